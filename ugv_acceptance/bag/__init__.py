@@ -1,0 +1,1 @@
+"""MCAP to columns of numbers, salvage, and a writer with checksums."""

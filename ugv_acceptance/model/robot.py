@@ -1,0 +1,95 @@
+"""A robot as data: links, joints and contact points of a URDF tree, and what it carries."""
+
+from dataclasses import dataclass, field
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NO_INERTIA: Matrix = (ZERO, ZERO, ZERO)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A rigid body: mass (kg), centre of gravity (m) and inertia about it (kg m2), in link axes."""
+
+    name: str
+    mass: float = 0.0
+    cog: Vector = ZERO
+    inertia: Matrix = NO_INERTIA
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A URDF joint: `xyz` (m) and `rotation` place its frame in the parent link, `axis` is a unit vector.
+
+    `kind` is revolute, continuous, prismatic or fixed. `effort` (N m, or N where prismatic),
+    `velocity` (rad/s or m/s) and the position limits are infinite where the URDF gives none.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    xyz: Vector = ZERO
+    rotation: Matrix = IDENTITY
+    axis: Vector = (1.0, 0.0, 0.0)
+    lower: float = float('-inf')
+    upper: float = float('inf')
+    effort: float = float('inf')
+    velocity: float = float('inf')
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A point (m, in the axes of `link`) with which the robot can stand on the ground."""
+
+    name: str
+    link: str
+    position: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Payload:
+    """A load carried by the robot's payload link: mass (kg) and centre of gravity in its axes (m)."""
+
+    mass: float = 0.0
+    cog: Vector = ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """The physical model; the root link's frame is `base_link`.
+
+    `joint_names` are the joints whose positions are given, in the order of every `q[..., j]`;
+    movable joints that are not among them are held at `held[name]`, else at 0.
+    `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
+    how far from it a point still stands on the ground.
+    """
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    joint_names: tuple[str, ...]
+    contacts: tuple[Contact, ...] = ()
+    held: dict[str, float] = field(default_factory=dict)
+    payload_link: str | None = None
+    payload: Payload = Payload()
+    gravity: float = 9.81
+    ground: float = 0.0
+    contact_tolerance: float = 0.005
+
+    @property
+    def root(self) -> str:
+        """Name of the link no joint has as its child."""
+        children = {joint.child for joint in self.joints}
+        return next(link.name for link in self.links if link.name not in children)
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of that name."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def link(self, name: str) -> Link:
+        """Return the link of that name."""
+        return next(link for link in self.links if link.name == name)

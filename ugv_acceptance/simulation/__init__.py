@@ -1,0 +1,1 @@
+"""A MuJoCo vehicle made from the robot description (no ROS)."""
