@@ -1,0 +1,86 @@
+# `make demo` and `make test` do all the set-up themselves. What each target is for: `make help`.
+
+PYTHON ?= python3
+# Python of Ubuntu 24.04, on which Jazzy runs; where this machine has none, the second test run is left out, said aloud.
+JAZZY_PYTHON ?= $(shell .ci/find-python 3.12)
+# Processes that run tests side by side.
+JOBS ?= 2
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help venv demo test lint pytest colcon clean distclean
+
+# The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
+# libraries load.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+# A sourced ROS (apt's) is used as it is: no wheels, and the NumPy its messages are compiled against.
+ROS := $(if $(ROS_DISTRO),-c requirements/jazzy.txt,-r requirements/ros.txt)
+PIP_INSTALL := -m pip install --quiet -c requirements/constraints.txt
+PACKAGE := -e '.[fast,sim,test]'
+REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
+COLCON := out/colcon
+INSTALLED := $(COLCON)/install/ugv_acceptance
+
+help:
+	@echo 'make venv       .venv with the command .venv/bin/ugv-acceptance'
+	@echo 'make demo       the main job on a recorded run: live margins and alerts, then the verdict on the bag'
+	@echo 'make test       everything CI checks: lint, the tests here, the tests on Python 3.12 + NumPy 1.26'
+	@echo 'make lint       ruff and mypy --strict'
+	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
+	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
+	@echo 'make clean      removes what was built; make distclean the virtual environments too'
+
+venv: .venv/.installed
+
+.venv/.installed: $(REQUIREMENTS)
+	test -x .venv/bin/python || $(PYTHON) -m venv .venv
+	.venv/bin/python $(PIP_INSTALL) $(ROS) $(PACKAGE)
+	test -x .venv/bin/ugv-acceptance
+	touch $@
+
+.venv312/.installed: $(REQUIREMENTS)
+	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
+	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) $(PACKAGE) colcon-common-extensions
+	touch $@
+
+demo: venv
+	.venv/bin/ugv-acceptance demo
+
+test: lint pytest
+ifneq ($(JAZZY_PYTHON),)
+	$(MAKE) colcon
+else
+	@echo '*** NOT DONE: the second run, on Python 3.12 + NumPy 1.26: no python3.12 on PATH, in pyenv or in uv.'
+	@echo '*** NOT DONE: `make colcon JAZZY_PYTHON=/path/to/python3.12` makes it.'
+	@test -z "$${CI:-}" || { echo '*** CI needs that run.'; exit 1; }
+endif
+
+lint: venv
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/mypy
+
+pytest: venv
+	.venv/bin/python -m pytest -n $(JOBS) $(ARGS)
+
+# colcon takes failing tests for a success unless it is asked; it takes no tests at all for one too.
+colcon: .venv312/.installed
+	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log build \
+	    --build-base $(COLCON)/build --install-base $(COLCON)/install --event-handlers console_direct+
+	test -x $(INSTALLED)/lib/ugv_acceptance/ugv-acceptance
+	test -x $(INSTALLED)/lib/ugv_acceptance/acceptance_monitor
+	test -f $(INSTALLED)/share/ament_index/resource_index/packages/ugv_acceptance
+	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log test \
+	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
+	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)
+	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build
+
+clean:
+	rm -rf out build install log *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -path './.venv*' -prune -o -name __pycache__ -type d -print0 | xargs -0 rm -rf
+
+distclean: clean
+	rm -rf .venv .venv312
