@@ -18,8 +18,7 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
 # A sourced ROS (apt's) is used as it is: no wheels, and the NumPy its messages are compiled against.
 ROS := $(if $(ROS_DISTRO),-c requirements/jazzy.txt,-r requirements/ros.txt)
-PIP_INSTALL := -m pip install --quiet -c requirements/constraints.txt
-PACKAGE := -e '.[fast,sim,test]'
+PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
 INSTALLED := $(COLCON)/install/ugv_acceptance
@@ -36,14 +35,17 @@ help:
 venv: .venv/.installed
 
 .venv/.installed: $(REQUIREMENTS)
+	@echo 'Installing what is needed into .venv: about a minute.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	.venv/bin/python $(PIP_INSTALL) $(ROS) $(PACKAGE)
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[fast,lint,sim,test]'
 	test -x .venv/bin/ugv-acceptance
 	touch $@
 
 .venv312/.installed: $(REQUIREMENTS)
+	@echo 'Installing what is needed into .venv312: about a minute.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
-	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) $(PACKAGE) colcon-common-extensions
+	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
+	    -e '.[fast,sim,test]' colcon-common-extensions
 	touch $@
 
 demo: venv
@@ -66,17 +68,19 @@ lint: venv
 pytest: venv
 	.venv/bin/python -m pytest -n $(JOBS) $(ARGS)
 
-# colcon takes failing tests for a success unless it is asked; it takes no tests at all for one too.
+colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
+# colcon takes failing tests for a success unless it is asked; a run without any test is one to it in any case.
 colcon: .venv312/.installed
-	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log build \
+	colcon --log-base $(COLCON)/log build \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --event-handlers console_direct+
 	test -x $(INSTALLED)/lib/ugv_acceptance/ugv-acceptance
 	test -x $(INSTALLED)/lib/ugv_acceptance/acceptance_monitor
 	test -f $(INSTALLED)/share/ament_index/resource_index/packages/ugv_acceptance
-	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log test \
+	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)
-	PATH="$(CURDIR)/.venv312/bin:$$PATH" colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build
+	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
+	grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
 clean:
 	rm -rf out build install log *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -27,19 +27,15 @@ SIMULATION = ['mujoco']
 TEST = [
     'catkin-pkg',
     'hypothesis',
-    'mypy',
     'pin',
     'pytest',
     'pytest-timeout',
     'pytest-xdist',
-    'ruff',
-    'scipy-stubs',
     'setuptools<80',
-    'types-PyYAML',
-    'types-defusedxml',
     'wheel',
     *SIMULATION,
 ]
+LINT = ['mypy', 'ruff', 'scipy-stubs', 'types-PyYAML', 'types-defusedxml']
 
 
 def version() -> str:
@@ -86,7 +82,7 @@ setup(
         *share('bags'),
     ],
     install_requires=REQUIRES,
-    extras_require={'sim': SIMULATION, 'fast': ['cramjam'], 'test': TEST},
+    extras_require={'sim': SIMULATION, 'fast': ['cramjam'], 'test': TEST, 'lint': LINT},
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',

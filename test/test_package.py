@@ -18,5 +18,5 @@ def test_changelog_has_the_version_on_top(repository: Path) -> None:
 
 def test_package_xml_has_the_version_of_the_code(repository: Path) -> None:
     """package.xml and the code name one version."""
-    root = ElementTree.parse(repository / 'package.xml').getroot()
-    assert root.findtext('version') == ugv_acceptance.__version__
+    package = ElementTree.parse(repository / 'package.xml')
+    assert package.findtext('version') == ugv_acceptance.__version__
