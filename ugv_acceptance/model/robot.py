@@ -1,6 +1,6 @@
 """A robot as data: links, joints and contact points of a URDF tree, and what it carries."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -63,7 +63,7 @@ class Robot:
     """The physical model; the root link's frame is `base_link`.
 
     `joint_names` are the joints whose positions are given, in the order of every `q[..., j]`;
-    movable joints that are not among them are held at `held[name]`, else at 0.
+    movable joints that are not among them are held at the value `held` pairs with their name, else at 0.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground.
     """
@@ -73,7 +73,7 @@ class Robot:
     joints: tuple[Joint, ...]
     joint_names: tuple[str, ...]
     contacts: tuple[Contact, ...] = ()
-    held: dict[str, float] = field(default_factory=dict)
+    held: tuple[tuple[str, float], ...] = ()
     payload_link: str | None = None
     payload: Payload = Payload()
     gravity: float = 9.81

@@ -1,0 +1,90 @@
+"""What an evaluation is told: how messages map to the robot, limits, and alert delays.
+
+Joint order is `robot.joint_names`. SI and radians; times in seconds. `config` makes these from a
+YAML file and checks them; nothing here checks again.
+"""
+
+from dataclasses import dataclass
+
+from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class JointInput:
+    """How one joint is found in JointState messages: q = sign * position + offset.
+
+    tau = effort_sign * effort_scale * effort (N m; N where prismatic).
+    """
+
+    topic_name: str
+    sign: float = 1.0
+    offset: float = 0.0
+    effort_sign: float = 1.0
+    effort_scale: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ImuInput:
+    """How the IMU sits on the robot and what of it is used.
+
+    `mounting` turns sensor axes into `base_link`, `position` is the sensor in `base_link` (m).
+    `attitude` is auto (orientation where it can be trusted, else accelerometer), orientation or
+    accelerometer. With `specific_force` the accelerometer takes gravity's place in every margin.
+    """
+
+    mounting: Matrix = IDENTITY
+    position: Vector = ZERO
+    attitude: str = 'auto'
+    specific_force: bool = False
+    low_pass: float = 0.2
+    rest_acceleration: float = 0.5
+    rest_rate: float = 0.1
+    agreement: float = 0.0872664625997165
+    agreement_delay: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where margins turn into levels. WARN from `*_warn`, ERROR from `*_error`.
+
+    `torque` limit of each joint (N m or N; infinite: not judged); `torque_warn` and `torque_error`
+    are utilisations |tau| / limit. Tip angles are the tilt left (rad). `speed` is the joint rate
+    (rad/s or m/s) to which the static model was shown valid; infinite: not judged.
+    """
+
+    torque: tuple[float, ...]
+    torque_warn: float = 0.8
+    torque_error: float = 1.0
+    torque_deadband: float = 2.0
+    tip_warn: float = 0.17453292519943295
+    tip_error: float = 0.08726646259971647
+    tip_deadband: float = 0.017453292519943295
+    speed: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Delays:
+    """Seconds a level must last before an alert is raised (on) and must be gone to clear it (off).
+
+    An input is stale when `stale_periods` of its own periods, but at least `stale_after`, have
+    passed without a message; silence is judged every `tick`.
+    """
+
+    tip_on: float = 0.1
+    torque_on: float = 0.1
+    fault_on: float = 0.0
+    off: float = 1.0
+    stale_after: float = 0.1
+    stale_periods: float = 3.0
+    tick: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Everything an evaluation needs beside the messages. `joints` follows `robot.joint_names`."""
+
+    robot: Robot
+    joints: tuple[JointInput, ...]
+    imu: ImuInput
+    limits: Limits
+    delays: Delays = Delays()

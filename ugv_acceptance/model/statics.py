@@ -1,0 +1,106 @@
+"""Static and dynamic joint torques, their margins, and the payload that is left: arrays in and out.
+
+Joint order is `robot.joint_names`; gravity is the vector (m/s2) in `base_link`, (0, 0, -g) on level
+ground; with the accelerometer in gravity's place it is minus the specific force. A payload left out
+is the robot's own `payload`.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ugv_acceptance.model.blocks import Floats, in_blocks
+from ugv_acceptance.model.expressions import Number
+from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
+from ugv_acceptance.model.robot import Payload, Robot
+
+
+def torque_of(posture: Posture, gravity: tuple[Number, Number, Number]) -> tuple[Number, ...]:
+    """Return each joint's static torque (N m; N where prismatic) under `gravity` (m/s2)."""
+    gx, gy, gz = gravity
+    return tuple(x * gx + y * gy + z * gz for x, y, z in posture.levers)
+
+
+def static_torque(
+    robot: Robot,
+    q: ArrayLike,
+    gravity: ArrayLike,
+    payload: Payload | None = None,
+    workers: int = 1,
+) -> Floats:
+    """Return the torque that holds posture `q` (..., j) at rest on a base under `gravity` (..., 3).
+
+    Shape (..., j), N m (N where prismatic): the paper's equations (1) and (2) for any tree.
+    """
+    mechanics, load = mechanics_of(robot), payload or robot.payload
+    n = len(robot.joint_names)
+
+    def torques(*columns: Number) -> tuple[Number, ...]:
+        posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
+        return torque_of(posture, columns[n:])  # type: ignore[arg-type]  # three columns
+
+    return in_blocks(torques, n, q, gravity, workers=workers)
+
+
+def inverse_dynamics(
+    robot: Robot,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    gravity: ArrayLike,
+    payload: Payload | None = None,
+    workers: int = 1,
+) -> Floats:
+    """Return the torque (..., j) that moves the joints with rates `qd` and accelerations `qdd`.
+
+    Rigid bodies on a base at rest, payload as a point mass; rad, rad/s, rad/s2 (m, m/s, m/s2 where
+    prismatic). With qd = qdd = 0 it is `static_torque`.
+    """
+    mechanics, load = mechanics_of(robot), payload or robot.payload
+
+    def torques(*columns: Number) -> tuple[Number, ...]:
+        return mechanics.forces.many(*columns, load.mass, *load.cog)
+
+    return in_blocks(torques, len(robot.joint_names), q, qd, qdd, gravity, workers=workers)
+
+
+def centre_of_gravity(robot: Robot, q: ArrayLike, payload: Payload | None = None) -> Floats:
+    """Return the whole robot's centre of gravity (m, `base_link`) for `q` (..., j), shape (..., 3)."""
+    mechanics, load = mechanics_of(robot), payload or robot.payload
+
+    def centres(*columns: Number) -> tuple[Number, ...]:
+        return posture_of(mechanics, columns, load.mass, load.cog).cog
+
+    return in_blocks(centres, 3, q)
+
+
+def torque_margin(torque: ArrayLike, limit: ArrayLike) -> Floats:
+    """Return limit - |torque| (..., j): what is left of each joint, negative where it saturates."""
+    margin: Floats = np.asarray(limit, dtype=np.float64) - np.abs(torque)
+    return margin
+
+
+def utilisation(torque: ArrayLike, limit: ArrayLike) -> Floats:
+    """Return |torque| / limit (..., j): 1 is saturation; NaN where a limit is infinite."""
+    return np.abs(np.asarray(torque, dtype=np.float64)) / np.asarray(limit, dtype=np.float64)
+
+
+def payload_capacity(
+    robot: Robot, q: ArrayLike, gravity: ArrayLike, limit: ArrayLike, workers: int = 1
+) -> Floats:
+    """Return the largest payload mass (kg), shape (...), that no joint's `limit` (j,) forbids.
+
+    Exact: torque is linear in the payload's mass. The payload's centre of gravity is that of
+    `robot.payload`. Negative where a joint saturates without any payload, so that no payload
+    is allowed; infinite where the payload loads no joint.
+    """
+    limit = np.asarray(limit, dtype=np.float64)
+    cog = robot.payload.cog
+    empty = static_torque(robot, q, gravity, Payload(0.0, cog), workers)
+    slope = static_torque(robot, q, gravity, Payload(1.0, cog), workers) - empty
+    with np.errstate(divide='ignore', invalid='ignore'):
+        # The torque reaches +limit or -limit, whichever lies in the direction the payload pulls.
+        rise = (limit - np.sign(slope) * empty) / np.abs(slope)
+    rise = np.where(slope == 0.0, np.inf, rise)
+    rise = np.where(np.abs(empty) > limit, np.minimum(rise, -1.0) * 0.0 - 1.0, rise)
+    result: Floats = rise.min(axis=-1)
+    return result

@@ -1,0 +1,196 @@
+"""The moving bodies of a robot, and their positions, motions and joint forces: one recursion.
+
+Fixed and held joints are lumped. Every body's axes are parallel to `base_link` when all joints are
+at zero, so a constant rotation between joints never appears. Forces come from the recursive
+Newton-Euler algorithm (Luh, Walker and Paul 1980); the static torque is the same recursion at rest.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.expressions import (
+    Mat,
+    Scalar,
+    Vec,
+    add,
+    cos,
+    cross,
+    dot,
+    matmul,
+    rotate,
+    scale,
+    sin,
+    subtract,
+    transpose,
+)
+from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Matrix, Robot, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Everything that moves with one joint, lumped; vectors in base axes at the zero posture.
+
+    `offset` (m) is from the parent body's origin to this one's (on the joint axis), `cog` from
+    this origin; `inertia` (kg m2) is about the centre of gravity.
+    """
+
+    joint: str
+    parent: int
+    prismatic: bool
+    axis: Vector
+    offset: Vector
+    mass: float
+    cog: Vector
+    inertia: Matrix
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """The bodies, parents first; body 0 is the base. `frames` places each link in its body."""
+
+    bodies: tuple[Body, ...]
+    frames: dict[str, tuple[int, Matrix, Vector]]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Rotation, origin (m) and joint axis of every body, in `base_link`."""
+
+    rotation: list[Mat]
+    origin: list[Vec]
+    axis: list[Vec]
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """Where a link is: its body, and its axes and origin in the body's zero-posture axes."""
+
+    body: int
+    rotation: Matrix
+    xyz: Vector
+
+
+def rotation_about(axis: Vec, angle: Scalar) -> Mat:
+    """Return the rotation matrix about a unit axis by an angle (rad): Rodrigues' formula."""
+    x, y, z = axis
+    s, c = sin(angle), cos(angle)
+    v = 1.0 - c
+    return (
+        (x * x + (1.0 - x * x) * c, x * y * v - z * s, x * z * v + y * s),
+        (y * x * v + z * s, y * y + (1.0 - y * y) * c, y * z * v - x * s),
+        (z * x * v - y * s, z * y * v + x * s, z * z + (1.0 - z * z) * c),
+    )
+
+
+def tree_of(robot: Robot) -> Tree:
+    """Return the moving bodies of `robot`. Raises BadConfig where the joints are not a tree."""
+    frames, moving = _place_links(robot)
+    names = ['', *(joint.name for joint, _ in moving)]
+    members: list[list[tuple[float, Vector, Matrix]]] = [[] for _ in names]
+    for link in robot.links:
+        frame = frames[link.name]
+        cog = _plain(add(frame.xyz, rotate(frame.rotation, link.cog)))
+        inertia = matmul(matmul(frame.rotation, link.inertia), transpose(frame.rotation))
+        members[frame.body].append((link.mass, cog, _plain_matrix(inertia)))
+    bodies = [Body(names[0], -1, False, (0.0, 0.0, 1.0), ZERO, *_lump(members[0]))]
+    for k, (joint, parent) in enumerate(moving, start=1):
+        at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
+        axis = _plain(rotate(frames[joint.child].rotation, joint.axis))
+        bodies.append(
+            Body(joint.name, parent.body, joint.kind == 'prismatic', axis, at, *_lump(members[k]))
+        )
+    return Tree(tuple(bodies), {n: (f.body, f.rotation, f.xyz) for n, f in frames.items()})
+
+
+def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Frame]]]:
+    """Return each link's frame and the moving joints (with their parents' frames), parents first."""
+    children: dict[str, list[Joint]] = {}
+    for joint in robot.joints:
+        children.setdefault(joint.parent, []).append(joint)
+    frames = {robot.root: _Frame(0, IDENTITY, ZERO)}
+    moving: list[tuple[Joint, _Frame]] = []
+    held = dict(robot.held)
+    waiting = list(children.get(robot.root, ()))
+    while waiting:
+        joint = waiting.pop(0)
+        if joint.child in frames:
+            raise BadConfig(f'joint {joint.name}: link {joint.child} has a parent already')
+        frames[joint.child] = _child_frame(robot, joint, frames, moving, held.get(joint.name, 0.0))
+        waiting += children.get(joint.child, ())
+    lost = [link.name for link in robot.links if link.name not in frames]
+    if lost:
+        raise BadConfig(f'links {", ".join(lost)} do not hang on root link {robot.root}')
+    return frames, moving
+
+
+def _child_frame(
+    robot: Robot,
+    joint: Joint,
+    frames: dict[str, _Frame],
+    moving: list[tuple[Joint, _Frame]],
+    held: float,
+) -> _Frame:
+    parent = frames[joint.parent]
+    turned = _plain_matrix(matmul(parent.rotation, joint.rotation))
+    if joint.name in robot.joint_names:
+        moving.append((joint, parent))
+        return _Frame(len(moving), turned, ZERO)
+    at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
+    if joint.kind == 'prismatic':
+        at = _plain(add(at, scale(rotate(turned, joint.axis), held)))
+    elif joint.kind != 'fixed':
+        turned = _plain_matrix(matmul(turned, rotation_about(joint.axis, held)))
+    return _Frame(parent.body, turned, at)
+
+
+def _plain(v: Sequence[Scalar]) -> Vector:
+    x, y, z = (float(c) for c in v)  # type: ignore[arg-type]  # numbers in, numbers out
+    return (x, y, z)
+
+
+def _plain_matrix(m: Sequence[Vec]) -> Matrix:
+    a, b, c = (_plain(row) for row in m)
+    return (a, b, c)
+
+
+def _lump(parts: list[tuple[float, Vector, Matrix]]) -> tuple[float, Vector, Matrix]:
+    """Return mass, centre of gravity and inertia about it of rigidly joined parts (Steiner)."""
+    mass = math.fsum(m for m, _, _ in parts)
+    if mass == 0.0:
+        return 0.0, ZERO, NO_INERTIA
+    cog = _plain([math.fsum(m * c[k] for m, c, _ in parts) / mass for k in range(3)])
+    total = [[0.0] * 3 for _ in range(3)]
+    for m, c, inertia in parts:
+        d = _plain(subtract(c, cog))
+        square = d[0] ** 2 + d[1] ** 2 + d[2] ** 2
+        for i in range(3):
+            for j in range(3):
+                steiner = (square if i == j else 0.0) - d[i] * d[j]
+                total[i][j] += inertia[i][j] + m * steiner
+    return mass, cog, _plain_matrix([(r[0], r[1], r[2]) for r in total])
+
+
+def pose_of(tree: Tree, q: Sequence[Scalar]) -> Pose:
+    """Return the pose of every body for joint positions `q` (one a moving body, rad or m)."""
+    pose = Pose([IDENTITY], [ZERO], [ZERO])
+    for body, position in zip(tree.bodies[1:], q, strict=True):
+        turn = pose.rotation[body.parent]
+        axis = rotate(turn, body.axis)
+        origin = add(pose.origin[body.parent], rotate(turn, body.offset))
+        if body.prismatic:
+            origin = add(origin, scale(axis, position))
+        else:
+            turn = matmul(turn, rotation_about(body.axis, position))
+        pose.rotation.append(turn)
+        pose.origin.append(origin)
+        pose.axis.append(axis)
+    return pose
+
+
+def point_of(tree: Tree, pose: Pose, link: str, point: Vec) -> tuple[int, Vec]:
+    """Return the body that carries `point` (m, link axes) and the point in `base_link`."""
+    body, rotation, xyz = tree.frames[link]
+    local = add(xyz, rotate(rotation, point))
+    return body, add(pose.origin[body], rotate(pose.rotation[body], local))
