@@ -2,7 +2,9 @@
 
 PYTHON ?= python3
 # Python of Ubuntu 24.04, on which Jazzy runs; where this machine has none, the second test run is left out, said aloud.
-JAZZY_PYTHON ?= $(shell .ci/find-python 3.12)
+ifndef JAZZY_PYTHON
+JAZZY_PYTHON := $(shell .ci/find-python 3.12)
+endif
 # Processes that run tests side by side.
 JOBS ?= 2
 
@@ -42,6 +44,7 @@ venv: .venv/.installed
 	touch $@
 
 .venv312/.installed: $(REQUIREMENTS)
+	@test -n '$(JAZZY_PYTHON)' || { echo 'expected a python3.12 on PATH, in pyenv or in uv, found none'; exit 1; }
 	@echo 'Installing what is needed into .venv312: about a minute.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
@@ -69,7 +72,8 @@ pytest: venv
 	.venv/bin/python -m pytest -n $(JOBS) $(ARGS)
 
 colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
-# colcon takes failing tests for a success unless it is asked; a run without any test is one to it in any case.
+
+# Unless it is asked, colcon takes failing tests for a success; no test at all is one to it in any case.
 colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log build \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --event-handlers console_direct+
@@ -80,7 +84,7 @@ colcon: .venv312/.installed
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
-	grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
+	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
 clean:
 	rm -rf out build install log *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,0 +1,260 @@
+"""The walls of the house, executed: who imports whom, what the pure part does without, how long.
+
+The table is that of docs/architecture.md. Imports inside functions count too.
+"""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / 'ugv_acceptance'
+MODULES = sorted(PACKAGE.rglob('*.py'))
+
+# What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
+BELOW_NODES = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'console'}
+MAY_IMPORT: dict[str, set[str]] = {
+    '__init__': set(),
+    'model': set(),
+    'evaluation': {'model'},
+    'config': {'model', 'evaluation'},
+    'bag': {'evaluation'},
+    'simulation': {'model'},
+    'report': {'model', 'evaluation'},
+    'console': {'model', 'evaluation'},
+    'nodes': BELOW_NODES,
+    'cli': BELOW_NODES | {'nodes'},
+}
+# A verb on recordings starts without these; each verb of cli that needs ROS is named.
+HEAVY = {'rclpy', 'mujoco', 'matplotlib', 'starlette'}
+LIVE_VERBS = {'demo', 'doctor', 'monitor', 'replay'}
+
+# The layers that may import a foreign library.
+HOME_OF = {
+    'rclpy': {'nodes'},
+    'mujoco': {'simulation'},
+    'pydantic': {'config'},
+    'yaml': {'config', 'bag'},
+    'defusedxml': {'config'},
+    'mcap': {'bag'},
+    'rosbags': {'bag'},
+    'matplotlib': {'report'},
+    'jinja2': {'report'},
+    'click': {'cli'},
+    'rich': {'cli'},
+    'typer': {'cli'},
+    'starlette': {'console'},
+    'uvicorn': {'console'},
+}
+# The pure part takes time, files and settings as arguments.
+PURE = {'model', 'evaluation'}
+IMPURE_MODULES = {
+    'time',
+    'datetime',
+    'logging',
+    'os',
+    'sys',
+    'io',
+    'pathlib',
+    'random',
+    'subprocess',
+    'socket',
+}
+IMPURE_CALLS = {'open', 'print', 'input'}
+
+LONGEST_MODULE = 300
+LONGEST_FUNCTION = 40
+# 'module' or 'module:function' -> the reason why it is longer.
+LONGER: dict[str, str] = {}
+
+
+def layer_of(path: Path) -> str:
+    """Return the layer a module stands in: its folder, or its own name on the top floor."""
+    parts = path.relative_to(PACKAGE).with_suffix('').parts
+    return parts[0]
+
+
+def name_of(path: Path) -> str:
+    """Return a short name for test ids and for LONGER."""
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def parse(path: Path) -> ast.Module:
+    """Return a module's syntax tree."""
+    return ast.parse(path.read_text(encoding='utf-8'), filename=str(path))
+
+
+def imports(tree: ast.AST, path: Path) -> Iterator[tuple[str, int]]:
+    """Yield the full name and the line of everything imported anywhere below `tree`.
+
+    `from a import b` yields a.b: b may be a module.
+    """
+    package = ['ugv_acceptance', *path.relative_to(PACKAGE).parent.parts]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node.lineno
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            start = '.'.join([*base, *([node.module] if node.module else [])])
+            for alias in node.names:
+                yield f'{start}.{alias.name}', node.lineno
+
+
+def our_layer(name: str) -> str | None:
+    """Return the layer of ours that a full imported name belongs to; None for a foreign one."""
+    parts = name.split('.')
+    if parts[0] != 'ugv_acceptance':
+        return None
+    known = len(parts) > 1 and parts[1] in MAY_IMPORT
+    return parts[1] if known else '__init__'
+
+
+def functions(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Return every function and method, nested ones included."""
+    return [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+
+
+def public_definitions(tree: ast.Module) -> Iterator[ast.ClassDef | ast.FunctionDef]:
+    """Yield the classes and functions a user of the module sees, methods included."""
+    bodies: list[list[ast.stmt]] = [tree.body]
+    while bodies:
+        for node in bodies.pop():
+            if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith('_'):
+                yield node
+                if isinstance(node, ast.ClassDef):
+                    bodies.append(node.body)
+
+
+def code_lines(node: ast.FunctionDef | ast.AsyncFunctionDef, source: list[str]) -> int:
+    """Return the lines of a function's body that hold code: no docstring, comment or blank line."""
+    body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+    if not body:
+        return 0
+    lines = source[body[0].lineno - 1 : node.end_lineno]
+    return sum(bool(line.strip()) and not line.strip().startswith('#') for line in lines)
+
+
+each_module = pytest.mark.parametrize('path', MODULES, ids=name_of)
+
+
+@each_module
+def test_every_module_stands_in_a_known_layer(path: Path) -> None:
+    """A folder or a file on the top floor is a layer of the table."""
+    assert layer_of(path) in MAY_IMPORT
+
+
+@each_module
+def test_a_layer_imports_only_layers_below_it(path: Path) -> None:
+    """The table of layers holds for every import, those inside functions too."""
+    layer = layer_of(path)
+    allowed = MAY_IMPORT[layer] | {layer, '__init__'}
+    wrong = [
+        f'line {line}: {name}'
+        for name, line in imports(parse(path), path)
+        if (other := our_layer(name)) is not None and other not in allowed
+    ]
+    assert not wrong, f'{name_of(path)} ({layer}) may import {sorted(allowed)}'
+
+
+@each_module
+def test_a_library_stays_in_its_layer(path: Path) -> None:
+    """rclpy, mujoco, pydantic and the like are imported in the layers named for them only."""
+    wrong = [
+        f'line {line}: {name}'
+        for name, line in imports(parse(path), path)
+        if layer_of(path) not in HOME_OF.get(name.split('.')[0], {layer_of(path)})
+    ]
+    assert not wrong, name_of(path)
+
+
+@pytest.mark.parametrize(
+    'path',
+    [p for p in MODULES if layer_of(p) == 'cli' and p.stem not in LIVE_VERBS],
+    ids=name_of,
+)
+def test_a_verb_on_recordings_loads_nothing_heavy(path: Path) -> None:
+    """Its module and all that it imports do without ROS, MuJoCo, matplotlib and web servers."""
+    name = '.'.join(path.relative_to(PACKAGE.parent).with_suffix('').parts)
+    code = f'import sys, {name}; print(sorted(set(sys.modules) & {HEAVY}))'
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == '[]'
+
+
+@pytest.mark.parametrize('path', [p for p in MODULES if layer_of(p) in PURE], ids=name_of)
+def test_the_pure_part_reads_no_clock_file_or_logger(path: Path) -> None:
+    """In model and evaluation time, files and settings come in as arguments."""
+    tree = parse(path)
+    calls = {
+        f'line {node.lineno}: {node.func.id}()'
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in IMPURE_CALLS
+    }
+    modules = {
+        f'line {line}: {name}'
+        for name, line in imports(tree, path)
+        if name.split('.')[0] in IMPURE_MODULES
+    }
+    assert not calls | modules, name_of(path)
+
+
+@each_module
+def test_a_module_is_short(path: Path) -> None:
+    """A module has at most 300 lines, unless LONGER gives the reason."""
+    lines = len(path.read_text(encoding='utf-8').splitlines())
+    assert lines <= LONGEST_MODULE or name_of(path) in LONGER, f'{name_of(path)}: {lines} lines'
+
+
+@each_module
+def test_a_function_is_short(path: Path) -> None:
+    """A function has at most 40 lines of code, unless LONGER gives the reason."""
+    source = path.read_text(encoding='utf-8').splitlines()
+    long = {
+        f'{name_of(path)}:{node.name}': lines
+        for node in functions(parse(path))
+        if (lines := code_lines(node, source)) > LONGEST_FUNCTION
+    }
+    assert not long.keys() - LONGER.keys(), long
+
+
+@each_module
+def test_every_public_name_has_a_docstring(path: Path) -> None:
+    """A module, a public class, function and method says what it is."""
+    tree = parse(path)
+    bare = [n.name for n in public_definitions(tree) if ast.get_docstring(n) is None]
+    assert ast.get_docstring(tree), f'{name_of(path)} has no docstring'
+    assert not bare, name_of(path)
+
+
+@each_module
+def test_every_function_is_annotated(path: Path) -> None:
+    """Every argument but self and cls, and every return, has its type."""
+    bare = []
+    for node in functions(parse(path)):
+        arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+        arguments += [a for a in (node.args.vararg, node.args.kwarg) if a is not None]
+        bare += [
+            f'{node.name}({argument.arg})'
+            for argument in arguments
+            if argument.annotation is None and argument.arg not in {'self', 'cls'}
+        ]
+        bare += [f'{node.name} ->'] if node.returns is None else []
+    assert not bare, name_of(path)
+
+
+def test_every_allowance_is_still_needed() -> None:
+    """LONGER names nothing that has become short or has gone."""
+    long = {name_of(p) for p in MODULES if len(p.read_text().splitlines()) > LONGEST_MODULE}
+    for path in MODULES:
+        source = path.read_text(encoding='utf-8').splitlines()
+        long |= {
+            f'{name_of(path)}:{node.name}'
+            for node in functions(parse(path))
+            if code_lines(node, source) > LONGEST_FUNCTION
+        }
+    assert not LONGER.keys() - long
