@@ -82,7 +82,8 @@ class _Raw:
 
 
 def _joint_states(key: Key, log_time: Times, stamp: Times, blocks: Sequence[Floats]) -> Columns:
-    return JointStateColumns(key[0], log_time, stamp, *blocks)
+    floats = [block.astype(np.float64, order='C') for block in blocks]
+    return JointStateColumns(key[0], log_time, stamp, *floats)
 
 
 def _imu(key: Key, log_time: Times, stamp: Times, blocks: Sequence[Floats]) -> Columns:
@@ -332,8 +333,7 @@ def _assemble(kind: Kind[Any], found: list[tuple[Key, _Raw]]) -> tuple[list[Colu
     columns = []
     for key, raws in groups.items():
         raw = raws[0] if len(raws) == 1 else _merged(raws)
-        floats = [np.asarray(b, np.float64, order='C') for b in raw.blocks]
-        columns.append(_COLUMNS[kind.type](key, raw.log_time, raw.stamp, floats))
+        columns.append(_COLUMNS[kind.type](key, raw.log_time, raw.stamp, raw.blocks))
     return columns, sum(len(raw.place) for _, raw in found)
 
 

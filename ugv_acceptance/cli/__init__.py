@@ -1,40 +1,55 @@
-"""The command line, `ugv-acceptance VERB`: one module a verb, imported only when it is used."""
+"""The command line, `ugv-acceptance VERB`: one module a verb, each thin: parse, call, print.
+
+A verb's module imports what it needs inside its function, so that --help and completion are quick.
+"""
 
 import sys
 from importlib import import_module
-from typing import Any
 
-import click
 import typer
-from typer.core import TyperGroup
 
-from ugv_acceptance import AcceptanceError
+from ugv_acceptance import AcceptanceError, __version__
 
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 
-# Verb -> its one line in --help; its code is ugv_acceptance/cli/VERB.py, function VERB.
-VERBS = {
-    'demo': 'Play a recorded run into the live monitor, then judge the same recording.',
-    'evaluate': 'Judge a recorded run: margins, alerts and a verdict.',
-    'monitor': 'Watch joint_states and IMU live and publish margins and alerts.',
-    'replay': 'Publish a recording on its topics.',
-    'model': 'Print what the tool believes the robot is.',
-    'doctor': 'Check a set-up and say what to do.',
-}
+# In the order in which people meet them; the code of a verb is cli/VERB.py, function VERB.
+VERBS = ('demo', 'evaluate', 'monitor', 'replay', 'model', 'doctor')
+
+app = typer.Typer(
+    name='ugv-acceptance',
+    help='Acceptance monitoring of unmanned ground vehicles: torque and tip-over margins.',
+    epilog='Exit codes: 0 pass, 1 fail, 2 bad input or usage, 3 inconclusive.',
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
 
 
-class LazyGroup(TyperGroup):
-    """Loads a verb's module when it is called or asked for help, not at start-up."""
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f'ugv-acceptance {__version__}')
+        raise typer.Exit
 
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which people meet them."""
-        return list(VERBS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return the command of a verb, or None where there is none of that name."""
-        if cmd_name not in VERBS:
-            return None
-        module = import_module(f'ugv_acceptance.cli.{cmd_name}')
-        app = typer.Typer(add_completion=False, rich_markup_mode=None)
-        app.command(cmd_name, help=getattr(module, cmd_name).__doc__)(getattr(module, cmd_name))
-        return typer.main.get_command(app)
+@app.callback()
+def _options(
+    version: bool = typer.Option(  # noqa: ARG001 - acted on by its callback
+        False, '--version', callback=_version, is_eager=True, help='Print the version and exit.'
+    ),
+) -> None:
+    """Acceptance monitoring of unmanned ground vehicles: torque and tip-over margins."""
+
+
+def main() -> None:
+    """Run the command line; an error a user can act on is one line and exit code 2."""
+    for verb in VERBS:
+        module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
+        app.command(verb)(getattr(module, verb.replace('-', '_')))
+    try:
+        app()
+    except AcceptanceError as error:
+        typer.echo(f'ugv-acceptance: {error}', err=True)
+        sys.exit(BAD_INPUT)
+
+
+if __name__ == '__main__':
+    main()
