@@ -1,0 +1,74 @@
+"""The launch files against what they start: read as syntax trees, for launch has no wheel."""
+
+import ast
+from collections.abc import Iterator
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+LAUNCH_FILES = sorted((Path(__file__).resolve().parents[1] / 'launch').glob('*.launch.py'))
+NODES = {'Node', 'LifecycleNode'}
+
+each_file = pytest.mark.parametrize('path', LAUNCH_FILES, ids=lambda path: path.name)
+
+
+def calls(path: Path, names: set[str]) -> Iterator[ast.Call]:
+    """Yield every call of a function or class of one of these names."""
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names:
+            yield node
+
+
+def first_arguments(path: Path, name: str) -> set[str]:
+    """Return the first argument of every call of `name`, all of them plain strings."""
+    return {ast.literal_eval(call.args[0]) for call in calls(path, {name})}
+
+
+def keywords(call: ast.Call) -> dict[str, ast.expr]:
+    """Return the keyword arguments of a call by name."""
+    return {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg is not None}
+
+
+@each_file
+def test_what_a_launch_file_starts_is_installed(path: Path) -> None:
+    """Every executable of this package that a launch file names is one of its console scripts."""
+    installed = {script.name for script in entry_points(group='console_scripts')}
+    started = {
+        ast.literal_eval(keywords(call)['executable'])
+        for call in calls(path, NODES)
+        if ast.literal_eval(keywords(call)['package']) == 'ugv_acceptance'
+    }
+    assert started
+    assert started <= installed
+
+
+@each_file
+def test_every_argument_is_declared_and_used(path: Path) -> None:
+    """What a launch file takes it uses, and what it uses it takes."""
+    declared = first_arguments(path, 'DeclareLaunchArgument')
+    assert declared == first_arguments(path, 'LaunchConfiguration')
+
+
+@each_file
+def test_every_argument_is_described(path: Path) -> None:
+    """`ros2 launch --show-args` says what each argument is for."""
+    for call in calls(path, {'DeclareLaunchArgument'}):
+        assert ast.literal_eval(keywords(call)['description'])
+
+
+@each_file
+def test_an_included_launch_file_takes_what_it_is_given(path: Path) -> None:
+    """The arguments handed on are arguments of the file included, which is one of ours."""
+    for call in calls(path, {'IncludeLaunchDescription'}):
+        names = [n.value for n in ast.walk(call.args[0]) if isinstance(n, ast.Constant)]
+        included = path.with_name(str(names[-1]))
+        given = {
+            key.value
+            for node in ast.walk(keywords(call)['launch_arguments'])
+            if isinstance(node, ast.Dict)
+            for key in node.keys
+            if isinstance(key, ast.Constant)
+        }
+        assert given
+        assert given <= first_arguments(included, 'DeclareLaunchArgument')
