@@ -2,6 +2,7 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -29,7 +30,9 @@ def generate_launch_description() -> LaunchDescription:
                 'loop', default_value='false', description='start again at the end'
             ),
             IncludeLaunchDescription(
-                PathJoinSubstitution([share, 'launch', 'monitor.launch.py']),
+                PythonLaunchDescriptionSource(
+                    PathJoinSubstitution([share, 'launch', 'monitor.launch.py'])
+                ),
                 launch_arguments={
                     'config': LaunchConfiguration('config'),
                     'namespace': LaunchConfiguration('namespace'),
