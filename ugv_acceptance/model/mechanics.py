@@ -8,6 +8,10 @@ a joint.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
 from ugv_acceptance.model.expressions import (
@@ -42,9 +46,9 @@ class Posture:
     contacts: tuple[Triple, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Mechanics:
-    """The compiled kernels of one robot.
+    """The compiled kernels of one robot (compared by identity: hashing a robot takes long).
 
     Inputs of `posture`: joint positions, payload mass, payload centre of gravity (3).
     Inputs of `forces`: positions, rates, accelerations, gravity (3), payload mass and centre (3).
@@ -133,6 +137,19 @@ def posture_of(mechanics: Mechanics, q: Sequence[Number], mass: Number, cog: Tri
     kernel = mechanics.posture.one if live else mechanics.posture.many
     out = kernel(*q, mass, *cog)
     n = 3 * len(mechanics.robot.joint_names)
-    triples = [out[k : k + 3] for k in range(0, n, 3)]
-    points = [out[k : k + 3] for k in range(n + 4, len(out), 3)]
-    return Posture(tuple(triples), out[n], out[n + 1 : n + 4], tuple(points))
+    levers: tuple[Any, ...] = tuple(out[k : k + 3] for k in range(0, n, 3))
+    contacts: tuple[Any, ...] = tuple(out[k : k + 3] for k in range(n + 4, len(out), 3))
+    return Posture(levers, out[n], (out[n + 1], out[n + 2], out[n + 3]), contacts)
+
+
+def take(posture: Posture, rows: slice | NDArray[np.intp]) -> Posture:
+    """Return the rows of a posture of arrays; what is the same for all samples stays a float."""
+
+    def pick(x: Number) -> Number:
+        return x if isinstance(x, float) else x[rows]
+
+    def pick_all(triples: tuple[Triple, ...]) -> tuple[Triple, ...]:
+        return tuple((pick(x), pick(y), pick(z)) for x, y, z in triples)
+
+    (cog,) = pick_all((posture.cog,))
+    return Posture(pick_all(posture.levers), pick(posture.mass), cog, pick_all(posture.contacts))

@@ -7,30 +7,41 @@ the accelerometer takes gravity's place.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ugv_acceptance.model.blocks import in_blocks
+from ugv_acceptance.model.blocks import Floats, in_blocks
 from ugv_acceptance.model.expressions import (
     Kernel,
     Number,
     Scalar,
     Vec,
+    add,
     atan2,
     compile_kernel,
     copysign,
     cross,
     dot,
+    rotate,
     scale,
     sqrt,
     subtract,
 )
-from ugv_acceptance.model.mechanics import Posture, Triple, mechanics_of, posture_of
+from ugv_acceptance.model.mechanics import (
+    Mechanics,
+    Posture,
+    Triple,
+    mechanics_of,
+    posture_of,
+    take,
+)
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.support import Support, support_of
+from ugv_acceptance.model.support import Cycle, Rows, Support, pairs, support_of, supports_of
 
 # Sides of the robot, by the direction in which an edge's outward normal points most.
 SIDES = ('front', 'left', 'rear', 'right')
@@ -38,30 +49,25 @@ SIDES = ('front', 'left', 'rear', 'right')
 # States of a stability sample; from NO_CONTACT on, there is no margin.
 STANDING, RAISED, INVERTED, NO_CONTACT, DEGENERATE, FREE_FALL = range(6)
 STATES = ('standing', 'raised', 'inverted', 'no_contact', 'degenerate', 'free_fall')
+_NO_EDGE = math.inf
 # Below this effective gravity (m/s2) nothing presses the robot on the ground: nothing can be said.
 WEIGHTLESS = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class TipEdge:
-    """One edge of a stance: its side (a number in SIDES), the samples that have it, and its terms.
+class Stance:
+    """How a posture stands, whatever the attitude: samples that share one support polygon.
 
-    Terms (m): `l` from the centre of gravity square to the edge, `b = l x a` for the unit vector
-    `a` along the edge, and the components of the inward direction in the ground plane on both.
+    `terms` are eight numbers a tip edge (m): `l` from the centre of gravity square to the edge,
+    `b = l x a` for the unit vector `a` along the edge, and the components of the ground plane's
+    inward direction on both. `sides` is the side of each edge, a number in SIDES; `mass` in kg.
     """
 
-    side: int | NDArray[np.int8]
-    where: NDArray[np.bool_] | None
+    support: Support
+    sides: tuple[int | NDArray[np.int8], ...]
     terms: tuple[Number, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Stance:
-    """How a posture stands: its tip edges, mass (kg) and state, whatever the attitude."""
-
-    edges: tuple[TipEdge, ...]
     mass: Number
-    state: int | NDArray[np.int8]
+    state: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +86,11 @@ class Stability:
     state: int | NDArray[np.int8]
 
 
-def _edge_terms(*inputs: Scalar) -> list[Scalar]:
-    """Terms of a TipEdge from its start, its end and the centre of gravity; last, its normal."""
-    start, end, cog = inputs[0:3], inputs[3:6], inputs[6:9]
-    edge = subtract(_vec(end), _vec(start))
+def _edge_terms(start: Vec, end: Vec, cog: Vec) -> list[Scalar]:
+    """Return the terms of an edge, then the two components of its outward normal."""
+    edge = subtract(end, start)
     along = scale(edge, 1.0 / sqrt(dot(edge, edge)))
-    to_start = subtract(_vec(start), _vec(cog))
+    to_start = subtract(start, cog)
     square = subtract(to_start, scale(along, dot(to_start, along)))
     side = cross(square, along)
     flat = 1.0 / sqrt(along[0] * along[0] + along[1] * along[1])
@@ -93,46 +98,78 @@ def _edge_terms(*inputs: Scalar) -> list[Scalar]:
     return [*square, *side, dot(inward, square), dot(inward, side), along[1], -along[0]]
 
 
-def _vec(parts: tuple[Scalar, ...]) -> Vec:
-    return (parts[0], parts[1], parts[2])
-
-
-def _edge_margins(*inputs: Scalar) -> list[Scalar]:
-    """Angle (rad), moment (N m a kg), energy (J a kg) and ZMP distance (m) of one edge."""
-    square, side, gravity = _vec(inputs[0:3]), _vec(inputs[3:6]), _vec(inputs[8:11])
-    inward_l, inward_b = inputs[6:8]
-    along_l, along_b = dot(gravity, square), dot(gravity, side)
+def _edge_margins(terms: Sequence[Scalar], gravity: Vec) -> list[Scalar]:
+    """Return angle (rad), moment (N m a kg), energy (J a kg) and ZMP distance (m) of one edge."""
+    along_l = dot(gravity, (terms[0], terms[1], terms[2]))
+    along_b = dot(gravity, (terms[3], terms[4], terms[5]))
+    inward_l, inward_b = terms[6], terms[7]
     rise = sqrt(along_l * along_l + along_b * along_b) - along_l
     slope = along_l * inward_l + along_b * inward_b
     zmp = inward_b * slope / (along_l * inward_b - along_b * inward_l) - inward_l
     return [atan2(-along_b, along_l), -along_b, copysign(rise, -along_b), zmp]
 
 
-@lru_cache(maxsize=1)
-def _kernels() -> tuple[Kernel, Kernel]:
-    terms = compile_kernel(_edge_terms, [f'point{k}' for k in range(9)])
-    margins = compile_kernel(_edge_margins, [f'term{k}' for k in range(11)])
-    return terms, margins
+@lru_cache(maxsize=256)
+def _terms_kernel(mechanics: Mechanics, polygon: Cycle) -> Kernel:
+    """Return the terms of all edges of a polygon from the contacts' and the cog's coordinates."""
+    contacts = mechanics.robot.contacts
+    frames = mechanics.tree.frames
+    n = 3 * len(contacts)
+
+    def formula(*inputs: Scalar) -> list[Scalar]:
+        points: list[Vec] = []
+        for k, contact in enumerate(contacts):
+            body, rotation, xyz = frames[contact.link]
+            fixed = add(xyz, rotate(rotation, contact.position))
+            moving = (inputs[3 * k], inputs[3 * k + 1], inputs[3 * k + 2])
+            points.append(fixed if body == 0 else moving)
+        cog = (inputs[n], inputs[n + 1], inputs[n + 2])
+        edges = [_edge_terms(points[i], points[j], cog) for i, j in pairs(polygon)]
+        return [*(x for e in edges for x in e[:8]), *(x for e in edges for x in e[8:])]
+
+    return compile_kernel(formula, [f'x{k}' for k in range(n + 3)])
 
 
-def stance_of(robot: Robot, posture: Posture) -> Stance:
-    """Return the stance of a posture: of one sample (floats) or of arrays of samples."""
-    support = support_of(robot, posture)
-    edges = tuple(
-        _tip_edge(posture.contacts[e.start], posture.contacts[e.end], posture.cog, e.where)
-        for e in support.edges
+@lru_cache(maxsize=64)
+def _margins_kernel(edges: int) -> Kernel:
+    """Return the margins of that many edges: all angles, all moments, all energies, all ZMPs."""
+
+    def formula(*inputs: Scalar) -> list[Scalar]:
+        gravity: Vec = (inputs[-3], inputs[-2], inputs[-1])
+        table = [_edge_margins(inputs[8 * k : 8 * k + 8], gravity) for k in range(edges)]
+        return [row[kind] for kind in range(4) for row in table]
+
+    return compile_kernel(formula, [f'x{k}' for k in range(8 * edges + 3)])
+
+
+def stance_of(mechanics: Mechanics, posture: Posture) -> Stance:
+    """Return the stance of one sample (a posture of floats)."""
+    points: Any = posture.contacts
+    support = support_of(mechanics.robot, points, posture.cog)  # type: ignore[arg-type]  # floats
+    return _stance(mechanics, posture, support, live=True)
+
+
+def stances_of(mechanics: Mechanics, posture: Posture, count: int) -> list[tuple[Rows, Stance]]:
+    """Return the stances of `count` samples (a posture of arrays), each with its rows."""
+    found = supports_of(mechanics.robot, posture.contacts, posture.cog, count)
+    return [
+        (rows, _stance(mechanics, take(posture, rows), support, live=False))
+        for rows, support in found
+    ]
+
+
+def _stance(mechanics: Mechanics, posture: Posture, support: Support, *, live: bool) -> Stance:
+    n = len(support.polygon)
+    if n == 0:
+        state = DEGENERATE if support.standing >= 3 else NO_CONTACT
+        return Stance(support, (), (), posture.mass, state)
+    kernel = _terms_kernel(mechanics, support.polygon)
+    terms = (kernel.one if live else kernel.many)(
+        *(x for point in posture.contacts for x in point), *posture.cog
     )
-    return Stance(edges, posture.mass, _standing_state(support))
-
-
-def _tip_edge(
-    start: Triple, end: Triple, cog: Triple, where: NDArray[np.bool_] | None
-) -> TipEdge:
-    numbers = (*start, *end, *cog)
-    kernel = _kernels()[0]
-    live = all(isinstance(x, float) for x in numbers)
-    *terms, nx, ny = kernel.one(*numbers) if live else kernel.many(*numbers)
-    return TipEdge(_side(nx, ny), where, tuple(terms))
+    sides = tuple(_side(*terms[k : k + 2]) for k in range(8 * n, 10 * n, 2))
+    state = RAISED if support.raised else STANDING
+    return Stance(support, sides, terms[: 8 * n], posture.mass, state)
 
 
 def _side(nx: Number, ny: Number) -> int | NDArray[np.int8]:
@@ -146,70 +183,72 @@ def _side(nx: Number, ny: Number) -> int | NDArray[np.int8]:
     return int(side[0]) if side.size and (side == side[0]).all() else side
 
 
-def _standing_state(support: Support) -> int | NDArray[np.int8]:
-    if isinstance(support.corners, int):
-        if support.corners:
-            return RAISED if support.raised else STANDING
-        return DEGENERATE if support.standing >= 3 else NO_CONTACT
-    empty = np.where(support.standing >= 3, DEGENERATE, NO_CONTACT)
-    on = np.where(support.raised, RAISED, STANDING)
-    return np.where(support.corners > 0, on, empty).astype(np.int8)
-
-
 def stability_of(stance: Stance, gravity: Triple) -> Stability:
-    """Return the margins of a stance under the effective `gravity` (m/s2)."""
-    kernel = _kernels()[1]
-    numbers = (*gravity, *(t for edge in stance.edges for t in edge.terms))
-    margins = kernel.one if all(isinstance(x, float) for x in numbers) else kernel.many
-    tables: list[list[Number]] = [[math.inf] * len(SIDES) for _ in range(3)]
-    zmp: Number = math.inf
-    for edge in stance.edges:
-        *values, distance = margins(*edge.terms, *gravity)
-        zmp = _least(zmp, distance, edge.where)
-        for side in range(len(SIDES)) if isinstance(edge.side, np.ndarray) else (edge.side,):
-            where = edge.where if isinstance(edge.side, int) else _both(edge, side)
-            for table, value in zip(tables, values, strict=True):
-                table[side] = _least(table[side], value, where)
+    """Return the margins of a stance under the effective `gravity` (m/s2): floats or arrays."""
+    n = len(stance.sides)
     state = _state(stance.state, gravity)
-    angle, moment, energy = (tuple(_known(x, state) for x in table) for table in tables)
+    if n == 0:
+        none = (math.nan,) * len(SIDES)
+        return Stability(none, none, none, math.nan, state)
+    kernel = _margins_kernel(n)
+    live = isinstance(gravity[0], float) and isinstance(stance.mass, float)
+    live = live and all(isinstance(x, float) for x in stance.terms)
+    values = (kernel.one if live else kernel.many)(*stance.terms, *gravity)
+    smaller = min if live else _smaller
+    angle = _by_side(stance.sides, values[:n], smaller)
+    moment = _by_side(stance.sides, values[n : 2 * n], smaller)
+    energy = _by_side(stance.sides, values[2 * n : 3 * n], smaller)
+    mass = stance.mass
     return Stability(
-        angle,
-        tuple(x * stance.mass for x in moment),
-        tuple(x * stance.mass for x in energy),
-        _known(zmp, state),
+        _known(angle, state),
+        _known([x * mass for x in moment], state),
+        _known([x * mass for x in energy], state),
+        _known([reduce(smaller, values[3 * n :])], state)[0],
         state,
     )
 
 
-def _both(edge: TipEdge, side: int) -> NDArray[np.bool_]:
-    on: NDArray[np.bool_] = edge.side == side
-    return on if edge.where is None else on & edge.where
+def _smaller(a: Number, b: Number) -> Number:
+    least: Number = np.minimum(a, b)
+    return least
 
 
-def _least(least: Number, value: Number, where: NDArray[np.bool_] | None) -> Number:
-    """Return the smaller of both where the edge exists."""
-    if isinstance(least, float) and isinstance(value, float):
-        return min(least, value)
-    smaller: Number = np.minimum(least, value if where is None else np.where(where, value, np.inf))
-    return smaller
+def _by_side(
+    sides: tuple[int | NDArray[np.int8], ...],
+    values: Sequence[Number],
+    smaller: Callable[[Number, Number], Number],
+) -> list[Number]:
+    """Return the smallest value of the edges on each side; infinite where there is none."""
+    least: list[Number] = [_NO_EDGE] * len(SIDES)
+    for side, value in zip(sides, values, strict=True):
+        if isinstance(side, int):
+            least[side] = value if least[side] is _NO_EDGE else smaller(least[side], value)
+        else:
+            for k in range(len(SIDES)):
+                least[k] = smaller(least[k], np.where(side == k, value, np.inf))
+    return least
 
 
-def _state(standing: int | NDArray[np.int8], gravity: Triple) -> int | NDArray[np.int8]:
+def _state(standing: int, gravity: Triple) -> int | NDArray[np.int8]:
     gx, gy, gz = gravity
     weight = gx * gx + gy * gy + gz * gz
-    if isinstance(weight, float) and isinstance(standing, int):
+    if isinstance(weight, float):
         if weight < WEIGHTLESS**2:
             return FREE_FALL
         return INVERTED if gz >= 0 and standing < INVERTED else standing
-    inverted = np.where((np.asarray(gz) >= 0) & (np.asarray(standing) < INVERTED), INVERTED, standing)
-    return np.where(weight < WEIGHTLESS**2, FREE_FALL, inverted).astype(np.int8)
+    state = np.full(len(weight), standing, dtype=np.int8)
+    if standing < INVERTED:
+        state[np.asarray(gz) >= 0] = INVERTED
+    state[weight < WEIGHTLESS**2] = FREE_FALL
+    return state
 
 
-def _known(value: Number, state: int | NDArray[np.int8]) -> Number:
-    """Return NaN in place of the margin of a sample whose state has none."""
-    if isinstance(state, int) and isinstance(value, float):
-        return math.nan if state >= NO_CONTACT else value
-    return np.where(np.asarray(state) >= NO_CONTACT, np.nan, value)
+def _known(values: Sequence[Number], state: int | NDArray[np.int8]) -> tuple[Number, ...]:
+    """Return NaN in place of margins of samples whose state has none."""
+    if isinstance(state, int):
+        return tuple(values) if state < NO_CONTACT else (math.nan,) * len(values)
+    none = state >= NO_CONTACT
+    return tuple(np.where(none, np.nan, x) for x in values) if none.any() else tuple(values)
 
 
 def stability(
@@ -223,11 +262,15 @@ def stability(
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
 
-    def margins(*columns: Number) -> tuple[Number, ...]:
+    def margins(*columns: Any) -> Sequence[Floats]:
         posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
-        found = stability_of(stance_of(robot, posture), columns[n:])  # type: ignore[arg-type]  # three
-        return (*found.angle, *found.moment, *found.energy, found.zmp, found.state)  # type: ignore[arg-type]  # a small integer
+        table = np.empty((14, len(columns[0])))
+        for rows, stance in stances_of(mechanics, posture, len(columns[0])):
+            found = stability_of(stance, tuple(g[rows] for g in columns[n:]))
+            values = (*found.angle, *found.moment, *found.energy, found.zmp, found.state)
+            for line, value in zip(table, values, strict=True):
+                line[rows] = value
+        return list(table)
 
-    table = np.moveaxis(in_blocks(margins, 14, q, gravity, workers=workers), -1, 0)
-    parts = tuple(table)
+    parts = tuple(np.moveaxis(in_blocks(margins, 14, q, gravity, workers=workers), -1, 0))
     return Stability(parts[0:4], parts[4:8], parts[8:12], parts[12], parts[13].astype(np.int8))

@@ -8,19 +8,21 @@ under the centre of gravity. A polygon is a cycle of contact numbers, counter-cl
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.model.mechanics import Posture
 from ugv_acceptance.model.robot import Robot
 
 Point = tuple[float, float, float]
 Cycle = tuple[int, ...]
 Mask = NDArray[np.bool_]
-Counts = NDArray[np.int64]
+Rows = Union[slice, NDArray[np.intp]]
+
+ALL = slice(None)
 
 # A polygon thinner than this (m) has no inside that could be stood on.
 THIN = 1e-6
@@ -29,50 +31,62 @@ _SLACK = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
-    """A tip edge between two contact points; `where` masks the samples that have it (None: all)."""
-
-    start: int
-    end: int
-    where: Mask | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Support:
-    """The edges of the support polygons of a posture's samples.
+    """How a sample stands on the ground.
 
-    `standing` is the number of contact points on the ground, `corners` that of the polygon: 0 where
-    fewer than three points stand or all in one line, which leaves no edge. `raised` says that the
-    robot stands on points below the tracks' plane.
+    `polygon` is the cycle of contacts it stands on: empty where fewer than three points stand or
+    all in one line. `standing` is the number of contact points on the ground; `raised` says that
+    the robot stands on points below the tracks' plane.
     """
 
-    edges: tuple[Edge, ...]
-    standing: int | Counts
-    corners: int | Counts
-    raised: bool | Mask
+    polygon: Cycle
+    standing: int
+    raised: bool
 
 
-def support_of(robot: Robot, posture: Posture) -> Support:
-    """Return the support polygon of a posture: of one sample (floats) or of every sample (arrays)."""
-    numbers = [x for point in (*posture.contacts, posture.cog) for x in point]
-    count = max((len(x) for x in numbers if isinstance(x, np.ndarray)), default=0)
-    if count:
-        return _support_of_many(robot, posture, count)
-    cycle, standing, raised = polygon(robot, posture.contacts, posture.cog)  # type: ignore[arg-type]  # floats
-    return Support(_edges(cycle), standing, len(cycle), raised)
+def support_of(robot: Robot, points: Sequence[Point], cog: Point) -> Support:
+    """Return the support of one sample from its contact points and centre of gravity (m)."""
+    lowest = min((z for _, _, z in points), default=robot.ground)
+    if lowest < robot.ground - robot.contact_tolerance:
+        return _face_below(points, cog, robot.contact_tolerance)
+    top = robot.ground + robot.contact_tolerance
+    active = tuple(k for k, point in enumerate(points) if point[2] <= top)
+    return Support(_hull(tuple(points), active), len(active), False)
 
 
-def polygon(robot: Robot, points: Sequence[Point], cog: Point) -> tuple[Cycle, int, bool]:
-    """Return the polygon one sample stands on, how many points stand, and whether it is raised."""
-    heights = [z - robot.ground for _, _, z in points]
-    if heights and min(heights) < -robot.contact_tolerance:
-        cycle, standing = _face_below(points, cog, robot.contact_tolerance)
-        return cycle, standing, True
-    active = [k for k, h in enumerate(heights) if h <= robot.contact_tolerance]
-    return _hull(points, active), len(active), False
+def supports_of(
+    robot: Robot, contacts: Sequence[Any], cog: Any, count: int
+) -> list[tuple[Rows, Support]]:
+    """Return the supports of `count` samples, each with the rows that share it.
+
+    The support of the first sample is taken by all samples it fits; so on until none is left.
+    """
+    points = [tuple(np.broadcast_to(x, count) for x in point) for point in contacts]
+    centre = tuple(np.broadcast_to(x, count) for x in cog)
+    height = np.array([point[2] for point in points]).reshape(-1, count) - robot.ground
+    raised = (height < -robot.contact_tolerance).any(axis=0)
+    active = height <= robot.contact_tolerance
+    found: list[tuple[Rows, Support]] = []
+    left = np.ones(count, dtype=np.bool_)
+    while left.any():
+        first = int(left.argmax())
+        one = [(float(x[first]), float(y[first]), float(z[first])) for x, y, z in points]
+        x, y, z = (float(c[first]) for c in centre)
+        support = support_of(robot, one, (x, y, z))
+        same = left & (raised == support.raised)
+        if support.raised:
+            same &= _is_face(points, centre, support, robot.contact_tolerance)
+        else:
+            same &= (active == active[:, first : first + 1]).all(axis=0)
+            same &= _is_hull(points, support.polygon, np.flatnonzero(active[:, first]))
+        same[first] = True
+        left &= ~same
+        found.append((ALL if same.all() else np.flatnonzero(same), support))
+    return found
 
 
-def _hull(points: Sequence[Point], active: Sequence[int]) -> Cycle:
+@lru_cache(maxsize=256)
+def _hull(points: tuple[Point, ...], active: tuple[int, ...]) -> Cycle:
     """Return the convex hull seen from above (Andrew's monotone chain); () where it is degenerate."""
     order = sorted(active, key=lambda k: points[k][:2])
     chain: list[int] = []
@@ -102,18 +116,18 @@ def _width(points: Sequence[Point], chain: Sequence[int]) -> float:
     return float(area / longest) if longest else 0.0
 
 
-def _face_below(points: Sequence[Point], cog: Point, tolerance: float) -> tuple[Cycle, int]:
+def _face_below(points: Sequence[Point], cog: Point, tolerance: float) -> Support:
     """Return the face of the lower hull under (or nearest to) the centre of gravity."""
     best: tuple[float, Cycle, int] = (-math.inf, (), 0)
     for triple in combinations(range(len(points)), 3):
         above = _height_above(points, *triple)
         if above is None or min(above) < -tolerance:
             continue
-        active = [k for k, h in enumerate(above) if h <= tolerance]
-        cycle = _hull(points, active)
-        inside = [_turn([points[i], points[j], cog], 0, 1, 2) for i, j in _pairs(cycle)]
+        active = tuple(k for k, h in enumerate(above) if h <= tolerance)
+        cycle = _hull(tuple(points), active)
+        inside = [_turn([points[i], points[j], cog], 0, 1, 2) for i, j in pairs(cycle)]
         best = max(best, (min(inside, default=-math.inf), cycle, len(active)))
-    return best[1], best[2]
+    return Support(best[1], best[2], True)
 
 
 def _height_above(points: Sequence[Any], i: int, j: int, k: int) -> list[Any] | None:
@@ -127,45 +141,9 @@ def _height_above(points: Sequence[Any], i: int, j: int, k: int) -> list[Any] | 
     return [(z - az) + ((x - ax) * nx + (y - ay) * ny) / nz for x, y, z in points]
 
 
-def _pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
+def pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
+    """Return the edges of a polygon, counter-clockwise."""
     return zip(cycle, cycle[1:] + cycle[:1], strict=True)
-
-
-def _edges(cycle: Cycle) -> tuple[Edge, ...]:
-    return tuple(Edge(i, j) for i, j in _pairs(cycle))
-
-
-def _support_of_many(robot: Robot, posture: Posture, count: int) -> Support:
-    """Return the supports of arrays: samples that share a polygon are found together.
-
-    The polygon of the first sample is taken by all samples it fits; so on until none is left.
-    """
-    points = [tuple(np.broadcast_to(x, count) for x in point) for point in posture.contacts]
-    cog = tuple(np.broadcast_to(x, count) for x in posture.cog)
-    height = np.array([point[2] for point in points]).reshape(-1, count) - robot.ground
-    raised = (height < -robot.contact_tolerance).any(axis=0)
-    active = height <= robot.contact_tolerance
-    standing, corners = active.sum(axis=0), np.zeros(count, dtype=np.int64)
-    masks: dict[tuple[int, int], Mask] = {}
-    left = np.ones(count, dtype=np.bool_)
-    while left.any():
-        first = int(left.argmax())
-        one = [(float(x[first]), float(y[first]), float(z[first])) for x, y, z in points]
-        cycle, number, up = polygon(robot, one, tuple(float(x[first]) for x in cog))  # type: ignore[arg-type]
-        same = left & (raised == up)
-        if up:
-            same &= _is_face(points, cog, cycle, number, robot.contact_tolerance)
-            standing[same] = number
-        else:
-            same &= (active == active[:, first : first + 1]).all(axis=0)
-            same &= _is_hull(points, cycle, np.flatnonzero(active[:, first]))
-        same[first] = True
-        corners[same] = len(cycle)
-        for pair in _pairs(cycle):
-            masks[pair] = masks[pair] | same if pair in masks else same
-        left &= ~same
-    edges = tuple(Edge(i, j, None if m.all() else m) for (i, j), m in masks.items())
-    return Support(edges, standing, corners, raised)
 
 
 def _is_hull(points: Sequence[Any], cycle: Cycle, active: Iterable[int]) -> Mask | bool:
@@ -176,22 +154,21 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Iterable[int]) -> Mask
     if not cycle:  # points in one line: whether they stay so is asked of each sample
         return False
     good: Mask | bool = True
-    for i, j in _pairs(cycle):
+    for i, j in pairs(cycle):
         for k in active:
             if k not in (i, j):
                 good = good & (_turn(points, i, j, k) >= -_SLACK)
     return good
 
 
-def _is_face(
-    points: Sequence[Any], cog: Any, cycle: Cycle, standing: int, tolerance: float
-) -> Mask | bool:
-    """Return where `cycle` is the face of the lower hull under the centre of gravity."""
+def _is_face(points: Sequence[Any], cog: Any, support: Support, tolerance: float) -> Mask | bool:
+    """Return where the support is the face of the lower hull under the centre of gravity."""
+    cycle = support.polygon
     above = _height_above(points, *cycle[:3]) if cycle else None
     if above is None:
         return False
-    inside = np.all([_turn([points[i], points[j], cog], 0, 1, 2) > 0 for i, j in _pairs(cycle)], 0)
-    on = np.sum([h <= tolerance for h in above], axis=0) == standing
+    inside = np.all([_turn([points[i], points[j], cog], 0, 1, 2) > 0 for i, j in pairs(cycle)], 0)
+    on = np.sum([h <= tolerance for h in above], axis=0) == support.standing
     corners = np.all([above[k] <= tolerance for k in cycle], axis=0)
     good: Mask = inside & on & corners & (np.min(above, axis=0) >= -tolerance)
     active = [k for k, h in enumerate(above) if k in cycle or (h[good] <= tolerance).any()]
