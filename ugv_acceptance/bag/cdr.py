@@ -181,9 +181,7 @@ def _joint_state(layout: Layout, stamp: int, blocks: list[tuple[float, ...]]) ->
 
 def _imu(layout: Layout, stamp: int, blocks: list[tuple[float, ...]]) -> ImuSample:
     v = blocks[0]
-    return ImuSample(
-        stamp, layout.frame_id, v[0:4], v[13:16], v[25:28], v[4], v[16], v[28]
-    )
+    return ImuSample(stamp, layout.frame_id, v[0:4], v[13:16], v[25:28], v[4], v[16], v[28])
 
 
 def _payload(layout: Layout, stamp: int, blocks: list[tuple[float, ...]]) -> PayloadSample:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
+import zstandard
 from numpy.typing import NDArray
 
 from ugv_acceptance import BadSample
@@ -34,6 +35,7 @@ HEAD = 31  # opcode, length, channel, sequence, log time, publish time
 _BEFORE = 5  # a row starts this far before its record: then CDR's origin is a multiple of 8
 _GUESSES = 8  # layouts learnt a chunk before the rest goes message by message
 _MAX_PLANS = 16
+_MAX_MESSAGE = 1 << 24
 
 
 def batch(columns: Iterable[Columns]) -> Batch:
@@ -124,14 +126,16 @@ class _Plan:
         order = '<' if layout.little else '>'
         data = _BEFORE + HEAD
         names = [f'block{i}' for i in range(len(layout.blocks))]
-        self.row = np.dtype({
-            'names': ['log_time', 'sec', 'nanosec', *names],
-            'formats': ['<i8', f'{order}i4', f'{order}u4']
-            + [(f'{order}f8', (n,)) for n in layout.widths],
-            'offsets': [_BEFORE + 15, data + layout.stamp, data + layout.stamp + 4]
-            + [data + offset if n else 0 for offset, n in layout.blocks],
-            'itemsize': self.width,
-        })
+        self.row = np.dtype(
+            {
+                'names': ['log_time', 'sec', 'nanosec', *names],
+                'formats': ['<i8', f'{order}i4', f'{order}u4']
+                + [(f'{order}f8', (n,)) for n in layout.widths],
+                'offsets': [_BEFORE + 15, data + layout.stamp, data + layout.stamp + 4]
+                + [data + offset if n else 0 for offset, n in layout.blocks],
+                'itemsize': self.width,
+            }
+        )
         self.regions = self._regions(layout, channel)
 
     def _regions(self, layout: Layout, channel: int) -> list[tuple[slice, Any, Any]]:
@@ -160,10 +164,7 @@ class _Plan:
     def matches(self, rows: NDArray[Any]) -> NDArray[np.bool_] | None:
         """Which rows have this layout; None if all have."""
         words = rows.view(np.uint64).reshape(len(rows), self.words)
-        differs = [
-            (words[:, part] ^ text, bits)
-            for part, text, bits in self.regions
-        ]
+        differs = [(words[:, part] ^ text, bits) for part, text, bits in self.regions]
         if not any((np.bitwise_or.reduce(d, axis=0) & bits).any() for d, bits in differs):
             return None
         bad = np.zeros(len(rows), np.bool_)
@@ -184,21 +185,14 @@ class _Plan:
 class ColumnDecoder:
     """Turns messages of one channel into columns; remembers the layouts it has met.
 
-    `unpack` is applied to a message's bytes first (message compression); it and ROS 1's packing
-    mean message by message. Safe to use from several threads.
+    ROS 1's packing and compressed messages mean message by message. Safe to use from several
+    threads.
     """
 
-    def __init__(
-        self,
-        kind: Kind[Any],
-        channel: int = 0,
-        wire: Wire = 'cdr',
-        unpack: Callable[[bytes], bytes] | None = None,
-    ) -> None:
+    def __init__(self, kind: Kind[Any], channel: int = 0, wire: Wire = 'cdr') -> None:
         self.kind = kind
         self.channel = channel
-        self.unpack = unpack
-        self.regular = wire == 'cdr' and unpack is None
+        self.regular = wire == 'cdr'
         self._one = Decoder(kind, wire)
         self._plans: tuple[_Plan, ...] = ()
 
@@ -304,14 +298,25 @@ class ColumnDecoder:
         groups: dict[Key, list[tuple[int, int, int, list[tuple[float, ...]]]]] = {}
         for place, log_time, packed in messages:
             try:
-                data = self.unpack(packed) if self.unpack else packed
-                layout, stamp, blocks = self._one.raw(data)
+                layout, stamp, blocks = self._one.raw(_plain(packed))
             except BadSample as error:
                 malformed += 1
                 reason = reason or str(error)
                 continue
             groups.setdefault(_key(self.kind, layout), []).append((place, log_time, stamp, blocks))
         return [(key, _raw_of(rows)) for key, rows in groups.items()], malformed, reason
+
+
+def _plain(data: bytes) -> bytes:
+    """The message itself where rosbag2 compressed it (compression_mode: message)."""
+    if data[:4] != zstandard.FRAME_HEADER:
+        return data
+    try:
+        if zstandard.frame_content_size(data) > _MAX_MESSAGE:
+            raise BadSample(f'message claims more than {_MAX_MESSAGE} bytes')
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=_MAX_MESSAGE)
+    except zstandard.ZstdError as error:
+        raise BadSample(f'message: its zstd data is broken ({error})') from error
 
 
 def _raw_of(rows: list[tuple[int, int, int, list[tuple[float, ...]]]]) -> _Raw:

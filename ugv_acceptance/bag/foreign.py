@@ -1,0 +1,131 @@
+"""SQLite bags (rosbag2's older storage) and ROS 1 bags: messages one by one to the same columns.
+
+SQLite is read with Python's own module, since it needs nothing but four columns of two tables and
+so works without metadata.yaml; ROS 1 bags are read by rosbags.
+"""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import quote
+
+from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.rosbag1 import ReaderError
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.mcap_index import Channel
+from ugv_acceptance.bag.mcap_source import Piecework, Wanted
+
+_BLOCK = 4096  # messages a batch
+_Message = tuple[int, int, bytes]  # channel, log time in ns, content
+
+
+@dataclass(slots=True)
+class ForeignIndex:
+    """Channels of one file, messages a channel id, first and last log time in ns."""
+
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)
+    first: int = 0
+    last: int = 0
+
+
+def open_sqlite(path: Path, name: str) -> ForeignIndex:
+    """Index of an SQLite bag."""
+    with _sqlite_errors(name), closing(_connect(path)) as db:
+        topics = db.execute('SELECT id, name, type, serialization_format FROM topics')
+        channels = {int(i): Channel(int(i), str(n), str(t), str(s)) for i, n, t, s in topics}
+        counts = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
+        held = {int(i): int(n) for i, n in counts}
+        first, last = db.execute('SELECT min(timestamp), max(timestamp) FROM messages').fetchone()
+    return ForeignIndex(channels, held, int(first or 0), int(last or 0))
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    # Immutable: a bag may lie where we cannot write, and a log left beside it is not ours to merge.
+    return sqlite3.connect(f'file:{quote(str(path))}?mode=ro&immutable=1', uri=True)
+
+
+class _sqlite_errors:  # noqa: N801 (used like a function)
+    """SQLite's own errors, and values of a type it should not hold, become BadBag."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, sqlite3.Error | TypeError | ValueError):
+            raise BadBag(f'{self.name}: not a readable SQLite bag ({error})') from error
+
+
+def _sqlite_messages(path: Path, wanted: Wanted) -> Iterator[_Message]:
+    marks = ','.join('?' * len(wanted))
+    query = (
+        'SELECT topic_id, timestamp, data FROM messages '  # noqa: S608 (only question marks)
+        f'WHERE topic_id IN ({marks}) ORDER BY timestamp, id'
+    )
+    with closing(_connect(path)) as db:
+        for channel, log_time, data in db.execute(query, list(wanted)):
+            yield int(channel), int(log_time), bytes(data)
+
+
+def open_ros1(path: Path, name: str) -> ForeignIndex:
+    """Index of a ROS 1 bag."""
+    try:
+        with Ros1Reader(path) as reader:
+            channels = {c.id: Channel(c.id, c.topic, c.msgtype, 'ros1') for c in reader.connections}
+            counts = {c.id: c.msgcount for c in reader.connections}
+            empty = not reader.message_count
+            first, last = (0, 0) if empty else (reader.start_time, reader.end_time - 1)
+            return ForeignIndex(channels, counts, first, last)
+    except Exception as error:  # rosbags lets whatever a broken file causes through
+        raise BadBag(f'{name}: not a readable ROS 1 bag ({error})') from error
+
+
+def _ros1_messages(path: Path, wanted: Wanted) -> Iterator[_Message]:
+    with Ros1Reader(path) as reader:
+        connections = [c for c in reader.connections if c.id in wanted]
+        for connection, log_time, data in reader.messages(connections):
+            yield connection.id, log_time, bytes(data)
+
+
+_MESSAGES = {'sqlite3': _sqlite_messages, 'ros1': _ros1_messages}
+
+
+def foreign_blocks(
+    storage: str, path: Path, name: str, wanted: Wanted
+) -> Iterator[tuple[Piecework, int]]:
+    """Blocks of messages in log time order, each with the log time of its last message, ns.
+
+    What breaks while reading ends the file with a finding; what came before is kept.
+    """
+    block: list[_Message] = []
+    broken = ''
+    messages = _MESSAGES[storage](path, wanted) if wanted else iter(())
+    while not broken:
+        try:
+            block.append(next(messages))
+        except StopIteration:
+            break
+        except (sqlite3.Error, ReaderError, OSError, ValueError, TypeError) as error:
+            broken = f'{name}: reading ended early ({error})'
+        if len(block) >= _BLOCK:
+            yield _decode(block, wanted), block[-1][1]
+            block = []
+    work = _decode(block, wanted)
+    if broken:
+        work.findings.append(broken)
+    yield work, block[-1][1] if block else 0
+
+
+def _decode(block: list[_Message], wanted: Wanted) -> Piecework:
+    work = Piecework()
+    for channel, (topic, decoder) in wanted.items():
+        mine = [(log_time, data) for c, log_time, data in block if c == channel]
+        if mine:
+            work.add(topic, decoder.messages(mine))
+    return work

@@ -1,0 +1,219 @@
+"""What an MCAP file holds and where: from its summary, or by scanning it where that fails."""
+
+import os
+import struct
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+from mcap import records
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.chunks import (
+    CHUNK,
+    HEAD_BYTES,
+    MAX_CHUNK_BYTES,
+    ChunkHead,
+    Walked,
+    chunk_head,
+    crc32,
+)
+
+MAGIC = b'\x89MCAP0\r\n'
+_FOOTER_BYTES = 29 + len(MAGIC)
+_MAX_SUMMARY_BYTES = 1 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic in one file: its ROS type name ('' where it has no schema), encoding of messages."""
+
+    id: int
+    topic: str
+    type: str
+    encoding: str
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of a file that is read on its own: a chunk, or bare message records.
+
+    `start`, `length` in bytes; `first`, `last` log times in ns; `head` None for bare records;
+    `indexes` says where each channel's MessageIndex lies in the file, None where there is none.
+    """
+
+    start: int
+    length: int
+    first: int
+    last: int
+    head: ChunkHead | None = None
+    indexes: dict[int, int] | None = None
+    index_length: int = 0
+
+
+@dataclass(slots=True)
+class McapIndex:
+    """Channels and pieces of one file; `counts` messages a channel id, `claimed` by whom."""
+
+    size: int
+    channels: dict[int, Channel] = field(default_factory=dict)
+    pieces: list[Piece] = field(default_factory=list)
+    counts: dict[int, int] = field(default_factory=dict)
+    scanned: bool = False
+    salvaged: str | None = None
+    findings: list[str] = field(default_factory=list)
+
+
+def pread(file: BinaryIO, start: int, length: int) -> bytes:
+    """`length` bytes of the file from `start`, fewer at its end."""
+    return os.pread(file.fileno(), max(length, 0), start)
+
+
+def parse(read: Callable[[Any], Any], content: bytes, what: str) -> Any:
+    """A record from its content; BadBag where it is garbled."""
+    try:
+        return read(ReadDataStream(BytesIO(content)))
+    except (McapError, struct.error, ValueError, KeyError) as error:
+        raise BadBag(f'{what}: garbled record ({error!r})') from error
+
+
+def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int, bytes]]) -> None:
+    """Take Schema and Channel records into `index`; garbled ones become findings."""
+    for opcode, content in found:
+        try:
+            if opcode == 3:
+                schema = parse(records.Schema.read, content, 'schema')
+                schemas[schema.id] = schema.name
+            elif opcode == 4:
+                channel = parse(records.Channel.read, content, 'channel')
+                index.channels[channel.id] = Channel(
+                    channel.id,
+                    channel.topic,
+                    schemas.get(channel.schema_id, ''),
+                    channel.message_encoding,
+                )
+        except BadBag as error:
+            index.findings.append(str(error))
+
+
+def definitions(data: memoryview, walked: Walked) -> list[tuple[int, bytes]]:
+    """Schema and Channel records of a walk, schemas first."""
+    held = [(op, bytes(data[at : at + n])) for op, at, n in walked.others if op in (3, 4)]
+    return sorted(held, key=lambda item: item[0])
+
+
+def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
+    """Index of a file that was closed properly; BadBag says why its summary cannot serve."""
+    size = os.fstat(file.fileno()).st_size
+    summary = _summary(file, size)
+    index = McapIndex(size)
+    schemas: dict[int, str] = {}
+    chunks, statistics = [], None
+    pos = 0
+    while pos + 9 <= len(summary):
+        opcode, length = summary[pos], int.from_bytes(summary[pos + 1 : pos + 9], 'little')
+        content = summary[pos + 9 : pos + 9 + length]
+        if len(content) < length:
+            raise BadBag('its summary is cut off')
+        if opcode in (3, 4):
+            define(index, schemas, [(opcode, content)])
+        elif opcode == 8:
+            chunks.append(parse(records.ChunkIndex.read, content, 'chunk index'))
+        elif opcode == 11:
+            statistics = parse(records.Statistics.read, content, 'statistics')
+        pos += 9 + length
+    _check(index, chunks, statistics)
+    index.pieces = _pieces(index, file, chunks, max_chunk_bytes)
+    return index
+
+
+def _summary(file: BinaryIO, size: int) -> bytes:
+    footer = pread(file, size - _FOOTER_BYTES, _FOOTER_BYTES)
+    if size < len(MAGIC) + _FOOTER_BYTES or footer[-8:] != MAGIC or footer[0] != 2:
+        raise BadBag('it does not end as a closed MCAP file does')
+    start, _, crc = struct.unpack_from('<QQI', footer, 9)
+    length = size - _FOOTER_BYTES - start
+    if not start:
+        raise BadBag('it has no summary')
+    if start < len(MAGIC) or not 0 <= length <= _MAX_SUMMARY_BYTES:
+        raise BadBag(f'its footer points to byte {start} of {size} for the summary')
+    summary = pread(file, start, length)
+    if crc and crc32(summary + footer[:25]) != crc:
+        raise BadBag('the checksum (CRC-32) of its summary does not match')
+    return summary
+
+
+def _check(index: McapIndex, chunks: list[Any], statistics: Any) -> None:
+    """Raise BadBag unless the summary says all that reading by index needs."""
+    if statistics is None:
+        raise BadBag('its summary has no statistics')
+    counts = {c: n for c, n in statistics.channel_message_counts.items() if n}
+    missing = sorted(set(counts) - set(index.channels))
+    if missing:
+        raise BadBag(f'its summary does not say what channels {missing} are')
+    if any(not index.channels[c].type for c in counts):
+        raise BadBag('its summary does not say what types its channels have')
+    if len(chunks) != statistics.chunk_count or (statistics.message_count and not chunks):
+        raise BadBag(
+            f'its summary lists {len(chunks)} chunks for {statistics.chunk_count} and '
+            f'{statistics.message_count} messages'
+        )
+    index.counts = counts
+    if sum(counts.values()) != statistics.message_count:
+        index.findings.append(
+            f'statistics: {statistics.message_count} messages in all, '
+            f'{sum(counts.values())} in its channels'
+        )
+
+
+def _pieces(
+    index: McapIndex, file: BinaryIO, chunks: list[Any], max_chunk_bytes: int
+) -> list[Piece]:
+    pieces = []
+    before = len(MAGIC)
+    for chunk in sorted(chunks, key=lambda c: cast('int', c.chunk_start_offset)):
+        start = chunk.chunk_start_offset
+        at = f'chunk at byte {start}'
+        if start < before or start + chunk.chunk_length > index.size:
+            raise BadBag(f'its index places a {at}, inside another or outside the file')
+        head = chunk_head(pread(file, start, HEAD_BYTES))
+        if head.length != chunk.chunk_length:
+            raise BadBag(f'{at}: the index says {chunk.chunk_length} bytes, it has {head.length}')
+        before = start + head.length
+        if too_big(head, max_chunk_bytes):
+            index.findings.append(f'{at} not read: {too_big(head, max_chunk_bytes)}')
+            continue
+        pieces.append(_indexed_piece(chunk, start, head, index.size))
+    return pieces
+
+
+def _indexed_piece(chunk: Any, start: int, head: ChunkHead, size: int) -> Piece:
+    stop = start + head.length
+    length = chunk.message_index_length
+    offsets: dict[int, int] = chunk.message_index_offsets
+    inside = all(stop <= at < stop + length for at in offsets.values())
+    if not offsets or not inside or stop + length > size or length > head.length + (1 << 20):
+        return Piece(start, head.length, head.first, head.last, head)
+    return Piece(start, head.length, head.first, head.last, head, offsets, length)
+
+
+def too_big(head: ChunkHead, max_chunk_bytes: int) -> str:
+    """Why a chunk is refused for its size, '' if it is not."""
+    if max(head.size, head.packed) <= max_chunk_bytes:
+        return ''
+    claimed = max(head.size, head.packed) / (1 << 20)
+    return f'it claims {claimed:.0f} MiB, at most {max_chunk_bytes / (1 << 20):.0f} are allowed'
+
+
+def is_chunk(head: bytes) -> bool:
+    """Whether a record head is that of a chunk."""
+    return bool(head) and head[0] == CHUNK
+
+
+def span(times: Any) -> tuple[int, int]:
+    """First and last of log times; (0, 0) of none."""
+    return (int(np.min(times)), int(np.max(times))) if len(times) else (0, 0)

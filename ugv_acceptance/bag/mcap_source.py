@@ -1,0 +1,174 @@
+"""The pieces of one MCAP file, each decoded on its own, by its index where that holds."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES, Buffers, indexed, walk
+from ugv_acceptance.bag.columns import LEAD, SLACK, Bytes, ColumnDecoder, Columns, Decoded
+from ugv_acceptance.bag.mcap_index import MAGIC, McapIndex, Piece, from_summary, pread
+from ugv_acceptance.bag.salvage import scan
+
+
+@dataclass(slots=True)
+class Piecework:
+    """What came of one piece: columns; a topic's messages and malformed ones; findings."""
+
+    columns: list[Columns] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    malformed: dict[str, tuple[int, str]] = field(default_factory=dict)
+    findings: list[str] = field(default_factory=list)
+
+    def add(self, topic: str, decoded: Decoded) -> None:
+        """Take in what was decoded of one topic."""
+        self.columns += decoded.columns
+        self.counts[topic] = self.counts.get(topic, 0) + decoded.count + decoded.malformed
+        if decoded.malformed:
+            number, reason = self.malformed.get(topic, (0, decoded.reason))
+            self.malformed[topic] = (number + decoded.malformed, reason)
+
+
+Wanted = dict[int, tuple[str, ColumnDecoder]]  # topic and decoder a channel id
+
+
+def open_mcap(file: BinaryIO, name: str, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
+    """Index of an MCAP file, by its summary or, where that cannot serve, by scanning it."""
+    magic = pread(file, 0, len(MAGIC))
+    if magic != MAGIC:
+        size = os.fstat(file.fileno()).st_size
+        raise BadBag(f'{name}: expected an MCAP file, got {size} bytes that begin {magic!r}')
+    try:
+        return from_summary(file, max_chunk_bytes)
+    except BadBag as error:
+        index = scan(file, max_chunk_bytes)
+        if str(error) != 'it has no summary' or index.salvaged:
+            index.findings.insert(0, f'read from its start to its end because {error}')
+        return index
+
+
+class McapSource:
+    """One open MCAP file and the channels wanted of it. `decode` may be called by many threads."""
+
+    def __init__(self, path: Path, name: str, index: McapIndex, wanted: Wanted) -> None:
+        self.name = name
+        self.index = index
+        self.wanted = wanted
+        self.file = path.open('rb')
+
+    @property
+    def pieces(self) -> list[Piece]:
+        """The pieces that may hold a wanted message."""
+        return [
+            p
+            for p in self.index.pieces
+            if p.indexes is None or not self.wanted.keys().isdisjoint(p.indexes)
+        ]
+
+    def decode(self, piece: Piece, buffers: Buffers) -> Piecework:
+        """Decode one piece; what is broken in it becomes a finding."""
+        work = Piecework()
+        at = f'{self.name}: chunk at byte {piece.start}'
+        try:
+            records, size, offsets = self._records(piece, buffers)
+        except BadBag as error:
+            work.findings.append(f'{at} not used: {error}{self._lost(piece)}')
+            return work
+        broken = 0
+        results: list[tuple[str, Decoded]] = []
+        for channel, (topic, decoder) in self.wanted.items():
+            found = offsets(channel)
+            if found is not None and found.size:
+                results.append((topic, decoder.records(records, size, found)))
+                broken += results[-1][1].broken
+            elif found is None:
+                broken += 1
+        if broken:
+            results = self._walked(records, size, results, work, f'{at}: {broken}')
+        for topic, decoded in results:
+            work.add(topic, decoded)
+        return work
+
+    def _records(
+        self, piece: Piece, buffers: Buffers
+    ) -> tuple[Bytes, int, Callable[[int], NDArray[np.int64] | None]]:
+        """Records of a piece in a buffer, their size, and the offsets of a channel's messages."""
+        total = piece.length + piece.index_length
+        if piece.head is None:
+            packed = buffers.packed(LEAD + total)
+            self._read(packed[LEAD : LEAD + total], piece.start)
+            return packed, total, _walked_offsets(packed, total)
+        packed = buffers.packed(total)
+        self._read(packed[:total], piece.start)
+        records = buffers.records(piece.head, packed)
+        if piece.indexes is None:
+            return records, piece.head.size, _walked_offsets(records, piece.head.size)
+        return records, piece.head.size, _index_offsets(packed[:total], piece)
+
+    def _read(self, target: Bytes, start: int) -> None:
+        got = os.preadv(self.file.fileno(), [memoryview(target)], start)
+        if got != target.size:
+            raise BadBag(f'expected {target.size} bytes of the file, got {got}')
+
+    def _walked(
+        self,
+        records: Bytes,
+        size: int,
+        by_index: list[tuple[str, Decoded]],
+        work: Piecework,
+        what: str,
+    ) -> list[tuple[str, Decoded]]:
+        """Second try where the message index names places that hold no message."""
+        walked = walk(memoryview(records)[LEAD : LEAD + size])
+        if not walked.whole:
+            work.findings.append(
+                f'{what} messages lost: no message where its index says, '
+                f'and its records break at byte {walked.stop} of {size}'
+            )
+            return by_index
+        work.findings.append(
+            f'{what} entries of its message index are wrong; its records were used'
+        )
+        return [
+            (topic, decoder.records(records, size, walked.messages[channel]))
+            for channel, (topic, decoder) in self.wanted.items()
+            if channel in walked.messages
+        ]
+
+    def _lost(self, piece: Piece) -> str:
+        """How many messages a piece that cannot be used holds, where its index says so."""
+        if piece.indexes is None:
+            return ''
+        data = pread(self.file, piece.start + piece.length, piece.index_length)
+        counts = []
+        for channel, at in piece.indexes.items():
+            found = indexed(data[at - piece.start - piece.length :], channel)
+            known = self.index.channels.get(channel)
+            if found is not None and known:
+                counts.append(f'{len(found)} of {known.topic}')
+        return f'; lost with it: {", ".join(counts)}' if counts else ''
+
+
+def _walked_offsets(records: Bytes, size: int) -> Callable[[int], NDArray[np.int64] | None]:
+    messages = walk(memoryview(records)[LEAD : LEAD + size]).messages
+    return lambda channel: messages.get(channel, np.zeros(0, np.int64))
+
+
+def _index_offsets(data: Bytes, piece: Piece) -> Callable[[int], NDArray[np.int64] | None]:
+    indexes = piece.indexes or {}
+
+    def offsets(channel: int) -> NDArray[np.int64] | None:
+        at = indexes.get(channel)
+        if at is None:
+            return np.zeros(0, np.int64)
+        return indexed(memoryview(data)[at - piece.start :], channel)
+
+    return offsets
+
+
+__all__ = ['SLACK', 'McapSource', 'Piecework', 'Wanted', 'open_mcap']

@@ -1,0 +1,261 @@
+"""A recording opened: what it holds and how it is protected, and its messages as batches."""
+
+import hashlib
+import tempfile
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zstandard
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, PAYLOAD, Kind
+from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES
+from ugv_acceptance.bag.foreign import ForeignIndex, open_ros1, open_sqlite
+from ugv_acceptance.bag.mcap_index import Channel, McapIndex
+from ugv_acceptance.bag.mcap_source import open_mcap
+from ugv_acceptance.bag.metadata import Metadata, files_of
+from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
+
+_BLOCK = 1 << 20
+_MAGIC = {b'\x89MCAP0\r\n': 'mcap', b'SQLite f': 'sqlite3', b'#ROSBAG ': 'ros1'}
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic's ROS 2 type ('' where not said), number of messages, and their encoding."""
+
+    type: str
+    count: int
+    encoding: str = 'cdr'
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The topics to read; None is not read."""
+
+    joint_states: str | None
+    imu: str | None
+    payload: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Bag:
+    """A recording: one or several files of one storage format, as found when it was opened.
+
+    Log times are ns; `protected` says whether all, part or none of its chunks carry a checksum;
+    `salvaged` is a sentence where a file breaks off, else None; `findings` are sentences about
+    what is odd. What only reading finds is in `Reading.facts`.
+    """
+
+    paths: tuple[Path, ...]
+    start_ns: int
+    end_ns: int
+    topics: dict[str, Topic]
+    protected: str
+    salvaged: str | None
+    findings: tuple[str, ...]
+    members: tuple[Member, ...] = field(repr=False)
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first to the last log time."""
+        return (self.end_ns - self.start_ns) * 1e-9
+
+    def sha256(self) -> str:
+        """SHA-256 of the file; of several, that of their SHA-256 digests in the order of `paths`.
+
+        metadata.yaml is not part of it: it says nothing that the files do not.
+        """
+        digests = [_sha256(path) for path in self.paths]
+        if len(digests) == 1:
+            return digests[0].hex()
+        return hashlib.sha256(b''.join(digests)).hexdigest()
+
+    def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
+        """The messages of `topics` as an iterator of batches that follow each other in log time.
+
+        Memory is bounded by the size of a chunk. `workers` threads decompress and decode; by
+        default two where there is more than one core.
+        """
+        chosen = ((JOINT_STATE, topics.joint_states), (IMU, topics.imu), (PAYLOAD, topics.payload))
+        wanted = {name: kind for kind, name in chosen if name is not None}
+        counts = {name: topic.count for name, topic in self.topics.items()}
+        return Reading(self.members, wanted, counts, workers)
+
+
+def open_bag(
+    paths: Path | str | Sequence[Path | str], *, max_chunk_bytes: int = MAX_CHUNK_BYTES
+) -> Bag:
+    """Open a recording: rosbag2 folders, MCAP (also .zstd), SQLite or ROS 1 files.
+
+    Several paths are the parts of one recording. A chunk that claims to unpack to more than
+    `max_chunk_bytes` is not read. BadBag where there is nothing that can be read.
+    """
+    given = [paths] if isinstance(paths, (str, Path)) else paths
+    if not given:
+        raise BadBag('expected at least one bag, got none')
+    members: list[Member] = []
+    findings: list[str] = []
+    for path in given:
+        files, metadata, found = files_of(Path(path))
+        part = [_member(file, max_chunk_bytes) for file in files]
+        findings += found + _compared(metadata, part)
+        members += part
+    kinds = sorted({member.storage for member in members})
+    if len(kinds) > 1:
+        raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
+    topics, odd = _topics(members)
+    ranges = [span for member in members if (span := member.span())]
+    findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
+    salvaged = [f'{m.name}: {m.index.salvaged}' for m in members if _salvaged(m.index)]
+    return Bag(
+        tuple(member.path for member in members),
+        min((first for first, _ in ranges), default=0),
+        max((last for _, last in ranges), default=0),
+        topics,
+        _protected(members),
+        '; '.join(salvaged) or None,
+        tuple(findings),
+        tuple(members),
+    )
+
+
+def _member(path: Path, max_chunk_bytes: int) -> Member:
+    local: Any = None
+    content = path
+    with path.open('rb') as file:
+        magic = file.read(8)
+    if magic[:4] == zstandard.FRAME_HEADER:
+        local = _unzstd(path)
+        content = Path(local.name)
+        with content.open('rb') as file:
+            magic = file.read(8)
+    storage = _MAGIC.get(magic)
+    if storage is None:
+        size = path.stat().st_size
+        raise BadBag(f'{path}: expected MCAP, SQLite or ROS 1 bag, got {size} bytes, {magic!r}...')
+    index: McapIndex | ForeignIndex
+    if storage == 'mcap':
+        with content.open('rb') as file:
+            index = open_mcap(file, str(path), max_chunk_bytes)
+    else:
+        index = {'sqlite3': open_sqlite, 'ros1': open_ros1}[storage](content, str(path))
+    return Member(path, content, storage, index, local)
+
+
+def _unzstd(path: Path) -> Any:
+    """The unpacked content in a temporary file, which lives as long as what is returned."""
+    local = tempfile.NamedTemporaryFile(prefix='bag-')  # noqa: SIM115 (the member keeps it)
+    try:
+        with path.open('rb') as file:
+            zstandard.ZstdDecompressor().copy_stream(file, local)
+    except zstandard.ZstdError as error:
+        raise BadBag(f'{path}: its zstd data is broken ({error})') from error
+    local.flush()
+    return local
+
+
+def _sha256(path: Path) -> bytes:
+    digest = hashlib.sha256()
+    with path.open('rb') as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+    return digest.digest()
+
+
+def _salvaged(index: McapIndex | ForeignIndex) -> bool:
+    return isinstance(index, McapIndex) and index.salvaged is not None
+
+
+def _compared(metadata: Metadata, members: list[Member]) -> list[str]:
+    """Findings where metadata.yaml and the files disagree on numbers of messages."""
+    findings = []
+    held, _ = _topics(members)
+    said = metadata.counts or {}
+    for name in sorted(said):
+        count = held[name].count if name in held else 0
+        if count != said[name]:
+            findings.append(f'metadata.yaml says {said[name]} messages of {name}, found {count}')
+    total = sum(topic.count for topic in held.values())
+    if not findings and metadata.message_count not in (None, total):
+        findings.append(f'metadata.yaml says {metadata.message_count} messages, found {total}')
+    return findings
+
+
+def _topics(members: Iterable[Member]) -> tuple[dict[str, Topic], list[str]]:
+    """Topics of all files, and a finding for each that has several types."""
+    held: dict[str, dict[Channel, int]] = {}
+    for member in members:
+        for channel in member.index.channels.values():
+            alike = Channel(0, channel.topic, normal_type(channel.type), channel.encoding)
+            same = held.setdefault(channel.topic, {})
+            same[alike] = same.get(alike, 0) + member.index.counts.get(channel.id, 0)
+    topics, findings = {}, []
+    for name in sorted(held):
+        kinds = sorted(held[name], key=lambda c: (not wire_of(c), -held[name][c]))
+        topics[name] = Topic(kinds[0].type, held[name][kinds[0]], kinds[0].encoding)
+        if len(kinds) > 1:
+            listed = ', '.join(f'{c.type} ({c.encoding}, {held[name][c]} messages)' for c in kinds)
+            findings.append(f'{name} has channels of several types: {listed}')
+    return topics, findings
+
+
+def _protected(members: Iterable[Member]) -> str:
+    pieces = [piece for m in members if isinstance(m.index, McapIndex) for piece in m.index.pieces]
+    guarded = [bool(piece.head and piece.head.crc) for piece in pieces]
+    if not any(guarded):
+        return 'none'
+    return 'all' if all(guarded) else 'part'
+
+
+def choose_topics(
+    bag: Bag,
+    joint_states: str = 'joint_states',
+    imu: str = 'imu/data',
+    payload: str = 'payload',
+    *,
+    imu_required: bool = True,
+) -> Topics:
+    """The topics to read: by configured name, else by type where exactly one topic has it.
+
+    A leading slash in a name is not significant. BadBag lists what the bag holds where the choice
+    is not clear. Without `imu_required`, a bag that has no IMU topic gives None.
+    """
+    joints = _choice(bag, JOINT_STATE, joint_states)
+    if joints is None:
+        raise _no_topic(bag, JOINT_STATE, joint_states)
+    measured = _choice(bag, IMU, imu)
+    if measured is None and (imu_required or _candidates(bag, IMU)):
+        raise _no_topic(bag, IMU, imu)
+    return Topics(joints, measured, _choice(bag, PAYLOAD, payload))
+
+
+def _candidates(bag: Bag, kind: Kind[Any]) -> list[str]:
+    return [
+        name
+        for name, topic in bag.topics.items()
+        if topic.type == kind.type and wire_of(Channel(0, name, topic.type, topic.encoding))
+    ]
+
+
+def _choice(bag: Bag, kind: Kind[Any], configured: str) -> str | None:
+    found = _candidates(bag, kind)
+    named = [name for name in found if name.lstrip('/') == configured.lstrip('/')]
+    if named:
+        return named[0]
+    held = [name for name in found if bag.topics[name].count] or found
+    return held[0] if len(held) == 1 else None
+
+
+def _no_topic(bag: Bag, kind: Kind[Any], configured: str) -> BadBag:
+    listed = '; '.join(
+        f'{name} {topic.type or "(no type)"}{"" if topic.encoding == "cdr" else " as "}'
+        f'{"" if topic.encoding == "cdr" else repr(topic.encoding)} {topic.count}'
+        for name, topic in bag.topics.items()
+    )
+    return BadBag(
+        f'{bag.paths[0]}: expected topic {configured!r} or exactly one of type {kind.type}; '
+        f'the bag holds: {listed or "no topics"}'
+    )

@@ -1,0 +1,233 @@
+"""One pass over a recording: pieces decoded by a few threads, handed out in log time order."""
+
+import os
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from ugv_acceptance.bag.cdr import Kind, Wire
+from ugv_acceptance.bag.chunks import Buffers
+from ugv_acceptance.bag.columns import ColumnDecoder
+from ugv_acceptance.bag.foreign import ForeignIndex, foreign_blocks
+from ugv_acceptance.bag.mcap_index import Channel, McapIndex, Piece
+from ugv_acceptance.bag.mcap_source import McapSource, Piecework, Wanted
+from ugv_acceptance.bag.order import Sequencer
+from ugv_acceptance.evaluation.samples import Batch
+
+_WIRES: dict[str, Wire] = {'cdr': 'cdr', 'ros1': 'ros1'}
+_MAX_FINDINGS = 200
+
+
+def normal_type(name: str) -> str:
+    """A type's ROS 2 name: sensor_msgs/Imu is sensor_msgs/msg/Imu."""
+    parts = name.split('/')
+    return f'{parts[0]}/msg/{parts[1]}' if len(parts) == 2 else name
+
+
+def wire_of(channel: Channel) -> Wire | None:
+    """How the channel's messages are packed, None where we cannot read that."""
+    return _WIRES.get(channel.encoding)
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One file of a recording: where it is, where its content is, its format and its index."""
+
+    path: Path
+    content: Path
+    storage: str
+    index: McapIndex | ForeignIndex
+    keep: Any = None
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+        return self.path.name
+
+    def span(self) -> tuple[int, int] | None:
+        """First and last log time in ns, None of a file without messages."""
+        if isinstance(self.index, ForeignIndex):
+            return (self.index.first, self.index.last) if any(self.index.counts.values()) else None
+        held = self.index.pieces
+        return (min(p.first for p in held), max(p.last for p in held)) if held else None
+
+    def findings(self) -> list[str]:
+        """What opening the file found."""
+        return self.index.findings if isinstance(self.index, McapIndex) else []
+
+    def wanted(self, topics: dict[str, Kind[Any]]) -> Wanted:
+        """Decoders of the file's channels that carry these topics in a form we read."""
+        found = {}
+        for channel in self.index.channels.values():
+            kind, wire = topics.get(channel.topic), wire_of(channel)
+            if kind and wire and normal_type(channel.type) == kind.type:
+                found[channel.id] = (channel.topic, ColumnDecoder(kind, channel.id, wire))
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a pass over a recording found.
+
+    `counts` are messages read a topic; `malformed` those of them that could not be decoded, with
+    the reason of the first; `late` messages logged before what was already handed out, which are
+    dropped; `findings` sentences; `complete` whether the pass reached the end.
+    """
+
+    counts: dict[str, int] = field(default_factory=dict)
+    malformed: dict[str, tuple[int, str]] = field(default_factory=dict)
+    late: int = 0
+    findings: tuple[str, ...] = ()
+    complete: bool = False
+
+
+class Reading(Iterator[Batch]):
+    """Batches of a recording in log time order; `facts` tells what was found so far.
+
+    Within a batch a topic's messages are grouped by names (and by which arrays they carry), and
+    by stretches: each group is in file order, groups are in order of their first message.
+    """
+
+    def __init__(
+        self,
+        members: Sequence[Member],
+        topics: dict[str, Kind[Any]],
+        expected: dict[str, int],
+        workers: int | None = None,
+    ) -> None:
+        self._members = members
+        self._topics = topics
+        self._expected = expected
+        self._workers = workers or min(2, os.cpu_count() or 1)
+        self._total = Piecework(counts=dict.fromkeys(topics, 0))
+        self._sequencer = Sequencer()
+        self._complete = False
+        self._stream = self._batches()
+
+    def __next__(self) -> Batch:
+        return next(self._stream)
+
+    def close(self) -> None:
+        """End the pass early and give its threads and files back."""
+        self._stream.close()
+
+    @property
+    def facts(self) -> Facts:
+        """What has been found so far; all of it once the batches are used up."""
+        total = self._total
+        findings = list(dict.fromkeys(total.findings))
+        if len(findings) > _MAX_FINDINGS:
+            more = len(findings) - _MAX_FINDINGS
+            findings = [*findings[:_MAX_FINDINGS], f'and {more} more findings like these']
+        return Facts(
+            dict(total.counts),
+            dict(total.malformed),
+            self._sequencer.late,
+            tuple(findings),
+            self._complete,
+        )
+
+    def _batches(self) -> Iterator[Batch]:
+        mcap = all(isinstance(member.index, McapIndex) for member in self._members)
+        for work, until in self._mcap() if mcap else self._foreign():
+            self._add(work)
+            if batch := self._sequencer.push(work.columns, until):
+                yield batch
+        self._conclude()
+
+    def _add(self, work: Piecework) -> None:
+        for topic, count in work.counts.items():
+            self._total.counts[topic] += count
+        for topic, (count, reason) in work.malformed.items():
+            before, first = self._total.malformed.get(topic, (0, reason))
+            self._total.malformed[topic] = (before + count, first)
+        self._total.findings += work.findings
+
+    def _conclude(self) -> None:
+        for topic, count in self._total.counts.items():
+            if count != self._expected.get(topic, 0):
+                self._total.findings.append(
+                    f'{topic}: the index counts {self._expected.get(topic, 0)} messages, '
+                    f'{count} were read'
+                )
+        for topic, (count, reason) in self._total.malformed.items():
+            self._total.findings.append(
+                f'{topic}: {count} of {self._total.counts[topic]} messages are malformed; '
+                f'the first: {reason}'
+            )
+        if self._sequencer.late:
+            self._total.findings.append(
+                f'{self._sequencer.late} messages dropped: logged earlier than their chunk says'
+            )
+        self._complete = True
+
+    def _foreign(self) -> Iterator[tuple[Piecework, int | None]]:
+        spans = [member.span() or (0, 0) for member in self._members]
+        order = sorted(range(len(spans)), key=lambda i: spans[i])
+        for place, i in enumerate(order):
+            member = self._members[i]
+            later = [spans[j][0] for j in order[place + 1 :]]
+            blocks = foreign_blocks(
+                member.storage, member.content, member.name, member.wanted(self._topics)
+            )
+            for work, last in blocks:
+                yield work, min([last, *later])
+        yield Piecework(), None
+
+    def _mcap(self) -> Iterator[tuple[Piecework, int | None]]:
+        """Work on all pieces in order of their first log time, with the next piece's."""
+        with ExitStack() as stack:
+            sources = []
+            for member in self._members:
+                if isinstance(member.index, McapIndex):
+                    wanted = member.wanted(self._topics)
+                    source = McapSource(member.content, member.name, member.index, wanted)
+                    stack.callback(source.file.close)
+                    sources.append(source)
+            jobs = [(piece, source) for source in sources for piece in source.pieces]
+            jobs.sort(key=lambda job: job[0].first)
+            firsts: list[int | None] = [piece.first for piece, _ in jobs[1:]]
+            results = _inline(jobs) if self._workers == 1 else _threaded(jobs, self._workers)
+            yield from zip(results, [*firsts, None], strict=False)
+            if not jobs:
+                yield Piecework(), None
+
+
+_Job = tuple[Piece, McapSource]
+
+
+def _inline(jobs: list[_Job]) -> Iterator[Piecework]:
+    buffers = Buffers()
+    for piece, source in jobs:
+        yield source.decode(piece, buffers)
+
+
+def _threaded(jobs: list[_Job], workers: int) -> Iterator[Piecework]:
+    """Decode ahead by a few pieces; results come in the order of the jobs."""
+    spare: SimpleQueue[Buffers] = SimpleQueue()
+    for _ in range(workers):
+        spare.put(Buffers())
+
+    def decode(piece: Piece, source: McapSource) -> Piecework:
+        buffers = spare.get()
+        try:
+            return source.decode(piece, buffers)
+        finally:
+            spare.put(buffers)
+
+    ahead: deque[Future[Piecework]] = deque()
+    pool = ThreadPoolExecutor(workers, 'bag')
+    try:
+        for job in jobs:
+            ahead.append(pool.submit(decode, *job))
+            if len(ahead) > workers:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

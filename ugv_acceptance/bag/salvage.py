@@ -1,0 +1,135 @@
+"""The index of an MCAP file whose summary is missing or wrong: every record is looked at once."""
+
+import os
+from typing import BinaryIO
+
+import numpy as np
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.chunks import (
+    CHUNK,
+    HEAD_BYTES,
+    MAX_CHUNK_BYTES,
+    Buffers,
+    Walked,
+    chunk_head,
+    log_times,
+    walk,
+)
+from ugv_acceptance.bag.columns import LEAD, Bytes
+from ugv_acceptance.bag.mcap_index import (
+    MAGIC,
+    McapIndex,
+    Piece,
+    define,
+    definitions,
+    pread,
+    span,
+    too_big,
+)
+
+_BLOCK = 1 << 20
+_GAP = 1 << 14  # between chunks there is little more than message indexes
+
+
+def scan(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
+    """Index of a file read from its start to its end, or to the first record that is broken.
+
+    `salvaged` says where and how the file breaks; what lies before is in the index.
+    """
+    return _Scan(file, max_chunk_bytes).run()
+
+
+class _Scan:
+    def __init__(self, file: BinaryIO, max_chunk_bytes: int) -> None:
+        self.file = file
+        self.max_chunk_bytes = max_chunk_bytes
+        self.size = os.fstat(file.fileno()).st_size
+        self.index = McapIndex(self.size, scanned=True)
+        self.schemas: dict[int, str] = {}
+        self.buffers = Buffers()
+        self.ended = False
+        self.block = _BLOCK
+
+    def run(self) -> McapIndex:
+        pos = len(MAGIC)
+        while pos < self.size and not self.ended:
+            head = pread(self.file, pos, HEAD_BYTES)
+            after = self._chunk(pos, head) if head[0] == CHUNK else self._bare(pos, head)
+            if after is None:
+                break
+            pos = after
+        if not self.ended:
+            held = sum(self.index.counts.values())
+            how = 'ends without its closing records' if pos >= self.size else 'breaks'
+            self.index.salvaged = (
+                f'the file {how} at byte {pos} of {self.size}: '
+                f'the {held} messages before that were kept'
+            )
+        return self.index
+
+    def _chunk(self, pos: int, head: bytes) -> int | None:
+        """Take a chunk in; the position behind it, None where the file breaks in it."""
+        at = f'chunk at byte {pos}'
+        self.block = _GAP
+        try:
+            parsed = chunk_head(head)
+        except BadBag:
+            length = int.from_bytes(head[1:9], 'little')
+            if len(head) < 9 or pos + 9 + length > self.size:
+                return None
+            self.index.findings.append(f'{at} not read: its head is garbled')
+            return pos + 9 + length
+        if pos + parsed.length > self.size:
+            return None
+        after = pos + parsed.length
+        if reason := too_big(parsed, self.max_chunk_bytes):
+            self.index.findings.append(f'{at} not read: {reason}')
+            return after
+        data = self.buffers.packed(parsed.length)
+        os.preadv(self.file.fileno(), [memoryview(data)[: parsed.length]], pos)
+        try:
+            records = self.buffers.records(parsed, data)[LEAD : LEAD + parsed.size]
+        except BadBag as error:
+            self.index.findings.append(f'{at} not used: {error}')
+            return after
+        walked = walk(memoryview(records))
+        if not walked.whole:
+            self.index.findings.append(
+                f'{at}: its records break at byte {walked.stop} of {parsed.size}, '
+                'what lies behind is lost'
+            )
+        times = self._take(records, walked)
+        if walked.messages:
+            self.index.pieces.append(Piece(pos, parsed.length, *times, parsed))
+        return after
+
+    def _bare(self, pos: int, head: bytes) -> int | None:
+        """Take records outside chunks in, a block at a time."""
+        size = self.block
+        self.block = _BLOCK
+        if len(head) >= 9:
+            size = max(size, 9 + int.from_bytes(head[1:9], 'little'))
+        if pos + size > self.size:
+            size = self.size - pos
+        if size > max(self.max_chunk_bytes, _BLOCK):
+            length = 9 + int.from_bytes(head[1:9], 'little')
+            self.index.findings.append(f'record of {length} bytes at byte {pos} not read')
+            return pos + length if pos + length <= self.size else None
+        data = self.buffers.packed(size)
+        os.preadv(self.file.fileno(), [memoryview(data)[:size]], pos)
+        walked = walk(memoryview(data)[:size], chunked=False)
+        times = self._take(data[:size], walked)
+        if walked.messages:
+            self.index.pieces.append(Piece(pos, walked.stop, *times))
+        self.ended = any(opcode in (2, 15) for opcode, _, _ in walked.others)
+        return pos + walked.stop if walked.stop else None
+
+    def _take(self, data: Bytes, walked: Walked) -> tuple[int, int]:
+        """Note channels and counts; first and last log time."""
+        define(self.index, self.schemas, definitions(memoryview(data), walked))
+        for channel, offsets in walked.messages.items():
+            self.index.counts[channel] = self.index.counts.get(channel, 0) + len(offsets)
+        if not walked.messages:
+            return 0, 0
+        return span(np.concatenate([log_times(data, o) for o in walked.messages.values()]))
