@@ -18,8 +18,15 @@ SHELL := bash
 # libraries load.
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-# A sourced ROS (apt's) is used as it is: no wheels, and the NumPy its messages are compiled against.
-ROS := $(if $(ROS_DISTRO),-c requirements/jazzy.txt,-r requirements/ros.txt)
+# A sourced ROS (apt's) is used as it is: no wheels, and the NumPy its messages are compiled against, for which there
+# are no type stubs.
+ifdef ROS_DISTRO
+ROS := -c requirements/jazzy.txt
+EXTRAS := fast,sim,test
+else
+ROS := -r requirements/ros.txt
+EXTRAS := fast,lint,sim,test
+endif
 PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
@@ -39,7 +46,7 @@ venv: .venv/.installed
 .venv/.installed: $(REQUIREMENTS)
 	@echo 'Installing what is needed into .venv: about a minute.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[fast,lint,sim,test]'
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[$(EXTRAS)]'
 	test -x .venv/bin/ugv-acceptance
 	touch $@
 
@@ -63,10 +70,15 @@ else
 	@test -z "$${CI:-}" || { echo '*** CI needs that run.'; exit 1; }
 endif
 
+ifdef ROS_DISTRO
+lint:
+	@echo '*** NOT DONE: lint: it needs a newer NumPy than the sourced ROS; run it in a shell without ROS.'
+else
 lint: venv
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
+endif
 
 pytest: venv
 	.venv/bin/python -m pytest -n $(JOBS) $(ARGS)

@@ -35,7 +35,7 @@ TEST = [
     'wheel',
     *SIMULATION,
 ]
-LINT = ['mypy', 'ruff', 'scipy-stubs', 'types-PyYAML', 'types-defusedxml']
+LINT = ['mypy', 'pre-commit', 'ruff', 'scipy-stubs', 'types-PyYAML', 'types-defusedxml']
 
 
 def version() -> str:
