@@ -16,8 +16,6 @@ from ugv_acceptance.model.expressions import (
     Vec,
     add,
     cos,
-    cross,
-    dot,
     matmul,
     rotate,
     scale,
