@@ -115,7 +115,7 @@ def our_layer(name: str) -> str | None:
 
 def homes(name: str) -> set[str]:
     """Return the layers that may import a foreign name: all, unless HOME_OF says otherwise."""
-    library = name.split('.')[0]
+    library = name.split('.', maxsplit=1)[0]
     is_ros = library.endswith(('_msgs', '_srvs', '_interfaces'))
     return HOME_OF.get('rclpy' if is_ros else library, set(MAY_IMPORT))
 
