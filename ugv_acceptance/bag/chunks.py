@@ -5,14 +5,14 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
 from ugv_acceptance import BadBag
-from ugv_acceptance.bag.columns import LEAD, SLACK, Bytes
+from ugv_acceptance.bag.gather import LEAD, SLACK, Bytes, Offsets
 
 MESSAGE, CHUNK, MESSAGE_INDEX = 5, 6, 7
 MAX_CHUNK_BYTES = 64 << 20
@@ -22,7 +22,7 @@ _HEAD = struct.Struct('<BQqqQII')
 HEAD_BYTES = _HEAD.size + 32 + 8  # enough for any compression we know
 
 
-def _optional(name: str) -> Any:
+def _optional(name: str) -> ModuleType | None:
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -98,8 +98,8 @@ class Buffers:
                 room = head.size + head.size // 4
                 self._records = np.zeros(LEAD + room + SLACK, np.uint8)
             out = self._records
-            self._unpack(head, memoryview(chunk)[head.data : stop], memoryview(out))
-        if head.crc and crc32(memoryview(out)[LEAD : LEAD + head.size]) != head.crc:
+            self._unpack(head, chunk.data[head.data : stop], out.data)
+        if head.crc and crc32(out.data[LEAD : LEAD + head.size]) != head.crc:
             raise BadBag('its checksum (CRC-32) does not match its content')
         return out
 
@@ -152,7 +152,7 @@ class Walked:
     `whole` whether that is the end. All offsets count from the walk's start.
     """
 
-    messages: dict[int, NDArray[np.int64]]
+    messages: dict[int, Offsets]
     others: list[tuple[int, int, int]]
     stop: int
     whole: bool
@@ -192,7 +192,7 @@ def walk(data: memoryview, *, chunked: bool = True) -> Walked:
     return Walked(arrays, others, pos, pos == end)
 
 
-def log_times(data: Bytes, offsets: NDArray[np.int64]) -> NDArray[np.int64]:
+def log_times(data: Bytes, offsets: Offsets) -> Offsets:
     """Log times in ns of the message records at `offsets` of `data`."""
     if not offsets.size:
         return np.zeros(0, np.int64)
@@ -200,7 +200,7 @@ def log_times(data: Bytes, offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     return every[offsets].astype(np.int64)
 
 
-def indexed(data: bytes | memoryview, channel: int) -> NDArray[np.int64] | None:
+def indexed(data: bytes | memoryview, channel: int) -> Offsets | None:
     """Offsets in a MessageIndex record that must be of `channel`; None where it is not one."""
     if len(data) < 15:
         return None
@@ -210,8 +210,8 @@ def indexed(data: bytes | memoryview, channel: int) -> NDArray[np.int64] | None:
         return None
     if 15 + size > len(data):
         return None
-    offsets = np.frombuffer(data, '<i8', size // 8, 15)[1::2]
+    offsets = np.frombuffer(data, '<i8', size // 8, 15)[1::2].astype(np.int64)
     if offsets.size and (offsets[0] < 0 or (offsets[1:] <= offsets[:-1]).any()):
         offsets = np.unique(offsets)
         offsets = offsets[offsets >= 0]
-    return offsets.astype(np.int64)
+    return offsets

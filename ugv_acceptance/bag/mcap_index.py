@@ -5,16 +5,14 @@ import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import Any, BinaryIO, cast
+from typing import BinaryIO, TypeVar
 
-import numpy as np
 from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.chunks import (
-    CHUNK,
     HEAD_BYTES,
     MAX_CHUNK_BYTES,
     ChunkHead,
@@ -68,12 +66,15 @@ class McapIndex:
     findings: list[str] = field(default_factory=list)
 
 
+Record = TypeVar('Record')
+
+
 def pread(file: BinaryIO, start: int, length: int) -> bytes:
     """`length` bytes of the file from `start`, fewer at its end."""
     return os.pread(file.fileno(), max(length, 0), start)
 
 
-def parse(read: Callable[[Any], Any], content: bytes, what: str) -> Any:
+def parse(read: Callable[[ReadDataStream], Record], content: bytes, what: str) -> Record:
     """A record from its content; BadBag where it is garbled."""
     try:
         return read(ReadDataStream(BytesIO(content)))
@@ -96,7 +97,7 @@ def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int,
                     schemas.get(channel.schema_id, ''),
                     channel.message_encoding,
                 )
-        except BadBag as error:
+        except BadBag as error:  # noqa: PERF203 (one garbled record spoils no other)
             index.findings.append(str(error))
 
 
@@ -112,7 +113,8 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
     summary = _summary(file, size)
     index = McapIndex(size)
     schemas: dict[int, str] = {}
-    chunks, statistics = [], None
+    chunks: list[records.ChunkIndex] = []
+    statistics: records.Statistics | None = None
     pos = 0
     while pos + 9 <= len(summary):
         opcode, length = summary[pos], int.from_bytes(summary[pos + 1 : pos + 9], 'little')
@@ -147,7 +149,9 @@ def _summary(file: BinaryIO, size: int) -> bytes:
     return summary
 
 
-def _check(index: McapIndex, chunks: list[Any], statistics: Any) -> None:
+def _check(
+    index: McapIndex, chunks: list[records.ChunkIndex], statistics: records.Statistics | None
+) -> None:
     """Raise BadBag unless the summary says all that reading by index needs."""
     if statistics is None:
         raise BadBag('its summary has no statistics')
@@ -171,11 +175,11 @@ def _check(index: McapIndex, chunks: list[Any], statistics: Any) -> None:
 
 
 def _pieces(
-    index: McapIndex, file: BinaryIO, chunks: list[Any], max_chunk_bytes: int
+    index: McapIndex, file: BinaryIO, chunks: list[records.ChunkIndex], max_chunk_bytes: int
 ) -> list[Piece]:
     pieces = []
     before = len(MAGIC)
-    for chunk in sorted(chunks, key=lambda c: cast('int', c.chunk_start_offset)):
+    for chunk in sorted(chunks, key=lambda c: c.chunk_start_offset):
         start = chunk.chunk_start_offset
         at = f'chunk at byte {start}'
         if start < before or start + chunk.chunk_length > index.size:
@@ -191,10 +195,10 @@ def _pieces(
     return pieces
 
 
-def _indexed_piece(chunk: Any, start: int, head: ChunkHead, size: int) -> Piece:
+def _indexed_piece(chunk: records.ChunkIndex, start: int, head: ChunkHead, size: int) -> Piece:
     stop = start + head.length
     length = chunk.message_index_length
-    offsets: dict[int, int] = chunk.message_index_offsets
+    offsets = chunk.message_index_offsets
     inside = all(stop <= at < stop + length for at in offsets.values())
     if not offsets or not inside or stop + length > size or length > head.length + (1 << 20):
         return Piece(start, head.length, head.first, head.last, head)
@@ -207,13 +211,3 @@ def too_big(head: ChunkHead, max_chunk_bytes: int) -> str:
         return ''
     claimed = max(head.size, head.packed) / (1 << 20)
     return f'it claims {claimed:.0f} MiB, at most {max_chunk_bytes / (1 << 20):.0f} are allowed'
-
-
-def is_chunk(head: bytes) -> bool:
-    """Whether a record head is that of a chunk."""
-    return bool(head) and head[0] == CHUNK
-
-
-def span(times: Any) -> tuple[int, int]:
-    """First and last of log times; (0, 0) of none."""
-    return (int(np.min(times)), int(np.max(times))) if len(times) else (0, 0)

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES, Buffers, indexed, walk
-from ugv_acceptance.bag.columns import LEAD, SLACK, Bytes, ColumnDecoder, Columns, Decoded
+from ugv_acceptance.bag.columns import ColumnDecoder, Columns, Decoded
+from ugv_acceptance.bag.gather import LEAD, Bytes, Offsets
 from ugv_acceptance.bag.mcap_index import MAGIC, McapIndex, Piece, from_summary, pread
 from ugv_acceptance.bag.salvage import scan
 
@@ -96,7 +96,7 @@ class McapSource:
 
     def _records(
         self, piece: Piece, buffers: Buffers
-    ) -> tuple[Bytes, int, Callable[[int], NDArray[np.int64] | None]]:
+    ) -> tuple[Bytes, int, Callable[[int], Offsets | None]]:
         """Records of a piece in a buffer, their size, and the offsets of a channel's messages."""
         total = piece.length + piece.index_length
         if piece.head is None:
@@ -111,7 +111,7 @@ class McapSource:
         return records, piece.head.size, _index_offsets(packed[:total], piece)
 
     def _read(self, target: Bytes, start: int) -> None:
-        got = os.preadv(self.file.fileno(), [memoryview(target)], start)
+        got = os.preadv(self.file.fileno(), [target.data], start)
         if got != target.size:
             raise BadBag(f'expected {target.size} bytes of the file, got {got}')
 
@@ -124,7 +124,7 @@ class McapSource:
         what: str,
     ) -> list[tuple[str, Decoded]]:
         """Second try where the message index names places that hold no message."""
-        walked = walk(memoryview(records)[LEAD : LEAD + size])
+        walked = walk(records.data[LEAD : LEAD + size])
         if not walked.whole:
             work.findings.append(
                 f'{what} messages lost: no message where its index says, '
@@ -154,21 +154,18 @@ class McapSource:
         return f'; lost with it: {", ".join(counts)}' if counts else ''
 
 
-def _walked_offsets(records: Bytes, size: int) -> Callable[[int], NDArray[np.int64] | None]:
-    messages = walk(memoryview(records)[LEAD : LEAD + size]).messages
+def _walked_offsets(records: Bytes, size: int) -> Callable[[int], Offsets | None]:
+    messages = walk(records.data[LEAD : LEAD + size]).messages
     return lambda channel: messages.get(channel, np.zeros(0, np.int64))
 
 
-def _index_offsets(data: Bytes, piece: Piece) -> Callable[[int], NDArray[np.int64] | None]:
+def _index_offsets(data: Bytes, piece: Piece) -> Callable[[int], Offsets | None]:
     indexes = piece.indexes or {}
 
-    def offsets(channel: int) -> NDArray[np.int64] | None:
+    def offsets(channel: int) -> Offsets | None:
         at = indexes.get(channel)
         if at is None:
             return np.zeros(0, np.int64)
-        return indexed(memoryview(data)[at - piece.start :], channel)
+        return indexed(data.data[at - piece.start :], channel)
 
     return offsets
-
-
-__all__ = ['SLACK', 'McapSource', 'Piecework', 'Wanted', 'open_mcap']

@@ -109,7 +109,7 @@ def open_bag(
     topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
     findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
-    salvaged = [f'{m.name}: {m.index.salvaged}' for m in members if _salvaged(m.index)]
+    salvaged = [f'{m.name}: {text}' for m in members if (text := _salvaged(m.index))]
     return Bag(
         tuple(member.path for member in members),
         min((first for first, _ in ranges), default=0),
@@ -123,7 +123,7 @@ def open_bag(
 
 
 def _member(path: Path, max_chunk_bytes: int) -> Member:
-    local: Any = None
+    local: tempfile._TemporaryFileWrapper[bytes] | None = None
     content = path
     with path.open('rb') as file:
         magic = file.read(8)
@@ -145,7 +145,7 @@ def _member(path: Path, max_chunk_bytes: int) -> Member:
     return Member(path, content, storage, index, local)
 
 
-def _unzstd(path: Path) -> Any:
+def _unzstd(path: Path) -> 'tempfile._TemporaryFileWrapper[bytes]':
     """The unpacked content in a temporary file, which lives as long as what is returned."""
     local = tempfile.NamedTemporaryFile(prefix='bag-')  # noqa: SIM115 (the member keeps it)
     try:
@@ -165,8 +165,8 @@ def _sha256(path: Path) -> bytes:
     return digest.digest()
 
 
-def _salvaged(index: McapIndex | ForeignIndex) -> bool:
-    return isinstance(index, McapIndex) and index.salvaged is not None
+def _salvaged(index: McapIndex | ForeignIndex) -> str | None:
+    return index.salvaged if isinstance(index, McapIndex) else None
 
 
 def _compared(metadata: Metadata, members: list[Member]) -> list[str]:

@@ -2,7 +2,7 @@
 
 import os
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -10,10 +10,11 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from ugv_acceptance.bag.cdr import Kind, Wire
+from ugv_acceptance.bag.cdr import Kind
 from ugv_acceptance.bag.chunks import Buffers
 from ugv_acceptance.bag.columns import ColumnDecoder
 from ugv_acceptance.bag.foreign import ForeignIndex, foreign_blocks
+from ugv_acceptance.bag.layout import Wire
 from ugv_acceptance.bag.mcap_index import Channel, McapIndex, Piece
 from ugv_acceptance.bag.mcap_source import McapSource, Piecework, Wanted
 from ugv_acceptance.bag.order import Sequencer
@@ -132,7 +133,7 @@ class Reading(Iterator[Batch]):
             self._complete,
         )
 
-    def _batches(self) -> Iterator[Batch]:
+    def _batches(self) -> Generator[Batch, None, None]:
         mcap = all(isinstance(member.index, McapIndex) for member in self._members)
         for work, until in self._mcap() if mcap else self._foreign():
             self._add(work)

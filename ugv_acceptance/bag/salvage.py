@@ -16,7 +16,7 @@ from ugv_acceptance.bag.chunks import (
     log_times,
     walk,
 )
-from ugv_acceptance.bag.columns import LEAD, Bytes
+from ugv_acceptance.bag.gather import LEAD, Bytes
 from ugv_acceptance.bag.mcap_index import (
     MAGIC,
     McapIndex,
@@ -24,7 +24,6 @@ from ugv_acceptance.bag.mcap_index import (
     define,
     definitions,
     pread,
-    span,
     too_big,
 )
 
@@ -87,13 +86,13 @@ class _Scan:
             self.index.findings.append(f'{at} not read: {reason}')
             return after
         data = self.buffers.packed(parsed.length)
-        os.preadv(self.file.fileno(), [memoryview(data)[: parsed.length]], pos)
+        os.preadv(self.file.fileno(), [data.data[: parsed.length]], pos)
         try:
             records = self.buffers.records(parsed, data)[LEAD : LEAD + parsed.size]
         except BadBag as error:
             self.index.findings.append(f'{at} not used: {error}')
             return after
-        walked = walk(memoryview(records))
+        walked = walk(records.data)
         if not walked.whole:
             self.index.findings.append(
                 f'{at}: its records break at byte {walked.stop} of {parsed.size}, '
@@ -117,8 +116,8 @@ class _Scan:
             self.index.findings.append(f'record of {length} bytes at byte {pos} not read')
             return pos + length if pos + length <= self.size else None
         data = self.buffers.packed(size)
-        os.preadv(self.file.fileno(), [memoryview(data)[:size]], pos)
-        walked = walk(memoryview(data)[:size], chunked=False)
+        os.preadv(self.file.fileno(), [data.data[:size]], pos)
+        walked = walk(data.data[:size], chunked=False)
         times = self._take(data[:size], walked)
         if walked.messages:
             self.index.pieces.append(Piece(pos, walked.stop, *times))
@@ -127,9 +126,10 @@ class _Scan:
 
     def _take(self, data: Bytes, walked: Walked) -> tuple[int, int]:
         """Note channels and counts; first and last log time."""
-        define(self.index, self.schemas, definitions(memoryview(data), walked))
+        define(self.index, self.schemas, definitions(data.data, walked))
         for channel, offsets in walked.messages.items():
             self.index.counts[channel] = self.index.counts.get(channel, 0) + len(offsets)
         if not walked.messages:
             return 0, 0
-        return span(np.concatenate([log_times(data, o) for o in walked.messages.values()]))
+        times = np.concatenate([log_times(data, o) for o in walked.messages.values()])
+        return int(times.min()), int(times.max())

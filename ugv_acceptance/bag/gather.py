@@ -1,0 +1,136 @@
+"""Message records of one layout out of a chunk: a few gathers, every constant byte compared.
+
+A gather copies the same stretch of every record, one small memcpy each, so what comes out is
+contiguous; records themselves lie anywhere. Constants are compared a word at a time with bits
+masked out that may vary (padding, stamps).
+"""
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.bag.layout import Layout
+from ugv_acceptance.evaluation.samples import Floats, Times
+
+Bytes: TypeAlias = NDArray[np.uint8]
+Offsets: TypeAlias = NDArray[np.int64]
+Words: TypeAlias = NDArray[np.uint64]
+Span: TypeAlias = tuple[int, int, int]  # block, first and last + 1 of its float64
+
+LEAD = 8  # bytes kept free in front of a chunk's records, so that a row may begin before the first
+SLACK = 8  # and behind them, so that a row may end after the last
+HEAD = 31  # opcode, length, channel, sequence, log time, publish time
+_BEFORE = 5  # a row starts this far before its record: then CDR's origin is a multiple of 8
+
+
+@dataclass(slots=True)
+class _Region:
+    """`size` words of a row from `start` that hold constants.
+
+    `tile` has the words expected and the bits that count, repeated as often as there were messages
+    at a time, so that comparing is one long loop instead of a short one a message. It is replaced
+    as a whole, since several threads use it.
+    """
+
+    start: int
+    size: int
+    tile: tuple[Words, Words]
+
+    def differs(self, words: Words) -> Words:
+        """Bits of (n, size) words that are not as expected."""
+        n = len(words)
+        text, bits = self.tile
+        if len(text) < n:
+            text, bits = (np.repeat(part[:1], n, axis=0) for part in (text, bits))
+            self.tile = text, bits
+        wrong = words ^ text[:n]
+        wrong &= bits[:n]
+        return wrong
+
+
+class Gather:
+    """A layout turned into gathers. `record` is the size of a whole record in bytes.
+
+    `spans` are the stretches of the layout's blocks that are wanted; none means all blocks.
+    Two threads may share one.
+    """
+
+    def __init__(self, layout: Layout, channel: int, spans: tuple[Span, ...] = ()) -> None:
+        self.record = HEAD + layout.length
+        self.order = '<' if layout.little else '>'
+        self._data = _BEFORE + HEAD
+        wanted = spans or tuple((i, 0, n) for i, n in enumerate(layout.widths))
+        self._spans = [
+            (self._data + layout.blocks[block][0] + 8 * first, last - first)
+            for block, first, last in wanted
+        ]
+        self._regions = self._find(layout, channel)
+        self._times = np.dtype(
+            {
+                'names': ['log_time', 'sec', 'nanosec'],
+                'formats': ['<i8', f'{self.order}i4', f'{self.order}u4'],
+                'offsets': [_BEFORE + 15, self._data + layout.stamp, self._data + layout.stamp + 4],
+                'itemsize': 8 * self._regions[0].size,
+            }
+        )
+
+    def _find(self, layout: Layout, channel: int) -> list[_Region]:
+        """The regions; the first holds all of a row before its first block, so the times too."""
+        width = -(-(_BEFORE + self.record) // 8) * 8
+        text, mask = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
+        head = b'\x05' + (self.record - 9).to_bytes(8, 'little') + channel.to_bytes(2, 'little')
+        data = [(self._data + offset, piece) for offset, piece in layout.constant]
+        for offset, piece in [(_BEFORE, head), *data]:
+            text[offset : offset + len(piece)] = np.frombuffer(piece, np.uint8)
+            mask[offset : offset + len(piece)] = 0xFF
+        words, bits = text.view(np.uint64), mask.view(np.uint64)
+        blocks = [self._data + offset for offset, n in layout.blocks if n]
+        first = min([*blocks, width]) // 8
+        held = [i for i in np.flatnonzero(bits).tolist() if i >= first]
+        starts = [i for i in held if i - 1 not in held]
+        stops = [i + 1 for i in held if i + 1 not in held]
+        parts = [(0, first), *zip(starts, stops, strict=True)]
+        return [_Region(a, b - a, (words[None, a:b], bits[None, a:b])) for a, b in parts]
+
+    def matching(self, buffer: Bytes, offsets: Offsets) -> tuple[NDArray[np.bool_] | None, Words]:
+        """Which records have this layout (None: all), and their words up to the first block."""
+        good: NDArray[np.bool_] | None = None
+        first: Words | None = None
+        for region in self._regions:
+            words = _gather(buffer, offsets, 8 * region.start, 8 * region.size, 'u8')
+            first = words if first is None else first
+            wrong = region.differs(words)
+            if wrong.max() == 0:
+                continue
+            fits: NDArray[np.bool_] = np.logical_not(wrong.any(axis=1))
+            good = fits if good is None else good & fits
+        assert first is not None  # noqa: S101 (there is always a first region)
+        return good, first
+
+    def times(self, words: Words) -> tuple[Times, Times]:
+        """Log times and stamps in ns, from the words `matching` gave."""
+        rows = words.view(self._times)[:, 0]
+        stamp = rows['sec'].astype(np.int64)
+        stamp *= 1_000_000_000
+        stamp += rows['nanosec']
+        return rows['log_time'].astype(np.int64), stamp
+
+    def blocks(self, buffer: Bytes, offsets: Offsets) -> tuple[Floats, ...]:
+        """The wanted numbers of records that match, (n, width) each."""
+        return tuple(
+            _gather(buffer, offsets, start, 8 * n, f'{self.order}f8').astype(np.float64, copy=False)
+            if n
+            else np.zeros((len(offsets), 0))
+            for start, n in self._spans
+        )
+
+
+def _gather(buffer: Bytes, offsets: Offsets, start: int, size: int, kind: str) -> NDArray[Any]:
+    """The `size` bytes from byte `start` of every row, as (n, size / 8) of `kind`."""
+    base = LEAD - _BEFORE + start
+    everywhere = np.ndarray(
+        (buffer.size - base - size + 1,), f'V{size}', buffer, offset=base, strides=(1,)
+    )
+    return everywhere[offsets].view(kind).reshape(len(offsets), size // 8)
