@@ -1,0 +1,117 @@
+"""A quantity over two joints as a 3 x 3 form: exact, and the reason why a map costs next to nothing.
+
+Every link's position is linear in (1, cos q, sin q) of each joint angle and in (1, x) of each
+prismatic joint; so are the centre of gravity, the potential energy and, as its derivative, each
+static torque. Over two joints a and b such a quantity is u(a) K v(b), and nine postures tell K.
+Where K depends on a + b alone but for terms in a, cells of equal a + b share their value.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.robot import Robot
+
+TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Two joints' positions `x` (n,) and `y` (m,), all others as in `q` (j,); rad, m where prismatic.
+
+    `first` and `second` are numbers in `robot.joint_names`. A field over the grid is (n, m).
+    """
+
+    first: int
+    second: int
+    x: Floats
+    y: Floats
+    q: Floats
+
+    def postures(self) -> Floats:
+        """Return every posture of the grid, shape (n, m, j)."""
+        q = np.broadcast_to(self.q, (len(self.x), len(self.y), len(self.q))).copy()
+        q[..., self.first] = self.x[:, np.newaxis]
+        q[..., self.second] = self.y
+        return q
+
+
+def grid_of(
+    robot: Robot, axes: tuple[str, str], ranges: ArrayLike, counts: tuple[int, int], q: ArrayLike
+) -> Grid:
+    """Return the grid over the joints named in `axes`, `ranges` (2, 2) from and to, both counted."""
+    first, second = (robot.joint_names.index(name) for name in axes)
+    (x0, x1), (y0, y1) = np.asarray(ranges, dtype=np.float64)
+    return Grid(
+        first,
+        second,
+        np.linspace(x0, x1, counts[0]),
+        np.linspace(y0, y1, counts[1]),
+        np.array(q, dtype=np.float64),
+    )
+
+
+def basis(robot: Robot, joint: int, values: Floats) -> Floats:
+    """Return (1, cos q, sin q), or (1, x, 0) of a prismatic joint, shape (..., 3)."""
+    one = np.ones_like(values)
+    if robot.joint(robot.joint_names[joint]).kind == 'prismatic':
+        return np.stack([one, values, np.zeros_like(values)], axis=-1)
+    return np.stack([one, np.cos(values), np.sin(values)], axis=-1)
+
+
+def form_of(robot: Robot, grid: Grid, function: Callable[[Floats], Floats]) -> Floats:
+    """Return K (k, 3, 3) of the k quantities that `function` gives for postures (..., j)."""
+    nodes = np.array([0.0, TURN / 3.0, -TURN / 3.0])
+    few = Grid(grid.first, grid.second, nodes, nodes, grid.q)
+    # The pseudo-inverse leaves out the third, empty column of a prismatic joint.
+    left = np.linalg.pinv(basis(robot, grid.first, nodes))
+    right = np.linalg.pinv(basis(robot, grid.second, nodes))
+    values = function(few.postures())
+    form = np.einsum('an,nmk,bm->kab', left, values, right)
+    scale = np.abs(form).max(axis=(1, 2), keepdims=True)
+    clean: Floats = np.where(np.abs(form) > 1e-13 * scale, form, 0.0)
+    return clean
+
+
+def evaluate(robot: Robot, grid: Grid, form: Floats, rows: slice = slice(None)) -> Floats:
+    """Return the quantities of `form` (..., 3, 3) over rows of the grid, shape (..., n, m)."""
+    left = basis(robot, grid.first, grid.x[rows])
+    right = basis(robot, grid.second, grid.y)
+    field: Floats = left @ form @ right.T
+    return field
+
+
+def along_rows(robot: Robot, grid: Grid, form: Floats) -> Floats:
+    """Return, for one form (3, 3), its coefficients of (1, cos, sin) of the second joint, (n, 3)."""
+    coefficients: Floats = basis(robot, grid.first, grid.x) @ form
+    return coefficients
+
+
+def is_sum_form(form: Floats, slack: float = 1e-12) -> bool:
+    """Return whether one form (3, 3) is f(a) + g(a + b), as of two parallel joints in series."""
+    off = np.array(
+        [form[0, 1], form[0, 2], form[1, 1] + form[2, 2], form[1, 2] - form[2, 1]],
+    )
+    return bool(np.abs(off).max() <= slack * max(np.abs(form).max(), 1e-300))
+
+
+def level_curves(robot: Robot, grid: Grid, form: Floats, level: float) -> Floats:
+    """Return where one form (3, 3) equals `level`, closed form: (2, n) positions of the second joint.
+
+    For each position of the first joint the two roots of c0 + R cos(b - phase) = level, moved by
+    whole turns into the grid's range; NaN where there is none. The second joint must turn.
+    """
+    c0, c1, c2 = along_rows(robot, grid, form).T
+    phase, radius = np.arctan2(c2, c1), np.hypot(c1, c2)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        cosine = np.where(radius > 0.0, (level - c0) / radius, np.nan)
+        spread = np.arccos(np.where(np.abs(cosine) <= 1.0, cosine, np.nan))
+    roots = np.stack([phase + spread, phase - spread])
+    start = float(grid.y[0])
+    roots = (roots - start) % TURN + start
+    found: Floats = np.where(roots <= grid.y[-1], roots, np.nan)
+    return found

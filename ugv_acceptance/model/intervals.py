@@ -1,0 +1,53 @@
+"""Intervals of an angle on one turn: where a torque that is a sine of one joint stays in bounds."""
+
+import math
+
+import numpy as np
+
+Intervals = tuple[tuple[float, float], ...]
+
+TURN = 2.0 * math.pi
+
+
+def where_cosine_between(lower: float, upper: float, shift: float = 0.0) -> Intervals:
+    """Return where lower <= cos(x - shift) <= upper, as intervals of x in [0, 2 pi] (rad)."""
+    if upper < -1.0 or lower > 1.0 or upper < lower:
+        return ()
+    near, far = math.acos(min(upper, 1.0)), math.acos(max(lower, -1.0))
+    parts: list[tuple[float, float]] = []
+    for start, end in ((near, far), (TURN - far, TURN - near)):
+        parts += wrap(start + shift, end + shift)
+    return merge(parts)
+
+
+def wrap(start: float, end: float) -> list[tuple[float, float]]:
+    """Return an interval of at most one turn as intervals inside [0, 2 pi]."""
+    turns = math.floor(start / TURN)
+    start, end = start - turns * TURN, end - turns * TURN
+    if end <= TURN:
+        return [(start, end)]
+    return [(start, TURN), (0.0, end - TURN)]
+
+
+def merge(parts: list[tuple[float, float]], slack: float = 1e-12) -> Intervals:
+    """Return the union of intervals, in order; parts closer than `slack` become one."""
+    found: list[tuple[float, float]] = []
+    for start, end in sorted(parts):
+        if found and start <= found[-1][1] + slack:
+            found[-1] = (found[-1][0], max(end, found[-1][1]))
+        else:
+            found.append((start, end))
+    return tuple(found)
+
+
+def length(intervals: Intervals) -> float:
+    """Return the total length (rad)."""
+    return math.fsum(end - start for start, end in intervals)
+
+
+def inside(intervals: Intervals, x: np.ndarray) -> np.ndarray:
+    """Return, for each angle (rad) in [0, 2 pi], whether it lies in an interval."""
+    found = np.zeros(np.shape(x), dtype=np.bool_)
+    for start, end in intervals:
+        found |= (x >= start) & (x <= end)
+    return found
