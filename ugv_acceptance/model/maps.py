@@ -1,0 +1,247 @@
+"""Maps over two joints: torque utilisation and the tilt left, and where they turn into failure.
+
+Both come from 3 x 3 forms (bilinear.py) where the support polygon stays the same over the map, and
+from the general functions of arrays where it does not.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ugv_acceptance.model.bilinear import Grid, along_rows, basis, evaluate, form_of, is_sum_form
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.stability import SIDES, stability
+from ugv_acceptance.model.statics import centre_of_gravity, static_torque
+from ugv_acceptance.model.support import pairs, supports_of
+from ugv_acceptance.model.windows import Mask, window_between
+
+SAFE, CAUTION, FAILURE = range(3)
+CLASSES = ('safe', 'caution', 'failure')
+# Rows a block: a few rows of 2001 cells and their temporaries stay in the cache.
+_ROWS = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipMap:
+    """`angle` (n, m) is the tilt left (rad), NaN where there is no margin; `side` a number in SIDES."""
+
+    angle: Floats
+    side: NDArray[np.int8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipForms:
+    """Each tip edge's force angle as atan2(sine, cosine): forms (edges, 3, 3), and its side (edges,)."""
+
+    sine: Floats
+    cosine: Floats
+    side: NDArray[np.int8]
+
+
+def classes(margin: Floats, caution: float, failure: float) -> NDArray[np.uint8]:
+    """Return SAFE, CAUTION or FAILURE of margins (larger is better); no margin is a failure."""
+    found = np.full(margin.shape, FAILURE, dtype=np.uint8)
+    found[margin > failure] = CAUTION
+    found[margin > caution] = SAFE
+    return found
+
+
+def torque_forms(
+    robot: Robot, grid: Grid, gravity: ArrayLike, payload: Payload | None = None
+) -> Floats:
+    """Return the static torque of every joint (N m) over the grid as forms (j, 3, 3)."""
+    return form_of(robot, grid, lambda q: static_torque(robot, q, gravity, payload))
+
+
+def within_limits(
+    robot: Robot, grid: Grid, forms: Floats, limits: ArrayLike, workers: int = 2
+) -> Mask:
+    """Return where every |torque| is at most its limit (j,), shape (n, m)."""
+    bounds = np.broadcast_to(np.asarray(limits, dtype=np.float64), len(forms))
+    ok = np.ones((len(grid.x), len(grid.y)), dtype=np.bool_)
+    for form, bound in zip(forms, bounds, strict=True):
+        if np.isinf(bound) or np.abs(form).sum() <= bound:
+            continue
+        if _equal_steps(robot, grid) and is_sum_form(form):
+            ok &= _sum_within(robot, grid, form, float(bound))
+        else:
+            _by_rows(len(grid.x), workers, _within(robot, grid, form, bound, ok))
+    return ok
+
+
+def _within(
+    robot: Robot, grid: Grid, form: Floats, bound: float, ok: Mask
+) -> Callable[[slice], None]:
+    def run(rows: slice) -> None:
+        ok[rows] &= np.abs(evaluate(robot, grid, form, rows)) <= bound
+
+    return run
+
+
+def _equal_steps(robot: Robot, grid: Grid) -> bool:
+    kinds = {robot.joint(robot.joint_names[k]).kind for k in (grid.first, grid.second)}
+    steps = np.concatenate([np.diff(grid.x), np.diff(grid.y)])
+    return 'prismatic' not in kinds and bool(np.ptp(steps) < 1e-12)
+
+
+def _sum_within(robot: Robot, grid: Grid, form: Floats, bound: float) -> Mask:
+    """Return where |f(a) + g(a + b)| <= bound, by a sliding window over g."""
+    of_row = along_rows(robot, grid, form)[:, 0]
+    step = grid.y[1] - grid.y[0]
+    total = grid.x[0] + grid.y[0] + step * np.arange(len(grid.x) + len(grid.y) - 1)
+    table = form[1, 1] * np.cos(total) + form[1, 2] * np.sin(total)
+    return window_between(table, -bound - of_row, bound - of_row)
+
+
+def _by_rows(count: int, workers: int, run: Callable[[slice], None]) -> None:
+    blocks = [slice(k, min(k + _ROWS, count)) for k in range(0, count, _ROWS)]
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(run, blocks))
+
+
+def utilisation_map(robot: Robot, grid: Grid, forms: Floats, limits: ArrayLike) -> Floats:
+    """Return the largest |torque| / limit over the joints (n, m): 1 is saturation."""
+    bounds = np.broadcast_to(np.asarray(limits, dtype=np.float64), len(forms))
+    worst = np.zeros((len(grid.x), len(grid.y)))
+    for form, bound in zip(forms, bounds, strict=True):
+        np.maximum(worst, np.abs(evaluate(robot, grid, form)) / bound, out=worst)
+    return worst
+
+
+def tip_forms(
+    robot: Robot, grid: Grid, gravity: ArrayLike, payload: Payload | None = None
+) -> TipForms | None:
+    """Return the tip edges' forms; None where the support polygon changes over the grid."""
+    g = np.asarray(gravity, dtype=np.float64)
+    cog = form_of(robot, grid, lambda q: centre_of_gravity(robot, q, payload))
+    points = _fixed_contacts(robot, grid)
+    if points is None or g[2] >= 0.0:
+        return None
+    centre = tuple(float(x) for x in centre_of_gravity(robot, grid.q, payload))
+    ((_, support),) = supports_of(robot, points, centre, 1)
+    if support.raised or not support.polygon:
+        return None
+    sine, cosine, side = [], [], []
+    for i, j in pairs(support.polygon):
+        start, along = points[i], points[j] - points[i]
+        along /= np.linalg.norm(along)
+        square = g - along * (along @ g)
+        sine.append(_affine(cog, start, -np.cross(along, g)))
+        cosine.append(_affine(cog, start, square))
+        side.append(_side_of(along))
+    return TipForms(np.array(sine), np.array(cosine), np.array(side, dtype=np.int8))
+
+
+def _affine(cog: Floats, start: Floats, direction: Floats) -> Floats:
+    """Return the form of (start - cog) . direction."""
+    form: Floats = -np.einsum('kab,k->ab', cog, direction)
+    form[0, 0] += start @ direction
+    return form
+
+
+def _side_of(along: Floats) -> int:
+    outward = (along[1], -along[0])
+    if abs(outward[0]) >= abs(outward[1]):
+        return 0 if outward[0] > 0 else 2
+    return 1 if outward[1] > 0 else 3
+
+
+def _fixed_contacts(robot: Robot, grid: Grid) -> list[Floats] | None:
+    """Return the contact points (m, `base_link`); None where one moves with a joint of the grid."""
+    mechanics = mechanics_of(robot)
+    names = {robot.joint_names[k] for k in (grid.first, grid.second)}
+    for contact in robot.contacts:
+        body = mechanics.tree.frames[contact.link][0]
+        while body > 0:
+            if mechanics.tree.bodies[body].joint in names:
+                return None
+            body = mechanics.tree.bodies[body].parent
+    posture = posture_of(mechanics, [float(x) for x in grid.q], 0.0, (0.0, 0.0, 0.0))
+    return [np.array(point, dtype=np.float64) for point in posture.contacts]
+
+
+def rollover_map(
+    robot: Robot,
+    grid: Grid,
+    gravity: ArrayLike,
+    payload: Payload | None = None,
+    workers: int = 2,
+) -> TipMap:
+    """Return the tilt left about the nearest tip edge over the grid, and the side it lies on."""
+    forms = tip_forms(robot, grid, gravity, payload)
+    if forms is None:
+        return _general(robot, grid, gravity, payload, workers)
+    angle = np.empty((len(grid.x), len(grid.y)))
+    side = np.empty(angle.shape, dtype=np.int8)
+
+    def run(rows: slice) -> None:
+        sine = evaluate(robot, grid, forms.sine, rows)
+        edges = np.arctan2(sine, evaluate(robot, grid, forms.cosine, rows))
+        worst = edges[0]
+        at = np.full(worst.shape, forms.side[0], dtype=np.int8)
+        for edge, name in zip(edges[1:], forms.side[1:], strict=True):
+            at[edge < worst] = name
+            np.minimum(worst, edge, out=worst)
+        angle[rows], side[rows] = worst, at
+
+    _by_rows(len(grid.x), workers, run)
+    return TipMap(angle, side)
+
+
+def _general(
+    robot: Robot, grid: Grid, gravity: ArrayLike, payload: Payload | None, workers: int
+) -> TipMap:
+    found = stability(robot, grid.postures(), gravity, payload, workers)
+    edges: Any = np.stack([np.asarray(x) for x in found.angle])
+    side = np.where(np.isnan(edges), np.inf, edges).argmin(axis=0)
+    return TipMap(edges.min(axis=0), side.astype(np.int8))
+
+
+def stands(robot: Robot, grid: Grid, forms: TipForms, angle: float = 0.0) -> Mask:
+    """Return where more than `angle` (rad, at least 0) is left about every edge, shape (n, m).
+
+    sin(force angle - angle) > 0 without an arc tangent; a robot tipped by more than half a turn
+    less `angle` does not occur under a gravity that points below the base.
+    """
+    turned = forms.sine * np.cos(angle) - forms.cosine * np.sin(angle)
+    ok = np.empty((len(grid.x), len(grid.y)), dtype=np.bool_)
+
+    def run(rows: slice) -> None:
+        ok[rows] = (evaluate(robot, grid, turned, rows) > 0.0).all(axis=0)
+
+    _by_rows(len(grid.x), 2, run)
+    return ok
+
+
+def area_fraction(mask: Mask, grid: Grid) -> float:
+    """Return the fraction of the map's area where `mask` (n, m) holds: the trapezoidal rule."""
+    of_row = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz
+    rows = of_row(mask.astype(np.float64), grid.y, axis=1)
+    area = (grid.x[-1] - grid.x[0]) * (grid.y[-1] - grid.y[0])
+    return float(of_row(rows, grid.x) / area)
+
+
+__all__ = [
+    'CAUTION',
+    'CLASSES',
+    'FAILURE',
+    'SAFE',
+    'SIDES',
+    'TipForms',
+    'TipMap',
+    'area_fraction',
+    'basis',
+    'classes',
+    'rollover_map',
+    'stands',
+    'tip_forms',
+    'torque_forms',
+    'utilisation_map',
+    'within_limits',
+]
