@@ -1,0 +1,241 @@
+"""A checked file and a URDF to the settings of an evaluation; names and kinds are compared here."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config.document import Document, Path
+from ugv_acceptance.config.schema import File, JointSection
+from ugv_acceptance.config.units import EXAMPLES, Given, shown
+from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
+
+T = TypeVar('T')
+# Lighter robots are mistakes of unit.
+LEAST_MASS = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """What a file is compared with, and the warnings collected on the way."""
+
+    document: Document
+    file: File
+    urdf: Urdf
+    warnings: list[str]
+
+    def refuse(self, path: Path, text: str) -> BadConfig:
+        """Return the error for a field of the YAML file."""
+        return BadConfig(f'{self.document.where(path)}: {text}')
+
+    def warn(self, path: Path, text: str) -> None:
+        """Note a doubt about a field of the YAML file."""
+        self.warnings.append(f'{self.document.where(path)}: {text}')
+
+
+def file_from(document: Document) -> File:
+    """Return the checked file. Raises BadConfig with file, line and field of its first error."""
+    try:
+        return File.model_validate(document.data)
+    except ValidationError as error:
+        first, more = error.errors()[0], error.error_count() - 1
+        raise BadConfig(
+            _sentence(document, dict(first)) + (f' (and {more} more)' if more else '')
+        ) from None
+
+
+def _sentence(document: Document, error: dict[str, Any]) -> str:
+    context = error.get('ctx', {})
+    path = tuple(part for part in error['loc'] if part != '[key]')
+    if error['type'] == 'key':
+        return f'{document.where((*path, context["key"]))}: {context["text"]}'
+    where = document.where(path)
+    if error['type'] == 'missing':
+        return f'{where}: expected this key, got none'
+    if 'error' in context:
+        return f'{where}: {context["error"]}'
+    text = error['msg'].replace('Input should be', 'expected', 1)
+    return f'{where}: {text}, got {shown(error["input"])}'
+
+
+def settings_from(build: Build) -> Settings:
+    """Return the settings. Raises BadConfig where file and URDF do not fit each other."""
+    measured = _measured(build)
+    robot = _robot(build, tuple(measured))
+    joints = {name: robot.joint(name) for name in measured}
+    return Settings(
+        robot,
+        tuple(_input(build, joints[name], section) for name, section in measured.items()),
+        _imu(build.file),
+        _limits(build, [(joints[name], section) for name, section in measured.items()]),
+        Delays(**build.file.delays.model_dump()),
+    )
+
+
+def _measured(build: Build) -> dict[str, JointSection]:
+    """Return the joints whose positions are told by messages, in the file's order."""
+    movable = [joint.name for joint in build.urdf.joints if joint.kind != 'fixed']
+    named = build.file.joints
+    if named is None:
+        mimics = dict(build.urdf.mimics)
+        rest = (n for n in movable if n not in build.file.held and n not in mimics)
+        return {name: JointSection() for name in rest}
+    for name in named:
+        _known(build, ('joints', name), name, movable, 'movable joint')
+    topic_names = [section.topic_name or name for name, section in named.items()]
+    for name, topic_name in zip(named, topic_names, strict=True):
+        if topic_names.count(topic_name) > 1:
+            raise build.refuse(
+                ('joints', name, 'topic_name'),
+                f'expected a name of its own, got {topic_name}, which another joint has too',
+            )
+    return dict(named)
+
+
+def _known(build: Build, path: Path, name: str, known: Sequence[str], what: str) -> None:
+    if name not in known:
+        near = get_close_matches(name, known, 1, 0.5)
+        hint = f'did you mean {near[0]}?' if near else f'it has {_list(known)}'
+        raise build.refuse(path, f'the URDF has no {what} {shown(name)}; {hint}')
+
+
+def _list(names: Sequence[str]) -> str:
+    return ', '.join(names[:8]) + (', ...' if len(names) > 8 else '') if names else 'none'
+
+
+def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
+    file, links = build.file, [link.name for link in build.urdf.links]
+    for name, contact in file.contacts.items():
+        _known(build, ('contacts', name, 'link'), contact.link, links, 'link')
+    if len(file.contacts) < 3:
+        build.warn(
+            ('contacts',), f'{len(file.contacts)} contact points: no tip-over margin below 3'
+        )
+    if file.payload is not None:
+        _known(build, ('payload', 'link'), file.payload.link, links, 'link')
+    bodies = tuple(_links(build, links))
+    load = Payload() if file.payload is None else Payload(file.payload.mass, file.payload.cog)
+    if (total := math.fsum(link.mass for link in bodies)) < LEAST_MASS:
+        raise build.refuse(('urdf',), f'expected a robot with mass, got {total:g} kg in all links')
+    return Robot(
+        file.robot.name,
+        bodies,
+        build.urdf.joints,
+        measured,
+        tuple(Contact(name, c.link, c.position) for name, c in file.contacts.items()),
+        tuple(_held(build, measured)),
+        None if file.payload is None else file.payload.link,
+        load,
+        file.gravity,
+        file.ground.height,
+        file.ground.tolerance,
+    )
+
+
+def _links(build: Build, names: list[str]) -> Iterable[Link]:
+    """Return the URDF's links with the masses and centres of gravity the file replaces."""
+    for name in build.file.links:
+        _known(build, ('links', name), name, names, 'link')
+    for link in build.urdf.links:
+        new = build.file.links.get(link.name)
+        mass = link.mass if new is None or new.mass is None else new.mass
+        cog = link.cog if new is None or new.cog is None else new.cog
+        yield replace(link, mass=mass, cog=cog)
+
+
+def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]]:
+    """Pair every movable joint without messages with the position at which it is held."""
+    held, mimics, silent = build.file.held, dict(build.urdf.mimics), []
+    movable = {joint.name: joint for joint in build.urdf.joints if joint.kind != 'fixed'}
+    for name in held:
+        _known(build, ('held', name), name, list(movable), 'movable joint')
+        if name in measured:
+            raise build.refuse(('held', name), 'expected a joint that is not under joints too')
+    for name, joint in movable.items():
+        if name in held:
+            yield name, _of_joint(build, ('held', name), joint, held[name], 'angle', 'length')
+        elif name in mimics and name not in measured:
+            build.warn(
+                ('urdf',), f'joint {name} mimics another: held at its offset {mimics[name]:g}'
+            )
+            yield name, mimics[name]
+        elif name not in measured:
+            silent.append(name)
+    if silent:
+        build.warn(('joints',), f'neither under joints nor held, so held at 0: {_list(silent)}')
+
+
+def _of_joint(
+    build: Build, path: Path, joint: Joint, given: Given, turning: str, sliding: str
+) -> float:
+    """Return a number of a joint in SI; refuse metres for a turning joint and the like."""
+    kind = sliding if joint.kind == 'prismatic' else turning
+    if given.kind not in (None, kind):
+        raise build.refuse(
+            path, f'expected {EXAMPLES[kind]} for a {joint.kind} joint, got a {given.kind}'
+        )
+    return given.value
+
+
+def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:
+    path = ('joints', joint.name, 'offset')
+    return JointInput(
+        section.topic_name or joint.name,
+        section.sign,
+        _of_joint(build, path, joint, section.offset, 'angle', 'length'),
+        section.effort_sign,
+        section.effort_scale,
+    )
+
+
+def _imu(file: File) -> ImuInput:
+    values = file.imu.model_dump()
+    return ImuInput(mounting=rotation_from_rpy(values.pop('mounting_rpy')), **values)
+
+
+def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:
+    limits = build.file.limits
+    if limits.torque_warn > limits.torque_error:
+        raise build.refuse(
+            ('limits', 'torque_warn'), f'expected at most torque_error, got {limits.torque_warn:g}'
+        )
+    if limits.tip_warn < limits.tip_error:
+        raise build.refuse(
+            ('limits', 'tip_warn'),
+            f'expected at least tip_error, got {math.degrees(limits.tip_warn):g} deg',
+        )
+    return Limits(
+        torque=tuple(_limit(build, joint, section) for joint, section in joints),
+        speed=tuple(_speed(build, joint, section) for joint, section in joints),
+        **limits.model_dump(),
+    )
+
+
+def _limit(build: Build, joint: Joint, section: JointSection) -> float:
+    """Return a joint's limit (N m or N): the file's, else the URDF's; infinite: not judged."""
+    path = ('joints', joint.name, 'limit')
+    if section.limit is not None:
+        value = _of_joint(build, path, joint, section.limit, 'torque', 'force')
+        if value <= 0.0:
+            raise build.refuse(path, f'expected a limit above 0, got {value:g}')
+        return value
+    if 'limit' not in section.model_fields_set and math.isinf(joint.effort):
+        build.warn(path[:2], 'no limit here and no effort in the URDF: its torque is not judged')
+    return math.inf if 'limit' in section.model_fields_set else joint.effort
+
+
+def _speed(build: Build, joint: Joint, section: JointSection) -> float:
+    """Return the rate to which the static model holds (rad/s or m/s); infinite: not judged."""
+    if section.static_speed is None:
+        return math.inf
+    path = ('joints', joint.name, 'static_speed')
+    value = _of_joint(build, path, joint, section.static_speed, 'angular rate', 'rate')
+    if value <= 0.0:
+        raise build.refuse(path, f'expected a speed above 0, got {value:g}')
+    return value

@@ -1,0 +1,94 @@
+"""YAML text to plain values and the line of every key, so that an error names file and line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import yaml
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config.units import KEY_ENDINGS
+
+# What PyYAML raises on text it cannot build (a date of month 13, an unknown tag, deep nesting).
+_PARSE_ERRORS = (
+    yaml.YAMLError,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
+_DEEPEST = 20
+
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A parsed YAML file: its plain values and the line (from 1) of each path in it."""
+
+    source: str
+    data: object
+    lines: dict[Path, int]
+
+    def where(self, path: Sequence[str | int]) -> str:
+        """Return 'file:line: a.b.c' for a path, with the line of the nearest key there is."""
+        known: Path = ()
+        for part in path:
+            here = self._key(known, part)
+            if here is None:
+                break
+            known = here
+        line = self.lines.get(known, 1)
+        written = (*known, *path[len(known) :])
+        field = '.'.join(str(part) for part in written)
+        return f'{self.source}:{line}: {field}' if field else f'{self.source}:{line}'
+
+    def _key(self, parent: Path, part: str | int) -> Path | None:
+        """Return the path of a key below `parent`, written with or without its unit."""
+        endings = (part, *(f'{part}_{unit}' for unit in KEY_ENDINGS))
+        return next((p for e in endings if (p := (*parent, e)) in self.lines), None)
+
+
+def read_document(text: str, source: str) -> Document:
+    """Return a parsed YAML text. Raises BadConfig where it is no YAML or holds a key twice."""
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        lines: dict[Path, int] = {}
+        if node is not None:
+            _walk(node, (), lines, source)
+        data = None if node is None else loader.construct_document(node)
+    except BadConfig:
+        raise
+    except _PARSE_ERRORS as error:
+        raise BadConfig(f'{source}{_place(error)}: expected YAML, got {_problem(error)}') from None
+    return Document(source, data, lines)
+
+
+def _walk(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> None:
+    """Note the line of every key below a node."""
+    lines.setdefault(path, node.start_mark.line + 1)
+    if len(path) > _DEEPEST:  # also what an alias to its own parent comes to
+        raise BadConfig(f'{source}:{node.start_mark.line + 1}: nested more than {_DEEPEST} deep')
+    if isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            _walk(item, (*path, index), lines, source)
+    elif isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            here = (*path, str(key.value))
+            if here in lines:
+                line = key.start_mark.line + 1
+                raise BadConfig(f'{source}:{line}: {".".join(map(str, here))}: key given twice')
+            lines[here] = key.start_mark.line + 1
+            _walk(value, here, lines, source)
+
+
+def _place(error: Exception) -> str:
+    mark = getattr(error, 'problem_mark', None)
+    return '' if mark is None else f':{mark.line + 1}'
+
+
+def _problem(error: Exception) -> str:
+    text = getattr(error, 'problem', None) or str(error) or type(error).__name__
+    return ' '.join(str(text).split())

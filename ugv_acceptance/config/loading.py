@@ -1,0 +1,139 @@
+"""Find, read and check a robot's YAML file and its URDF."""
+
+import hashlib
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config.build import Build, file_from, settings_from
+from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.strength import worst_torques
+from ugv_acceptance.config.topics import Topics, topics_from
+from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+
+PACKAGE = 'ugv_acceptance'
+DEFAULT = Path('packbot')
+# Larger files are no robot descriptions.
+LARGEST_FILE = 20_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """A robot as its files describe it. `sha256` is that of the YAML's bytes and the URDF's.
+
+    `uncertainty` pairs the names of numbers with their +/- as written in the file. `warnings` are
+    doubts that do not stop an evaluation, each with file and field.
+    """
+
+    name: str
+    serial: str | None
+    settings: Settings
+    topics: Topics
+    path: Path
+    urdf_path: Path
+    sha256: str
+    uncertainty: tuple[tuple[str, float], ...]
+    warnings: tuple[str, ...]
+
+
+def load(path: Path | None = None, *, urdf: Path | None = None) -> Config:
+    """Return the configuration in a YAML file; `urdf` replaces the URDF that the file names.
+
+    A name without folder and ending, such as packbot (the default), is one that ships. Raises
+    BadConfig with file, line and field where something is missing, wrong or does not fit.
+    """
+    at = find(DEFAULT if path is None else path)
+    yaml_bytes = _read(at, 'configuration')
+    document = read_document(_text(yaml_bytes, at), str(at))
+    file = file_from(document)
+    if urdf is None and file.urdf is None:
+        raise BadConfig(f'{at}: urdf: expected the path of a URDF here or with --urdf, got none')
+    urdf_at = _beside(at, str(file.urdf)) if urdf is None else urdf
+    urdf_bytes = _read(urdf_at, 'URDF (give its path with --urdf)')
+    model = read_urdf(urdf_bytes, str(urdf_at))
+    build = Build(document, file, model, list(model.warnings))
+    settings = settings_from(build)
+    topics = topics_from(build)
+    _check_strength(build, settings)
+    return Config(
+        file.robot.name,
+        file.robot.serial,
+        settings,
+        topics,
+        at,
+        urdf_at,
+        hashlib.sha256(yaml_bytes + urdf_bytes).hexdigest(),
+        tuple(file.uncertainty.items()),
+        tuple(build.warnings),
+    )
+
+
+def find(path: Path) -> Path:
+    """Return the file a user means: a path, or the name of a configuration that ships."""
+    if path.parent != Path() or path.exists():
+        return path
+    name = path if path.suffix in ('.yaml', '.yml') else Path(f'{path}.yaml')
+    places = [folder / 'msg_configs' / name for folder in _shares()]
+    found = next((place for place in places if place.is_file()), None)
+    if found is None:
+        folders = [place.parent for place in places if place.parent.is_dir()]
+        known = sorted({file.stem for folder in folders for file in folder.glob('*.yaml')})
+        raise BadConfig(
+            f'{path}: expected a file, or one that ships ({", ".join(known) or "none found"})'
+        )
+    return found
+
+
+def _shares() -> list[Path]:
+    """Return where our data may be: the checkout the code runs from, else the installed share."""
+    shares = [Path(__file__).resolve().parents[2]]
+    try:
+        from ament_index_python.packages import (  # noqa: PLC0415 - ROS may be absent
+            get_package_share_directory,
+        )
+
+        shares.append(Path(get_package_share_directory(PACKAGE)))
+    except (ImportError, LookupError, OSError):  # OSError: no AMENT_PREFIX_PATH
+        pass
+    return [*shares, Path(sys.prefix) / 'share' / PACKAGE]
+
+
+def _beside(at: Path, urdf: str) -> Path:
+    """Return the path of a URDF that is named relative to its configuration file."""
+    try:
+        return (at.resolve().parent / urdf.removeprefix('file://')).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise BadConfig(f'{at}: urdf: expected a path, got {error}') from None
+
+
+def _read(path: Path, what: str) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise BadConfig(f'{path}: expected a {what} below 20 MB, got a larger file')
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, 'strerror', None) or str(error)
+        raise BadConfig(f'{path}: expected a {what}, got: {reason}') from None
+
+
+def _text(content: bytes, path: Path) -> str:
+    try:
+        return content.decode('utf-8')
+    except UnicodeDecodeError as error:
+        raise BadConfig(f'{path}: expected UTF-8 text, got byte {error.start} of another') from None
+
+
+def _check_strength(build: Build, settings: Settings) -> None:
+    """Warn of a limit that cannot even hold the arm's own weight."""
+    names = settings.robot.joint_names
+    for worst in worst_torques(settings.robot, Payload()):
+        limit = settings.limits.torque[names.index(worst.joint)]
+        if math.isfinite(limit) and worst.torque > limit:
+            build.warn(
+                ('joints', worst.joint, 'limit'),
+                f'{limit:g} cannot hold the own weight in every posture: {worst.torque:.1f} needed',
+            )

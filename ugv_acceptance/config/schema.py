@@ -1,0 +1,236 @@
+"""The keys of a robot's YAML file, their units, defaults and ranges, as pydantic models.
+
+Values come out in SI and radians. A default that is not here is that of evaluation/settings.py.
+"""
+
+from difflib import get_close_matches
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from ugv_acceptance.config.units import Given, Measure, parse, shown, split_key
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
+from ugv_acceptance.model.robot import Robot
+
+_IMU = ImuInput()
+_LIMITS = Limits(())
+_DELAYS = Delays()
+_ROBOT = Robot('', (), (), ())
+
+
+def _number(*kinds: str) -> BeforeValidator:
+    return BeforeValidator(lambda value: parse(value, kinds).value)
+
+
+def _given(*kinds: str) -> BeforeValidator:
+    return BeforeValidator(lambda value: None if value is None else parse(value, kinds))
+
+
+def _vector(kind: str) -> BeforeValidator:
+    def three(value: object) -> tuple[float, ...]:
+        unit = value.unit if isinstance(value, Measure) else None
+        items = value.value if isinstance(value, Measure) else value
+        if not isinstance(items, list | tuple) or len(items) != 3:
+            raise ValueError(f'expected a list of three numbers, got {shown(items)}')
+        return tuple(parse(Measure(x, unit) if unit else x, (kind,)).value for x in items)
+
+    return BeforeValidator(three)
+
+
+def _sign(value: object) -> float:
+    if isinstance(value, bool) or value not in (1, -1):
+        raise ValueError(f'expected 1 or -1, got {shown(value)}')
+    return float(value)
+
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Number = Annotated[float, _number()]
+Angle = Annotated[float, _number('angle')]
+Time = Annotated[NotNegative, _number('time')]
+Mass = Annotated[NotNegative, _number('mass')]
+Position = Annotated[tuple[float, float, float], _vector('length')]
+Angles = Annotated[tuple[float, float, float], _vector('angle')]
+Sign = Annotated[float, BeforeValidator(_sign)]
+# Of a joint: the kind has to fit revolute or prismatic, which the URDF says.
+Place = Annotated[Given, _given('angle', 'length')]
+Effort = Annotated[Given | None, _given('torque', 'force')]
+Rate = Annotated[Given | None, _given('angular rate', 'rate')]
+Name = Annotated[str, Field(min_length=1, strict=True)]
+
+
+class Section(BaseModel):
+    """A mapping of the file: unknown keys are refused, a key may end in its value's unit."""
+
+    model_config = ConfigDict(extra='forbid', frozen=True)
+
+    @model_validator(mode='before')
+    @classmethod
+    def _read_units(cls, data: object) -> object:
+        """Turn `offset_deg: 30` into offset = Measure(30, 'deg')."""
+        if data is None:
+            return {}
+        if not isinstance(data, dict):
+            raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
+                f'expected keys with values, got {shown(data)}'
+            )
+        found: dict[str, object] = {}
+        for key, value in data.items():
+            name, written = cls._field(key, value)
+            if name in found:
+                raise _key_error(key, f'given twice, as {name} with different units')
+            found[name] = written
+        return found
+
+    @classmethod
+    def _field(cls, key: object, value: object) -> tuple[str, object]:
+        if not isinstance(key, str):
+            raise _key_error(
+                key, 'expected a text as key (YAML reads on, off, yes, no as booleans)'
+            )
+        stem, unit = split_key(key)
+        if key in cls.model_fields:
+            return key, value
+        if unit is None or stem not in cls.model_fields:
+            raise _key_error(key, f'unknown key{cls._suggestion(key)}')
+        return stem, value if value is None else Measure(value, unit)
+
+    @classmethod
+    def _suggestion(cls, key: str) -> str:
+        near = get_close_matches(split_key(key)[0], cls.model_fields, 1, 0.5)
+        known = ', '.join(cls.model_fields)
+        return f'; did you mean {near[0]}?' if near else f'; known are {known}'
+
+
+def _key_error(key: object, text: str) -> PydanticCustomError:
+    return PydanticCustomError('key', '{text}', {'text': text, 'key': str(key)})
+
+
+class QosSection(Section):
+    """Quality of service of a subscription."""
+
+    reliability: Literal['best_effort', 'reliable'] = 'best_effort'
+    durability: Literal['volatile', 'transient_local'] = 'volatile'
+    depth: Annotated[int, Field(ge=1, le=100000, strict=True)] = 100
+
+
+class TopicSection(Section):
+    """A topic; what is not given is as in topics.py."""
+
+    name: Annotated[str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')]
+    type: str | None = None
+    qos: QosSection | None = None
+    frame_id: str | None = None
+
+
+class TopicsSection(Section):
+    """The inputs."""
+
+    joint_states: TopicSection = TopicSection(name='joint_states')
+    imu: TopicSection = TopicSection(name='imu/data')
+    payload: TopicSection = TopicSection(name='payload')
+
+
+class JointSection(Section):
+    """How one joint is found in messages, and its limits."""
+
+    topic_name: Name | None = None
+    sign: Sign = 1.0
+    offset: Place = Given(0.0)
+    effort_sign: Sign = 1.0
+    effort_scale: Annotated[Positive, _number()] = 1.0
+    limit: Effort = None
+    static_speed: Rate = None
+
+
+class LinkSection(Section):
+    """What replaces the URDF's mass (kg) and centre of gravity (m, link axes) of a link."""
+
+    mass: Mass | None = None
+    cog: Position | None = None
+
+
+class ImuSection(Section):
+    """Mounting, position and use of the IMU."""
+
+    mounting_rpy: Angles = (0.0, 0.0, 0.0)
+    position: Position = _IMU.position
+    attitude: Literal['auto', 'orientation', 'accelerometer'] = 'auto'
+    specific_force: Annotated[bool, Field(strict=True)] = _IMU.specific_force
+    low_pass: Time = _IMU.low_pass
+    rest_acceleration: Annotated[Positive, _number('acceleration')] = _IMU.rest_acceleration
+    rest_rate: Annotated[Positive, _number('angular rate')] = _IMU.rest_rate
+    agreement: Annotated[Positive, _number('angle')] = _IMU.agreement
+    agreement_delay: Time = _IMU.agreement_delay
+
+
+class ContactSection(Section):
+    """A point the robot can stand on."""
+
+    link: Name
+    position: Position
+
+
+class GroundSection(Section):
+    """Height of the tracks' ground plane in base_link, and how near to it a point stands."""
+
+    height: Annotated[float, _number('length')] = _ROBOT.ground
+    tolerance: Annotated[Positive, _number('length')] = _ROBOT.contact_tolerance
+
+
+class PayloadSection(Section):
+    """The load carried until the payload topic says otherwise."""
+
+    link: Name
+    mass: Mass = 0.0
+    cog: Position = (0.0, 0.0, 0.0)
+
+
+class LimitsSection(Section):
+    """Where margins turn into levels."""
+
+    torque_warn: Annotated[Positive, _number()] = _LIMITS.torque_warn
+    torque_error: Annotated[Positive, _number()] = _LIMITS.torque_error
+    torque_deadband: Annotated[NotNegative, _number('torque', 'force')] = _LIMITS.torque_deadband
+    tip_warn: Angle = _LIMITS.tip_warn
+    tip_error: Angle = _LIMITS.tip_error
+    tip_deadband: Annotated[NotNegative, _number('angle')] = _LIMITS.tip_deadband
+
+
+class DelaysSection(Section):
+    """Times of the alert policy."""
+
+    tip_on: Time = _DELAYS.tip_on
+    torque_on: Time = _DELAYS.torque_on
+    fault_on: Time = _DELAYS.fault_on
+    off: Time = _DELAYS.off
+    stale_after: Time = _DELAYS.stale_after
+    stale_periods: Annotated[float, Field(ge=1), _number()] = _DELAYS.stale_periods
+    tick: Annotated[Positive, _number('time')] = _DELAYS.tick
+
+
+class RobotSection(Section):
+    """Which robot it is."""
+
+    name: Name
+    serial: Annotated[str, Field(strict=True)] | None = None
+
+
+class File(Section):
+    """A whole YAML file."""
+
+    robot: RobotSection
+    urdf: Name | None = None
+    topics: TopicsSection = TopicsSection()
+    joints: dict[str, JointSection] | None = None
+    held: dict[str, Place] = {}
+    links: dict[str, LinkSection] = {}
+    imu: ImuSection = ImuSection()
+    contacts: dict[str, ContactSection] = {}
+    ground: GroundSection = GroundSection()
+    payload: PayloadSection | None = None
+    limits: LimitsSection = LimitsSection()
+    delays: DelaysSection = DelaysSection()
+    gravity: Annotated[Positive, _number('acceleration')] = _ROBOT.gravity
+    uncertainty: dict[str, Annotated[NotNegative, _number()]] = {}

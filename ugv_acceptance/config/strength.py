@@ -1,0 +1,60 @@
+"""The worst posture of each joint, to ask whether its limit holds the weight.
+
+A search, so the torque found is a lower bound on the worst one; for an arm whose pitch axes are
+parallel it is exact, because all right angles are among the postures tried.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.statics import static_torque
+
+POSTURES = 1500
+# Compiling the formulas of longer trees takes longer than the question is worth.
+MOST_JOINTS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Worst:
+    """The largest |torque| found of a joint (N m; N where prismatic) and its posture (rad, m)."""
+
+    joint: str
+    torque: float
+    posture: tuple[float, ...]
+
+
+def worst_torques(robot: Robot, payload: Payload) -> tuple[Worst, ...]:
+    """Return the worst posture of every measured joint on level ground; () for very long trees."""
+    if not robot.joint_names or len(robot.joint_names) > MOST_JOINTS:
+        return ()
+    q = postures(robot)
+    torque = np.abs(static_torque(robot, q, (0.0, 0.0, -robot.gravity), payload))
+    rows = torque.argmax(axis=0)
+    return tuple(
+        Worst(name, float(torque[row, j]), tuple(map(float, q[row])))
+        for j, (name, row) in enumerate(zip(robot.joint_names, rows, strict=True))
+    )
+
+
+def postures(robot: Robot) -> NDArray[np.float64]:
+    """Return the postures to try, shape (n, j): right angles, ends of travel, and any between."""
+    random = np.random.default_rng(0)
+    columns = []
+    for name in robot.joint_names:
+        joint = robot.joint(name)
+        full = (0.0, 0.0) if joint.kind == 'prismatic' else (-math.pi, math.pi)
+        lower = joint.lower if math.isfinite(joint.lower) else full[0]
+        upper = joint.upper if math.isfinite(joint.upper) else full[1]
+        right = [k * math.pi / 2 for k in range(-2, 3)] if joint.kind != 'prismatic' else [0.0]
+        corners = [x for x in (*right, lower, upper) if lower <= x <= upper]
+        columns.append(
+            np.concatenate(
+                [random.choice(corners, POSTURES), random.uniform(lower, upper, POSTURES)]
+            )
+        )
+    table = np.stack(columns, axis=-1)
+    return np.vstack([np.clip(0.0, table.min(axis=0), table.max(axis=0)), table])

@@ -1,0 +1,254 @@
+"""A minimal URDF reader: links, masses, joints and limits of any tree; pictures are ignored.
+
+Read over defusedxml: no entities, no external files.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config.units import LARGEST, shown
+from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Link, Matrix, Vector
+
+KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
+
+
+@dataclass(frozen=True, slots=True)
+class Urdf:
+    """The links and joints of a URDF; `mimics` pairs a mimic joint with its offset (rad or m)."""
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    mimics: tuple[tuple[str, float], ...]
+    warnings: tuple[str, ...]
+
+
+def read_urdf(text: bytes, source: str) -> Urdf:
+    """Return what a URDF says of the robot's mechanics; `source` names the file in errors.
+
+    Raises BadConfig where it is no URDF, a number is not usable, or the joints are not one tree.
+    """
+    root = _parse(text, source)
+    warnings: list[str] = []
+    links = tuple(_link(e, source, warnings) for e in root.findall('link'))
+    joints = tuple(_joint(e, source, warnings) for e in root.findall('joint'))
+    _check_unique('link', [link.name for link in links], source)
+    _check_unique('joint', [joint.name for joint in joints], source)
+    _check_tree(links, joints, source)
+    mimics = tuple(_mimics(root, source))
+    return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings))
+
+
+def _parse(text: bytes, source: str) -> Element:
+    try:
+        root: Element = fromstring(text, forbid_dtd=True)
+    except DefusedXmlException:
+        raise BadConfig(
+            f'{source}: expected a URDF, got XML with a DTD or entities, which are refused'
+        ) from None
+    except (ParseError, ValueError, LookupError) as error:
+        raise BadConfig(f'{source}: expected a URDF (XML), got {shown(str(error))}') from None
+    if root.tag != 'robot':
+        raise BadConfig(f'{source}: expected the root element <robot>, got <{shown(root.tag)}>')
+    if any(isinstance(e.tag, str) and 'xacro' in e.tag for e in root.iter()):
+        raise BadConfig(f'{source}: expected a URDF, got xacro macros: run xacro on it first')
+    return root
+
+
+def _link(element: Element, source: str, warnings: list[str]) -> Link:
+    name = _name(element, 'link', source)
+    inertial = element.find('inertial')
+    if inertial is None:
+        return Link(name)
+    where = f'{source}: link {name}: inertial'
+    mass = _number(inertial.find('mass'), 'value', f'{where}/mass', None)
+    if mass < 0.0:
+        raise BadConfig(f'{where}/mass: expected a mass >= 0 kg, got {mass:g}')
+    if mass == 0.0:
+        warnings.append(f'{where}/mass: is 0 kg')
+    xyz, rotation = _origin(inertial, where)
+    inertia = _inertia(inertial.find('inertia'), f'{where}/inertia')
+    if mass > 0.0 and not _is_physical(inertia):
+        warnings.append(f'{where}/inertia: not that of a rigid body (not positive definite)')
+    turn = np.array(rotation)
+    return Link(name, mass, xyz, _matrix(turn @ np.array(inertia) @ turn.T))
+
+
+def _inertia(element: Element | None, where: str) -> Matrix:
+    if element is None:
+        return NO_INERTIA
+    xx, xy, xz, yy, yz, zz = (
+        _number(element, key, where, 0.0) for key in ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+    )
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def _is_physical(inertia: Matrix) -> bool:
+    """Say whether principal moments are positive and none exceeds the sum of the other two."""
+    moments = np.linalg.eigvalsh(np.array(inertia))
+    # 0.1 %: files are written with few digits.
+    return bool(moments[0] > 0.0 and moments[2] <= (moments[0] + moments[1]) * 1.001)
+
+
+def _joint(element: Element, source: str, warnings: list[str]) -> Joint:
+    name = _name(element, 'joint', source)
+    where = f'{source}: joint {name}'
+    kind = element.get('type', '')
+    if kind not in KINDS:
+        raise BadConfig(
+            f'{where}: expected the type {", ".join(KINDS)}, got {shown(kind)}:'
+            ' a joint of several degrees of freedom has to be written as several joints'
+        )
+    ends = []
+    for end in ('parent', 'child'):
+        child = element.find(end)
+        ends.append('' if child is None else child.get('link', ''))
+        if not ends[-1]:
+            raise BadConfig(f'{where}/{end}: expected the name of a link, got none')
+    xyz, rotation = _origin(element, where)
+    axis = (1.0, 0.0, 0.0) if kind == 'fixed' else _axis(element.find('axis'), f'{where}/axis')
+    lower, upper = _range(element.find('limit'), kind, f'{where}/limit', warnings)
+    effort = _limit(element.find('limit'), 'effort', f'{where}/limit')
+    velocity = _limit(element.find('limit'), 'velocity', f'{where}/limit')
+    return Joint(name, kind, ends[0], ends[1], xyz, rotation, axis, lower, upper, effort, velocity)
+
+
+def _range(
+    limit: Element | None, kind: str, where: str, warnings: list[str]
+) -> tuple[float, float]:
+    if kind in ('continuous', 'fixed'):
+        return -math.inf, math.inf
+    if limit is None:
+        warnings.append(f'{where}: none given for a {kind} joint: taken as unlimited')
+        return -math.inf, math.inf
+    lower, upper = (_number(limit, key, where, 0.0) for key in ('lower', 'upper'))
+    if lower > upper:
+        raise BadConfig(f'{where}: expected lower <= upper, got {lower:g} and {upper:g}')
+    if lower == upper:
+        warnings.append(f'{where}: lower and upper are both {lower:g}: taken as unlimited')
+        return -math.inf, math.inf
+    return lower, upper
+
+
+def _limit(limit: Element | None, key: str, where: str) -> float:
+    """Return an effort or velocity limit; infinite where it is missing or 0."""
+    if limit is None:
+        return math.inf
+    value = _number(limit, key, where, 0.0)
+    if value < 0.0:
+        raise BadConfig(f'{where}/{key}: expected a limit >= 0, got {value:g}')
+    return value or math.inf
+
+
+def _mimics(root: Element, source: str) -> Iterable[tuple[str, float]]:
+    for element in root.findall('joint'):
+        mimic = element.find('mimic')
+        if mimic is not None:
+            name = element.get('name', '')
+            yield name, _number(mimic, 'offset', f'{source}: joint {name}/mimic', 0.0)
+
+
+def _name(element: Element, what: str, source: str) -> str:
+    name = element.get('name', '')
+    if not name:
+        raise BadConfig(f'{source}: expected a name on every {what}, got one without')
+    return name
+
+
+def _origin(element: Element, where: str) -> tuple[Vector, Matrix]:
+    origin = element.find('origin')
+    if origin is None:
+        return ZERO, IDENTITY
+    xyz = _triple(origin, 'xyz', f'{where}/origin', '0 0 0')
+    return xyz, rotation_from_rpy(_triple(origin, 'rpy', f'{where}/origin', '0 0 0'))
+
+
+def rotation_from_rpy(rpy: Vector) -> Matrix:
+    """Return the rotation of roll, pitch and yaw (rad) about fixed axes, as URDF means them."""
+    if rpy == ZERO:
+        return IDENTITY  # without negative zeros
+    (sr, sp, sy), (cr, cp, cy) = map(math.sin, rpy), map(math.cos, rpy)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def _axis(element: Element | None, where: str) -> Vector:
+    axis = (1.0, 0.0, 0.0) if element is None else _triple(element, 'xyz', where, '1 0 0')
+    length = math.hypot(*axis)
+    if length < 1e-9:
+        raise BadConfig(f'{where}: expected a direction, got {axis[0]:g} {axis[1]:g} {axis[2]:g}')
+    x, y, z = (x / length for x in axis)
+    return (x, y, z)
+
+
+def _triple(element: Element, key: str, where: str, default: str) -> Vector:
+    text = element.get(key, default)
+    parts = text.split()
+    if len(parts) != 3:
+        raise BadConfig(f'{where}/{key}: expected three numbers, got {shown(text)}')
+    x, y, z = (_parsed(part, f'{where}/{key}') for part in parts)
+    return (x, y, z)
+
+
+def _number(element: Element | None, key: str, where: str, default: float | None) -> float:
+    text = None if element is None else element.get(key)
+    if text is None:
+        if default is None:
+            raise BadConfig(f'{where}/{key}: expected a number, got none')
+        return default
+    return _parsed(text, f'{where}/{key}')
+
+
+def _parsed(text: str, where: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not -LARGEST <= number <= LARGEST:
+        raise BadConfig(f'{where}: expected a finite number below {LARGEST:g}, got {shown(text)}')
+    return number
+
+
+def _matrix(m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Matrix:
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in m)
+    return (a, b, c)
+
+
+def _check_unique(what: str, names: list[str], source: str) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BadConfig(f'{source}: expected {what} names once each, got twice: {", ".join(twice)}')
+
+
+def _check_tree(links: tuple[Link, ...], joints: tuple[Joint, ...], source: str) -> None:
+    """Refuse missing links, links with two parents, cycles and several roots."""
+    names = {link.name for link in links}
+    parent_of: dict[str, str] = {}
+    for joint in joints:
+        for end in (joint.parent, joint.child):
+            if end not in names:
+                raise BadConfig(f'{source}: joint {joint.name}: link {shown(end)} does not exist')
+        if joint.child in parent_of:
+            raise BadConfig(f'{source}: joint {joint.name}: link {joint.child} has two parents')
+        parent_of[joint.child] = joint.parent
+    roots = [link.name for link in links if link.name not in parent_of]
+    if len(roots) != 1:
+        got = ', '.join(roots[:5]) or ('none: the joints are a cycle' if links else 'no link')
+        raise BadConfig(f'{source}: expected one root link, got {got}')
+    for name in parent_of:
+        seen, at = {name}, name
+        while at in parent_of:
+            at = parent_of[at]
+            if at in seen:
+                raise BadConfig(f'{source}: joints are a cycle through link {at}')
+            seen.add(at)
