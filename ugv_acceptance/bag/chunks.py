@@ -144,6 +144,15 @@ def _unlz4(source: memoryview, target: memoryview) -> int:
     return len(data)
 
 
+def pack(compression: str, content: bytes, zstd: zstandard.ZstdCompressor) -> bytes:
+    """The records of a chunk compressed; '' leaves them as they are."""
+    if compression == 'zstd':
+        return zstd.compress(content)
+    if compression == 'lz4':
+        return bytes(importlib.import_module('lz4.frame').compress(content))
+    return content
+
+
 @dataclass(frozen=True, slots=True)
 class Walked:
     """What a walk over records found: message offsets a channel (increasing), other records.

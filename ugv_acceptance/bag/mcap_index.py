@@ -22,6 +22,7 @@ from ugv_acceptance.bag.chunks import (
 )
 
 MAGIC = b'\x89MCAP0\r\n'
+UNKNOWN = '?'  # the type of a channel whose schema was not found
 _FOOTER_BYTES = 29 + len(MAGIC)
 _MAX_SUMMARY_BYTES = 1 << 30
 
@@ -94,7 +95,7 @@ def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int,
                 index.channels[channel.id] = Channel(
                     channel.id,
                     channel.topic,
-                    schemas.get(channel.schema_id, ''),
+                    schemas.get(channel.schema_id, UNKNOWN) if channel.schema_id else '',
                     channel.message_encoding,
                 )
         except BadBag as error:  # noqa: PERF203 (one garbled record spoils no other)
@@ -105,6 +106,10 @@ def definitions(data: memoryview, walked: Walked) -> list[tuple[int, bytes]]:
     """Schema and Channel records of a walk, schemas first."""
     held = [(op, bytes(data[at : at + n])) for op, at, n in walked.others if op in (3, 4)]
     return sorted(held, key=lambda item: item[0])
+
+
+class NoIndex(BadBag):
+    """A sound file that was written without an index: to be scanned, nothing to report."""
 
 
 def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
@@ -140,7 +145,7 @@ def _summary(file: BinaryIO, size: int) -> bytes:
     start, _, crc = struct.unpack_from('<QQI', footer, 9)
     length = size - _FOOTER_BYTES - start
     if not start:
-        raise BadBag('it has no summary')
+        raise NoIndex('it has no summary')
     if start < len(MAGIC) or not 0 <= length <= _MAX_SUMMARY_BYTES:
         raise BadBag(f'its footer points to byte {start} of {size} for the summary')
     summary = pread(file, start, length)
@@ -154,17 +159,20 @@ def _check(
 ) -> None:
     """Raise BadBag unless the summary says all that reading by index needs."""
     if statistics is None:
-        raise BadBag('its summary has no statistics')
+        raise NoIndex('its summary has no statistics')
     counts = {c: n for c, n in statistics.channel_message_counts.items() if n}
     missing = sorted(set(counts) - set(index.channels))
     if missing:
-        raise BadBag(f'its summary does not say what channels {missing} are')
-    if any(not index.channels[c].type for c in counts):
-        raise BadBag('its summary does not say what types its channels have')
-    if len(chunks) != statistics.chunk_count or (statistics.message_count and not chunks):
+        raise NoIndex(f'its summary does not say what channels {missing} are')
+    if any(index.channels[c].type == UNKNOWN for c in counts):
+        raise NoIndex('its summary does not say what types its channels have')
+    if statistics.message_count and not counts:
+        raise NoIndex('its statistics do not count by channel')
+    if not chunks and not statistics.chunk_count and statistics.message_count:
+        raise NoIndex('its messages are in no chunks')
+    if len(chunks) != statistics.chunk_count:
         raise BadBag(
-            f'its summary lists {len(chunks)} chunks for {statistics.chunk_count} and '
-            f'{statistics.message_count} messages'
+            f'its summary lists {len(chunks)} chunks, its statistics {statistics.chunk_count}'
         )
     index.counts = counts
     if sum(counts.values()) != statistics.message_count:

@@ -12,7 +12,7 @@ from ugv_acceptance import BadBag
 from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES, Buffers, indexed, walk
 from ugv_acceptance.bag.columns import ColumnDecoder, Columns, Decoded
 from ugv_acceptance.bag.gather import LEAD, Bytes, Offsets
-from ugv_acceptance.bag.mcap_index import MAGIC, McapIndex, Piece, from_summary, pread
+from ugv_acceptance.bag.mcap_index import MAGIC, McapIndex, NoIndex, Piece, from_summary, pread
 from ugv_acceptance.bag.salvage import scan
 
 
@@ -47,8 +47,8 @@ def open_mcap(file: BinaryIO, name: str, max_chunk_bytes: int = MAX_CHUNK_BYTES)
         return from_summary(file, max_chunk_bytes)
     except BadBag as error:
         index = scan(file, max_chunk_bytes)
-        if str(error) != 'it has no summary' or index.salvaged:
-            index.findings.insert(0, f'read from its start to its end because {error}')
+        if not isinstance(error, NoIndex):
+            index.findings.insert(0, f'scanned from its start because {error}')
         return index
 
 

@@ -1,0 +1,176 @@
+"""An MCAP file as it is written: chunks that end when told to, each with a checksum and an index.
+
+The writer of the mcap package ends a chunk only when it is full, so a process that is killed may
+lose minutes of a slow recording. The records themselves are those of that package.
+"""
+
+import struct
+from dataclasses import dataclass, field
+from typing import BinaryIO, Literal
+
+import zstandard
+from mcap import records
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+
+from ugv_acceptance.bag.chunks import crc32, pack
+from ugv_acceptance.bag.mcap_index import MAGIC
+
+Compression = Literal['zstd', 'lz4', '']
+_MESSAGE = struct.Struct('<BQHIQQ')
+
+
+@dataclass(slots=True)
+class _Open:
+    """The chunk being filled; `at` holds (log time, offset) a channel."""
+
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 0
+    first: int = 0
+    last: int = 0
+    at: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+
+
+class McapWriter:
+    """Writes records to `file`, which stays the caller's. Times are ns."""
+
+    def __init__(self, file: BinaryIO, library: str, compression: Compression = 'zstd') -> None:
+        self._file = file
+        self._compression = compression
+        self._zstd = zstandard.ZstdCompressor(level=3)
+        self._schemas: dict[str, records.Schema] = {}
+        self._channels: list[records.Channel] = []
+        self._chunks: list[records.ChunkIndex] = []
+        self._counts: dict[int, int] = {}
+        self._open = _Open()
+        self._pos = 0
+        self._put(MAGIC + _record(records.Header('ros2', library)))
+
+    @property
+    def counts(self) -> dict[int, int]:
+        """Messages written a channel id."""
+        return self._counts
+
+    @property
+    def pending(self) -> tuple[int, int]:
+        """Bytes in the open chunk, and the first log time in it."""
+        return self._open.size, self._open.first
+
+    def channel(self, topic: str, type_: str, schema: str, metadata: dict[str, str]) -> int:
+        """Id of a new channel."""
+        if type_ not in self._schemas:
+            number = len(self._schemas) + 1
+            self._schemas[type_] = records.Schema(number, schema.encode(), 'ros2msg', type_)
+            self._append(_record(self._schemas[type_]))
+        number = len(self._channels) + 1
+        channel = records.Channel(number, topic, 'cdr', metadata, self._schemas[type_].id)
+        self._channels.append(channel)
+        self._counts[number] = 0
+        self._append(_record(channel))
+        return number
+
+    def message(self, channel: int, log_time: int, data: bytes) -> None:
+        """Add a message to the open chunk."""
+        chunk = self._open
+        if chunk.at:
+            chunk.first, chunk.last = min(chunk.first, log_time), max(chunk.last, log_time)
+        else:
+            chunk.first = chunk.last = log_time
+        chunk.at.setdefault(channel, []).append((log_time, chunk.size))
+        head = (5, 22 + len(data), channel, self._counts[channel] & 0xFFFFFFFF, log_time, log_time)
+        self._counts[channel] += 1
+        self._append(_MESSAGE.pack(*head))
+        self._append(data)
+
+    def end_chunk(self) -> None:
+        """Write the open chunk, if there is anything in it, and hand it to the system."""
+        chunk = self._open
+        if not chunk.size:
+            return
+        self._open = _Open()
+        content = b''.join(chunk.parts)
+        packed = pack(self._compression, content, self._zstd)
+        start = self._pos
+        record = records.Chunk(
+            self._compression, packed, chunk.last, chunk.first, crc32(content), len(content)
+        )
+        self._put(_record(record))
+        length = self._pos - start
+        offsets = {}
+        for channel, at in chunk.at.items():
+            offsets[channel] = self._pos
+            self._put(_record(records.MessageIndex(channel, at)))
+        self._chunks.append(
+            records.ChunkIndex(
+                length,
+                start,
+                self._compression,
+                len(packed),
+                chunk.last,
+                self._pos - start - length,
+                offsets,
+                chunk.first,
+                len(content),
+            )
+        )
+        self._file.flush()
+
+    def span(self) -> tuple[int, int]:
+        """First and last log time of the chunks written, (0, 0) of none."""
+        held = [c for c in self._chunks if c.message_index_offsets]
+        if not held:
+            return 0, 0
+        return min(c.message_start_time for c in held), max(c.message_end_time for c in held)
+
+    def finish(self) -> None:
+        """Write the open chunk and the summary."""
+        self.end_chunk()
+        self._put(_record(records.DataEnd(0)))
+        start = self._pos
+        summary = b''
+        offsets = []
+        groups: list[tuple[Opcode, list[records.McapRecord]]] = [
+            (Opcode.SCHEMA, list(self._schemas.values())),
+            (Opcode.CHANNEL, list(self._channels)),
+            (Opcode.STATISTICS, [self._statistics()]),
+            (Opcode.CHUNK_INDEX, list(self._chunks)),
+        ]
+        for opcode, group in groups:
+            content = b''.join(_record(record) for record in group)
+            if content:
+                offsets.append(records.SummaryOffset(opcode, start + len(summary), len(content)))
+            summary += content
+        offset_start = start + len(summary)
+        summary += b''.join(_record(offset) for offset in offsets)
+        footer = struct.pack('<BQQQ', Opcode.FOOTER, 20, start, offset_start)
+        self._put(summary + footer + struct.pack('<I', crc32(summary + footer)) + MAGIC)
+        self._file.flush()
+
+    def _statistics(self) -> records.Statistics:
+        first, last = self.span()
+        return records.Statistics(
+            attachment_count=0,
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            message_end_time=last,
+            message_start_time=first,
+            metadata_count=0,
+            schema_count=len(self._schemas),
+        )
+
+    def _append(self, part: bytes) -> None:
+        self._open.parts.append(part)
+        self._open.size += len(part)
+
+    def _put(self, data: bytes) -> None:
+        self._file.write(data)
+        self._pos += len(data)
+
+
+def _record(record: records.McapRecord) -> bytes:
+    builder = RecordBuilder()
+    record.write(builder)
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    return data
