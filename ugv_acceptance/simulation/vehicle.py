@@ -1,0 +1,244 @@
+"""A robot as a MuJoCo model: its bodies, joints and motors on a ground it can tip over on.
+
+The model is made from the links and joints of the Robot, not from the compiled mechanics, so that
+MuJoCo checks those. Every link is a body with the link's own axes; a point-like link gets the least
+inertia MuJoCo takes. Ground slopes come from the direction of gravity: see `gravity_on_slope`.
+"""
+
+from dataclasses import dataclass
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.robot import IDENTITY, Joint, Link, Payload, Robot, Vector
+from ugv_acceptance.simulation import shape
+from ugv_acceptance.simulation.shape import numbers
+
+# Mass (kg) and inertia (kg m2) of what has none: MuJoCo wants a moving body to have some.
+LEAST = 1e-12
+# Own frequency (rad/s) of the position servos on the inertia they see at the zero posture.
+SERVO = 50.0
+# Bounds of the wheels' velocity servos: gain (N m s/rad), torque (N m) of one wheel.
+WHEEL_GAIN, WHEEL_TORQUE = 200.0, 40.0
+
+
+@dataclass(frozen=True, slots=True)
+class Build:
+    """How a robot is put into MuJoCo.
+
+    `base` is free or fixed (no ground then). `wheels` puts a wheel of `wheel_radius` (m) at every
+    contact of the root link, else a small sphere stands at each contact point, as it does at the
+    contacts of other links. `motors` drive the joints, limited to the joint's effort, with
+    `armature` (kg m2) as the rotor's share of inertia. `bulk` adds what touches the ground only
+    after a tip-over. `contact_time` (s) is the time constant of a contact: short is hard.
+    """
+
+    base: str = 'free'
+    wheels: bool = False
+    wheel_radius: float = 0.09
+    motors: bool = True
+    bulk: bool = False
+    friction: float = 0.8
+    armature: float = 0.0
+    timestep: float = 0.001
+    contact_time: float = 0.004
+    imu_position: Vector = (0.0, 0.0, 0.0)
+    imu_rotation: tuple[Vector, Vector, Vector] = IDENTITY
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A compiled model and where its parts are; joints in the order of `robot.joint_names`.
+
+    `model` is an mujoco.MjModel. `position`, `rate` and `motor` index qpos, qvel and ctrl; `wheels`
+    pairs the control index of each wheel with the wheel's y (m, `base_link`).
+    """
+
+    robot: Robot
+    build: Build
+    model: mujoco.MjModel
+    position: NDArray[np.intp]
+    rate: NDArray[np.intp]
+    motor: NDArray[np.intp]
+    wheels: tuple[tuple[int, float], ...]
+    root: int
+    payload: int
+
+
+def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
+    """Compile `robot` for MuJoCo, standing level on the lowest of its contacts."""
+    model = mujoco.MjModel.from_xml_string(mjcf_of(robot, build))
+    joints = [model.joint(name) for name in robot.joint_names]
+    motors = [model.actuator(name).id for name in robot.joint_names] if build.motors else []
+    wheels = shape.wheel_contacts(robot) if build.wheels else ()
+    vehicle = Vehicle(
+        robot,
+        build,
+        model,
+        np.array([int(j.qposadr[0]) for j in joints], dtype=np.intp),
+        np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
+        np.array(motors, dtype=np.intp),
+        tuple((model.actuator(f'wheel:{c.name}').id, c.position[1]) for c in wheels),
+        model.body(robot.root).id,
+        -1 if robot.payload_link is None else model.body('payload').id,
+    )
+    if build.motors:
+        _tune(vehicle)
+    return vehicle
+
+
+def _tune(vehicle: Vehicle) -> None:
+    """Give every motor the gains of a critically damped servo on the inertia it sees."""
+    model = vehicle.model
+    inertia = model.dof_M0[vehicle.rate]
+    model.actuator_gainprm[vehicle.motor, 0] = inertia * SERVO**2
+    model.actuator_biasprm[vehicle.motor, 1] = -inertia * SERVO**2
+    model.actuator_biasprm[vehicle.motor, 2] = -2.0 * inertia * SERVO
+
+
+def mjcf_of(robot: Robot, build: Build) -> str:
+    """Return the MJCF text of `robot`."""
+    root = ET.Element('mujoco', model=robot.name)
+    ET.SubElement(root, 'compiler', angle='radian', autolimits='true', inertiafromgeom='false')
+    ET.SubElement(
+        root,
+        'option',
+        timestep=repr(build.timestep),
+        gravity=numbers((0.0, 0.0, -robot.gravity)),
+        integrator='implicitfast',
+        cone='elliptic',
+        impratio='10',
+    )
+    default = ET.SubElement(root, 'default')
+    contact = {'friction': numbers((build.friction, 0.005, 0.0001)), 'condim': '3'}
+    hard = numbers((build.contact_time, 1.0))
+    ET.SubElement(default, 'geom', contact, solref=hard, contype='0', conaffinity='1')
+    world = ET.SubElement(root, 'worldbody')
+    if build.base == 'free':
+        ET.SubElement(world, 'geom', name='ground', type='plane', size='0 0 1', contype='1')
+    _add_bodies(world, robot, build)
+    _add_motors(root, robot, build)
+    _add_sensors(root, robot)
+    return ET.tostring(root, encoding='unicode')
+
+
+def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
+    bodies = {}
+    start = (0.0, 0.0, shape.CONTACT_RADIUS - shape.lowest_contact(robot))
+    top = ET.SubElement(world, 'body', name=robot.root, pos=numbers(start))
+    if build.base == 'free':
+        ET.SubElement(top, 'freejoint', name='base')
+    bodies[robot.root] = top
+    waiting = [joint for joint in robot.joints if joint.parent == robot.root]
+    while waiting:
+        joint = waiting.pop(0)
+        bodies[joint.child] = _add_body(bodies[joint.parent], robot, joint, build)
+        waiting += [j for j in robot.joints if j.parent == joint.child]
+    for link in robot.links:
+        _add_mass(bodies[link.name], link)
+    if robot.payload_link is not None:
+        load = ET.SubElement(
+            bodies[robot.payload_link], 'body', name='payload', pos=numbers(robot.payload.cog)
+        )
+        _add_mass(load, Link('payload', max(robot.payload.mass, LEAST)))
+    x, y = (tuple(row[k] for row in build.imu_rotation) for k in (0, 1))
+    ET.SubElement(top, 'site', name='imu', pos=numbers(build.imu_position), xyaxes=numbers(x + y))
+    if build.base == 'free':
+        shape.add_contacts(bodies, robot, build.wheel_radius if build.wheels else None)
+        if build.bulk:
+            shape.add_bulk(bodies, robot)
+
+
+def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> ET.Element:
+    """Add the child link of `joint`; a joint whose position is not given is built in as held."""
+    moving = joint.name in robot.joint_names
+    held = 0.0 if moving else dict(robot.held).get(joint.name, 0.0)
+    rotation, shift = np.array(joint.rotation), np.array(joint.xyz)
+    axis = np.array(joint.axis)
+    if joint.kind == 'prismatic':
+        shift = shift + rotation @ axis * held
+    elif joint.kind != 'fixed':
+        rotation = rotation @ _rotation(axis, held)
+    x_and_y = np.concatenate([rotation[:, 0], rotation[:, 1]])
+    body = ET.SubElement(
+        parent, 'body', name=joint.child, pos=numbers(shift), xyaxes=numbers(x_and_y)
+    )
+    ET.SubElement(body, 'site', name=f'joint:{joint.name}')
+    if moving:
+        kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
+        ET.SubElement(
+            body,
+            'joint',
+            name=joint.name,
+            type=kind,
+            axis=numbers(joint.axis),
+            armature=repr(build.armature),
+        )
+    return body
+
+
+def _rotation(axis: Floats, angle: float) -> Floats:
+    quaternion, matrix = np.empty(4), np.empty(9)
+    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+def _add_mass(body: ET.Element, link: Link) -> None:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia
+    diagonal = (xx + LEAST, yy + LEAST, zz + LEAST)
+    ET.SubElement(
+        body,
+        'inertial',
+        pos=numbers(link.cog),
+        mass=numbers([max(link.mass, LEAST)]),
+        fullinertia=numbers((*diagonal, xy, xz, yz)),
+    )
+
+
+def _add_motors(root: ET.Element, robot: Robot, build: Build) -> None:
+    actuators = ET.SubElement(root, 'actuator')
+    for name in robot.joint_names if build.motors else ():
+        limit = robot.joint(name).effort
+        clip = {'forcerange': numbers((-limit, limit))} if np.isfinite(limit) else {}
+        ET.SubElement(actuators, 'position', clip, name=name, joint=name, kp='1', kv='1')
+    for contact in shape.wheel_contacts(robot) if build.wheels else ():
+        name = f'wheel:{contact.name}'
+        ET.SubElement(
+            actuators,
+            'velocity',
+            name=name,
+            joint=name,
+            kv=repr(WHEEL_GAIN),
+            forcerange=numbers((-WHEEL_TORQUE, WHEEL_TORQUE)),
+        )
+
+
+def _add_sensors(root: ET.Element, robot: Robot) -> None:
+    sensors = ET.SubElement(root, 'sensor')
+    for kind in ('gyro', 'accelerometer'):
+        ET.SubElement(sensors, kind, name=kind, site='imu')
+    ET.SubElement(sensors, 'framequat', name='orientation', objtype='site', objname='imu')
+    for name in robot.joint_names:
+        for kind in ('force', 'torque'):
+            ET.SubElement(sensors, kind, name=f'{kind}:{name}', site=f'joint:{name}')
+
+
+def set_payload(vehicle: Vehicle, payload: Payload) -> None:
+    """Put `payload` in the robot's hand from now on: the model's masses change at once."""
+    model = vehicle.model
+    model.body_mass[vehicle.payload] = payload.mass
+    model.body_pos[vehicle.payload] = payload.cog
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def gravity_on_slope(gravity: float, tilt: float, heading: float) -> Floats:
+    """Return gravity (m/s2) in the axes of a ground tilted by `tilt` (rad), down towards `heading`.
+
+    `heading` (rad) counts from x (forward) to y (left): right tilt is -pi/2.
+    """
+    s, c = np.sin(tilt), np.cos(tilt)
+    return gravity * np.array([s * np.cos(heading), s * np.sin(heading), -c])
