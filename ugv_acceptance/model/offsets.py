@@ -1,0 +1,106 @@
+"""Table 2 explained: the centres of gravity of the paper's dynamic model that give all its cells.
+
+With both centres of gravity at mid-link the two models agree at rest, the reference error at
+1 deg/s is nearly zero and F grows as the fourth power of speed. Table 2 needs a reference error of
+1.0 N m, which link centres of gravity away from mid-link give. For each offset of link 2 the
+cells bound the offset of link 1 in closed form: the mean square at rest is a quadratic of it.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.planar import PAPER, PlanarArm, arm_robot
+from ugv_acceptance.model.validity import (
+    PAPER_SAMPLES,
+    PAPER_SPEEDS_DEG_S,
+    SpeedError,
+    paper_sweep,
+    speed_error,
+)
+
+# Table 2 as printed: F of the first joint; that of the second is 1.0 throughout.
+TABLE_2 = (1.0, 1.0, 1.0, 1.2, 5.1, 22.0, 67.6, 163.9)
+THETA1 = math.pi / 6.0
+# The family's member used on the page (m): near its middle.
+OFFSET1, OFFSET2 = 0.04728, -0.00228
+# A printed digit holds everything that rounds to it.
+_HALF = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Offsets (m) that give every cell: for each `offset2` the ends of two intervals of offset1.
+
+    `positive` and `negative` have shape (n, 2), smaller magnitude first.
+    """
+
+    offset2: Floats
+    positive: Floats
+    negative: Floats
+
+
+def table_error(offset1: float, offset2: float, arm: PlanarArm = PAPER) -> SpeedError:
+    """Return the error of the mid-link static model against the arm with those offsets (m)."""
+    moved = replace(arm, offset1=offset1, offset2=offset2)
+    return speed_error(arm_robot(moved), paper_sweep(THETA1), 1, static=arm_robot(arm))
+
+
+def table_2(offset1: float = OFFSET1, offset2: float = OFFSET2) -> Floats:
+    """Return F (8, 2) at the paper's eight speeds for both joints, offsets in m."""
+    return table_error(offset1, offset2).f_value(np.radians(PAPER_SPEEDS_DEG_S))
+
+
+def matches(found: Floats) -> Floats:
+    """Return which of the 16 cells (8, 2) are Table 2's to the printed digit."""
+    printed = np.stack([TABLE_2, np.ones(len(TABLE_2))], axis=-1)
+    same: Floats = np.abs(np.round(found, 1) - printed) < 1e-9
+    return same
+
+
+def offset_family(offset2: Floats, arm: PlanarArm = PAPER) -> Family:
+    """Return the offsets of link 1 that give all cells, for those of `offset2` (m) that allow any."""
+    rows = [(d2, *ends) for d2 in offset2 if (ends := _ends(float(d2), arm)) is not None]
+    table = np.array(rows).reshape(-1, 5)
+    return Family(table[:, 0], table[:, 1:3], table[:, 3:5])
+
+
+def _ends(offset2: float, arm: PlanarArm) -> tuple[float, float, float, float] | None:
+    low, high = _rest_bounds(offset2, arm)
+    if low >= high or offset2 == 0.0:  # without an offset joint 2 has no error at all: 0 / 0
+        return None
+    small, large = _offset1(low, offset2, arm), _offset1(high, offset2, arm)
+    return None if small is None or large is None else (small[0], large[0], small[1], large[1])
+
+
+def _rest_bounds(offset2: float, arm: PlanarArm) -> tuple[float, float]:
+    """Return between which mean squares at rest (N2 m2) every cell of joint 1 rounds as printed."""
+    error = table_error(0.0, offset2, arm)
+    mixed, moving = float(error.mixed[0]), float(error.moving[0])
+    squares = np.radians(PAPER_SPEEDS_DEG_S) ** 2
+    extra = 2.0 * squares * mixed + squares**2 * moving
+    low, high = 0.0, math.inf
+    for value, printed in zip(extra[1:] - extra[0], TABLE_2[1:], strict=True):
+        # F - 1 = value / (rest + extra at 1 deg/s) lies between printed - 1 -/+ half a digit.
+        bounds = [printed - 1.0 - _HALF, printed - 1.0 + _HALF]
+        if value < 0.0:
+            bounds = [-bounds[1], -bounds[0]]
+        low = max(low, abs(value) / bounds[1] - extra[0])
+        high = min(high, abs(value) / bounds[0] - extra[0] if bounds[0] > 0.0 else math.inf)
+    return low, high
+
+
+def _offset1(rest: float, offset2: float, arm: PlanarArm) -> tuple[float, float] | None:
+    """Return the two offsets of link 1 (positive first) that give that mean square at rest."""
+    n = PAPER_SAMPLES
+    c, s = math.cos(THETA1), math.sin(THETA1)
+    b = arm.mass2 * arm.gravity * offset2
+    # Sums over a turn with both ends counted: cos 1, cos^2 (n + 1) / 2, sin^2 (n - 1) / 2.
+    own = b * b * (c * c * (n + 1) + s * s * (n - 1)) / 2.0
+    root = (b * c) ** 2 - n * (own - rest * (n - 1))
+    if root < 0.0:
+        return None
+    scale = n * arm.mass1 * arm.gravity * c
+    return (-b * c + math.sqrt(root)) / scale, (-b * c - math.sqrt(root)) / scale
