@@ -4,6 +4,8 @@ import math
 import re
 from dataclasses import dataclass
 
+from ugv_acceptance import BadConfig
+
 _DEG = math.pi / 180.0
 _LB = 0.45359237
 _INCH = 0.0254
@@ -104,6 +106,17 @@ def parse(value: object, kinds: tuple[str, ...]) -> Given:
             f'expected {expected(kinds)}, got {shown(value)}'
         )
     return Given(_checked(value, value), None)
+
+
+def quantity(text: str, kind: str, what: str) -> float:
+    """Return the number in SI that a user wrote, a bare one in SI; `what` names it in the error.
+
+    Raises BadConfig where it is not of `kind` (a key of EXAMPLES).
+    """
+    try:
+        return parse(text, (kind,)).value
+    except ValueError as error:
+        raise BadConfig(f'{what}: {error}') from None
 
 
 def expected(kinds: tuple[str, ...]) -> str:

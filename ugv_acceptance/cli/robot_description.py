@@ -1,0 +1,197 @@
+"""A robot and one of its postures as plain values: what `ugv-acceptance model` shows.
+
+Keys end in their unit; an infinite number (no limit, no edge on that side) and NaN are None.
+"""
+
+import math
+from typing import Any, SupportsFloat
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
+from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
+from ugv_acceptance.model.robot import Joint, Payload, Robot
+from ugv_acceptance.model.stability import SIDES, STATES, Stance, stability_of, stance_of
+from ugv_acceptance.model.statics import payload_capacity, torque_of
+
+VERSION = 1
+
+Values = dict[str, Any]
+
+
+def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '') -> Values:
+    """Return links, joints, contacts and margins in a posture; arguments are those of the verb.
+
+    Raises BadConfig where a joint is unknown or a value is no angle (length where prismatic).
+    """
+    robot = config.settings.robot
+    q = posture_from(robot, posture)
+    roll, pitch = _tilt_from(tilt)
+    down = rotation_from_rpy((roll, pitch, 0.0))[2]
+    gravity = (-robot.gravity * down[0], -robot.gravity * down[1], -robot.gravity * down[2])
+    mass = quantity(payload, 'mass', '--payload') if payload else robot.payload.mass
+    if mass < 0.0:
+        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
+    load = Payload(mass, robot.payload.cog)
+    mechanics = mechanics_of(robot)
+    found = posture_of(mechanics, q, load.mass, load.cog)
+    stance = stance_of(mechanics, found)
+    return {
+        'version': VERSION,
+        'robot': {'name': config.name, 'serial': config.serial},
+        'config': {
+            'path': str(config.path),
+            'urdf': str(config.urdf_path),
+            'sha256': config.sha256,
+        },
+        'links': [_link(config, k) for k in range(len(robot.links))],
+        'tilt': {'roll_deg': math.degrees(roll), 'pitch_deg': math.degrees(pitch)},
+        'joints': _joints(config, q, torque_of(found, gravity)),
+        'payload': _payload(config, q, gravity, load),
+        'total_mass_kg': found.mass,
+        'centre_of_gravity_m': list(found.cog),
+        'contacts': _contacts(robot, found, stance),
+        **_stability(robot, stance, gravity),
+        'uncertainty': dict(config.uncertainty),
+        'warnings': [*config.warnings, *_outside(robot, q), *_overload(config, load)],
+    }
+
+
+def posture_from(robot: Robot, text: str) -> list[float]:
+    """Return joint positions (rad, m) from 'joint=30deg,...'; those left out are at 0."""
+    q = dict.fromkeys(robot.joint_names, 0.0)
+    for name, value in _pairs(text, '--posture'):
+        if name not in q:
+            known = ', '.join(q) or 'none'
+            raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}')
+        kind = 'length' if robot.joint(name).kind == 'prismatic' else 'angle'
+        q[name] = quantity(value, kind, f'--posture: {name}')
+    return list(q.values())
+
+
+def _tilt_from(text: str) -> tuple[float, float]:
+    """Return roll and pitch (rad) of 'roll=10deg,pitch=5deg'."""
+    tilt = {'roll': 0.0, 'pitch': 0.0}
+    for name, value in _pairs(text, '--tilt'):
+        if name not in tilt:
+            raise BadConfig(f'--tilt: expected roll or pitch, got {name}')
+        tilt[name] = quantity(value, 'angle', f'--tilt: {name}')
+    return tilt['roll'], tilt['pitch']
+
+
+def _pairs(text: str, option: str) -> list[tuple[str, str]]:
+    pairs = [part.partition('=') for part in text.split(',') if part.strip()]
+    for name, equals, _ in pairs:
+        if not equals:
+            raise BadConfig(f'{option}: expected name=value,name=value, got {name}')
+    return [(name.strip(), value) for name, _, value in pairs]
+
+
+def _link(config: Config, k: int) -> Values:
+    link = config.settings.robot.links[k]
+    return {'name': link.name, 'mass_kg': link.mass, 'centre_of_gravity_m': list(link.cog)}
+
+
+def _joints(config: Config, q: list[float], torque: tuple[Any, ...]) -> list[Values]:
+    """Return the measured joints in their order, then those that are held."""
+    settings, robot = config.settings, config.settings.robot
+    rows = []
+    for name, given, position, limit, value in zip(
+        robot.joint_names, settings.joints, q, settings.limits.torque, torque, strict=True
+    ):
+        rows.append(
+            _joint(robot.joint(name), position)
+            | {
+                'topic_name': given.topic_name,
+                'limit': _finite(limit),
+                'torque': float(value),
+                'margin': _finite(limit - abs(value)),
+                'utilisation': abs(value) / limit if math.isfinite(limit) else None,
+            }
+        )
+    held = dict(robot.held)
+    still = (j for j in robot.joints if j.kind != 'fixed' and j.name not in robot.joint_names)
+    return rows + [_joint(j, held.get(j.name, 0.0)) | {'topic_name': None} for j in still]
+
+
+def _joint(joint: Joint, position: float) -> Values:
+    slides = joint.kind == 'prismatic'
+    return {
+        'name': joint.name,
+        'kind': joint.kind,
+        'parent': joint.parent,
+        'child': joint.child,
+        'unit': 'm' if slides else 'rad',
+        'torque_unit': 'N' if slides else 'N m',
+        'lower': _finite(joint.lower),
+        'upper': _finite(joint.upper),
+        'position': position,
+    }
+
+
+def _payload(
+    config: Config, q: list[float], gravity: tuple[float, float, float], load: Payload
+) -> Values:
+    robot = config.settings.robot
+    largest = math.inf
+    if robot.payload_link is not None and q:
+        largest = float(payload_capacity(robot, q, gravity, config.settings.limits.torque))
+    return {
+        'link': robot.payload_link,
+        'mass_kg': load.mass,
+        'centre_of_gravity_m': list(load.cog),
+        'largest_kg': _finite(max(largest, 0.0)),
+        'holds_itself': largest >= 0.0,
+    }
+
+
+def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
+    return [
+        {
+            'name': contact.name,
+            'link': contact.link,
+            'position_m': list(point),
+            'corner': k in stance.support.polygon,
+        }
+        for k, (contact, point) in enumerate(zip(robot.contacts, found.contacts, strict=True))
+    ]
+
+
+def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]) -> Values:
+    """Return the support polygon (names, counter-clockwise from above) and the margins."""
+    margins = stability_of(stance, gravity)
+    return {
+        'support_polygon': [robot.contacts[k].name for k in stance.support.polygon],
+        'state': STATES[int(margins.state)],
+        'sides': {
+            side: {
+                'tilt_left_deg': _finite(math.degrees(margins.angle[k])),
+                'restoring_moment_nm': _finite(margins.moment[k]),
+                'energy_j': _finite(margins.energy[k]),
+            }
+            for k, side in enumerate(SIDES)
+        },
+        'zmp_margin_m': _finite(margins.zmp),
+    }
+
+
+def _outside(robot: Robot, q: list[float]) -> list[str]:
+    return [
+        f'--posture: {name}: {position:g} is outside its range {joint.lower:g} .. {joint.upper:g}'
+        for name, position in zip(robot.joint_names, q, strict=True)
+        if not (joint := robot.joint(name)).lower <= position <= joint.upper
+    ]
+
+
+def _overload(config: Config, load: Payload) -> list[str]:
+    """Return a sentence for each limit that cannot hold the payload in every posture."""
+    robot, limits = config.settings.robot, config.settings.limits.torque
+    return [
+        f'{worst.joint}: limit {limit:g} cannot hold {load.mass:g} kg in every posture:'
+        f' up to {worst.torque:.1f} needed'
+        for worst, limit in zip(worst_torques(robot, load), limits, strict=False)
+        if load.mass > 0.0 and worst.torque > limit
+    ]
+
+
+def _finite(value: SupportsFloat) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,139 @@
+"""The tables of `ugv-acceptance model`, readable in 80 columns."""
+
+import math
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+Values = dict[str, Any]
+
+
+def print_tables(description: Values) -> None:
+    """Print what `describe` returned."""
+    console = Console(highlight=False, soft_wrap=False)
+    _head(console, description)
+    console.print(_links(description))
+    console.print(_joints(description))
+    _print_payload(console, description)
+    console.print(_contacts(description))
+    _print_stability(console, description)
+    for text in description['warnings']:
+        console.print(f'[yellow]warning:[/] {escape(text)}', soft_wrap=True)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify='left', box=box.SIMPLE_HEAD, pad_edge=False)
+    for k, column in enumerate(columns):
+        table.add_column(column, justify='left' if k == 0 else 'right', overflow='fold')
+    return table
+
+
+def _head(console: Console, d: Values) -> None:
+    serial = d['robot']['serial']
+    console.print(
+        f'[bold]{escape(d["robot"]["name"])}[/]' + (f', serial {serial}' if serial else '')
+    )
+    console.print(f'config {escape(d["config"]["path"])}', soft_wrap=True)
+    console.print(f'urdf   {escape(d["config"]["urdf"])}', soft_wrap=True)
+    console.print(f'sha256 {d["config"]["sha256"][:16]}\n')
+
+
+def _links(d: Values) -> Table:
+    table = _table('Links (centre of gravity in link axes)', 'link', 'kg', 'x m', 'y m', 'z m')
+    for link in d['links']:
+        if link['mass_kg'] > 0.0:
+            table.add_row(escape(link['name']), *_numbers([link['mass_kg']]), *_xyz(link))
+    bare = sum(link['mass_kg'] == 0.0 for link in d['links'])
+    if bare:
+        table.caption, table.caption_justify = f'and {bare} without mass', 'left'
+    return table
+
+
+def _joints(d: Values) -> Table:
+    roll, pitch = d['tilt']['roll_deg'], d['tilt']['pitch_deg']
+    table = _table(
+        f'Joints in this posture (base: roll {roll:g} deg, pitch {pitch:g} deg)',
+        *('joint', 'range', 'at', 'torque', 'limit', 'used'),
+    )
+    for joint in d['joints']:
+        table.add_row(escape(joint['name']), _range(joint), _place(joint), *_torque(joint))
+    return table
+
+
+def _torque(joint: Values) -> tuple[str, str, str]:
+    if joint['topic_name'] is None:
+        return 'held', '', ''
+    unit, limit, used = joint['torque_unit'], joint['limit'], joint['utilisation']
+    torque = f'{round(joint["torque"], 1) + 0.0:.1f} {unit}'
+    if limit is None:
+        return torque, 'not judged', ''
+    colour = 'red' if used > 1.0 else 'green'
+    return torque, f'{limit:g} {unit}', f'[{colour}]{used:.0%}[/]'
+
+
+def _range(joint: Values) -> str:
+    if joint['lower'] is None:
+        return 'any'
+    scale, unit = _unit(joint)
+    return f'{joint["lower"] * scale:g} .. {joint["upper"] * scale:g} {unit}'
+
+
+def _place(joint: Values) -> str:
+    scale, unit = _unit(joint)
+    return f'{joint["position"] * scale:.4g} {unit}'
+
+
+def _unit(joint: Values) -> tuple[float, str]:
+    return (1.0, 'm') if joint['unit'] == 'm' else (180.0 / math.pi, 'deg')
+
+
+def _print_payload(console: Console, d: Values) -> None:
+    load = d['payload']
+    if load['link'] is None:
+        console.print('Payload: no payload link is configured\n')
+        return
+    console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}; ', end='')
+    if not load['holds_itself']:
+        console.print('[red]the arm is too heavy for its limits without one[/]\n')
+    elif load['largest_kg'] is None:
+        console.print('no limit forbids any mass here\n')
+    else:
+        left = load['largest_kg'] - load['mass_kg']
+        state = f'{left:.2f} kg left' if left >= 0.0 else f'[red]{-left:.2f} kg too much[/]'
+        console.print(f'the limits allow {load["largest_kg"]:.2f} kg here: {state}\n')
+
+
+def _contacts(d: Values) -> Table:
+    table = _table('Contact points (base_link)', 'point', 'link', 'x m', 'y m', 'z m', 'polygon')
+    for contact in d['contacts']:
+        xyz = _numbers(contact['position_m'])
+        corner = 'corner' if contact['corner'] else ''
+        table.add_row(escape(contact['name']), escape(contact['link']), *xyz, corner)
+    return table
+
+
+def _print_stability(console: Console, d: Values) -> None:
+    x, y, z = _numbers(d['centre_of_gravity_m'])
+    console.print(
+        f'Total mass {d["total_mass_kg"]:.2f} kg with payload, centre of gravity {x} {y} {z} m'
+    )
+    names = ' '.join(d['support_polygon']) or 'none'
+    console.print(f'Support polygon: {escape(names)} ({d["state"]})')
+    table = _table('Tilt left before tipping', 'side', 'deg', 'restoring N m', 'energy J')
+    for side, margin in d['sides'].items():
+        angle = margin['tilt_left_deg']
+        text = '-' if angle is None else f'[{"green" if angle > 0 else "red"}]{angle:.1f}[/]'
+        row = (margin['restoring_moment_nm'], margin['energy_j'])
+        table.add_row(side, text, *('-' if value is None else f'{value:.1f}' for value in row))
+    console.print(table)
+
+
+def _xyz(link: Values) -> list[str]:
+    return _numbers(link['centre_of_gravity_m'])
+
+
+def _numbers(values: list[float]) -> list[str]:
+    return [f'{round(value, 3) + 0.0:.3f}' for value in values]
