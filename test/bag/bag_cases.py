@@ -192,5 +192,5 @@ def write_mcap(path: Path, messages: Iterable[Message], **options: Any) -> Path:
                 schema = writer.register_schema(kind, 'ros2msg', text.encode())
                 channels[topic] = writer.register_channel(topic, 'cdr', schema)
             writer.add_message(channels[topic], time, data, time)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path

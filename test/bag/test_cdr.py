@@ -1,6 +1,7 @@
 """Single messages: the same numbers as rosbags, and BadSample of anything that is no message."""
 
 import struct
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -79,10 +80,8 @@ def test_ros1_packing_equals_rosbags(message: Any) -> None:
 def test_no_bytes_but_badsample(make: Any, data: bytes, little: bool) -> None:  # noqa: FBT001
     """Bytes that are no message raise BadSample and nothing else."""
     for tried in (data, b'\x00' + bytes([little]) + b'\x00\x00' + data):
-        try:
-            make().one(tried)
-        except BadSample as error:
-            assert str(error)
+        with suppress(BadSample):
+            assert make().one(tried).frame_id is not None
 
 
 @given(st.integers(0, 400), st.integers(0, 255), st.integers(0, 420))

@@ -62,7 +62,9 @@ def test_columns_equal_one_by_one_whatever_is_damaged(
     picks: list[int], place: int, value: int
 ) -> None:
     """With a byte changed anywhere, columns and `one` agree on every number and every refusal."""
-    pool = [joint_state((i, 0), 'f' * (i % 2), ('a', 'b' * i), ((i, 2), (), (i, 4))) for i in range(6)]
+    pool = [
+        joint_state((i, 0), 'f' * (i % 2), ('a', 'b' * i), ((i, 2), (), (i, 4))) for i in range(6)
+    ]
     messages = [bytearray(cdr(pool[i])) for i in picks]
     victim = messages[place % len(messages)]
     victim[place % len(victim)] = value

@@ -139,7 +139,7 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
 
 
 def _summary(file: BinaryIO, size: int) -> bytes:
-    footer = pread(file, size - _FOOTER_BYTES, _FOOTER_BYTES)
+    footer = pread(file, max(size - _FOOTER_BYTES, 0), _FOOTER_BYTES)
     if size < len(MAGIC) + _FOOTER_BYTES or footer[-8:] != MAGIC or footer[0] != 2:
         raise BadBag('it does not end as a closed MCAP file does')
     start, _, crc = struct.unpack_from('<QQI', footer, 9)
@@ -168,8 +168,8 @@ def _check(
         raise NoIndex('its summary does not say what types its channels have')
     if statistics.message_count and not counts:
         raise NoIndex('its statistics do not count by channel')
-    if not chunks and not statistics.chunk_count and statistics.message_count:
-        raise NoIndex('its messages are in no chunks')
+    if not chunks and statistics.message_count:
+        raise NoIndex('it lists no chunks')
     if len(chunks) != statistics.chunk_count:
         raise BadBag(
             f'its summary lists {len(chunks)} chunks, its statistics {statistics.chunk_count}'
