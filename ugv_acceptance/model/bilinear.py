@@ -55,21 +55,32 @@ def grid_of(
     )
 
 
+def _basis(values: Floats, *, prismatic: bool) -> Floats:
+    found = np.ones((*values.shape, 3))
+    found[..., 1] = values if prismatic else np.cos(values)
+    found[..., 2] = 0.0 if prismatic else np.sin(values)
+    return found
+
+
+def _prismatic(robot: Robot, joint: int) -> bool:
+    return robot.joint(robot.joint_names[joint]).kind == 'prismatic'
+
+
+# Three positions of each joint tell a form; the pseudo-inverse leaves out a prismatic joint's empty
+# third column.
+_NODES = np.array([0.0, TURN / 3.0, -TURN / 3.0])
+_INVERSE = {kind: np.linalg.pinv(_basis(_NODES, prismatic=kind)) for kind in (False, True)}
+
+
 def basis(robot: Robot, joint: int, values: Floats) -> Floats:
     """Return (1, cos q, sin q), or (1, x, 0) of a prismatic joint, shape (..., 3)."""
-    one = np.ones_like(values)
-    if robot.joint(robot.joint_names[joint]).kind == 'prismatic':
-        return np.stack([one, values, np.zeros_like(values)], axis=-1)
-    return np.stack([one, np.cos(values), np.sin(values)], axis=-1)
+    return _basis(values, prismatic=_prismatic(robot, joint))
 
 
 def form_of(robot: Robot, grid: Grid, function: Callable[[Floats], Floats]) -> Floats:
     """Return K (k, 3, 3) of the k quantities that `function` gives for postures (..., j)."""
-    nodes = np.array([0.0, TURN / 3.0, -TURN / 3.0])
-    few = Grid(grid.first, grid.second, nodes, nodes, grid.q)
-    # The pseudo-inverse leaves out the third, empty column of a prismatic joint.
-    left = np.linalg.pinv(basis(robot, grid.first, nodes))
-    right = np.linalg.pinv(basis(robot, grid.second, nodes))
+    few = Grid(grid.first, grid.second, _NODES, _NODES, grid.q)
+    left, right = (_INVERSE[_prismatic(robot, k)] for k in (grid.first, grid.second))
     values = function(few.postures())
     form = np.einsum('an,nmk,bm->kab', left, values, right)
     scale = np.abs(form).max(axis=(1, 2), keepdims=True)

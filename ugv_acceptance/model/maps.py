@@ -64,15 +64,47 @@ def within_limits(
 ) -> Mask:
     """Return where every |torque| is at most its limit (j,), shape (n, m)."""
     bounds = np.broadcast_to(np.asarray(limits, dtype=np.float64), len(forms))
-    ok = np.ones((len(grid.x), len(grid.y)), dtype=np.bool_)
-    for form, bound in zip(forms, bounds, strict=True):
-        if np.isinf(bound) or np.abs(form).sum() <= bound:
-            continue
-        if _equal_steps(robot, grid) and is_sum_form(form):
-            ok &= _sum_within(robot, grid, form, float(bound))
-        else:
-            _by_rows(len(grid.x), workers, _within(robot, grid, form, bound, ok))
+    judged = [(form, float(bound)) for form, bound in zip(forms, bounds, strict=True)]
+    judged = [(form, bound) for form, bound in judged if np.abs(form).sum() > bound]
+    windows: list[_Window] = []
+    if _equal_steps(robot, grid):
+        sums = [(form, bound) for form, bound in judged if is_sum_form(form)]
+        judged = [(form, bound) for form, bound in judged if not is_sum_form(form)]
+        for form, bound in sums:
+            _add_window(windows, along_rows(robot, grid, form)[:, 0], form[1, 1:], bound)
+    masks = [_window_mask(grid, window) for window in windows]
+    ok = masks[0] if masks else np.ones((len(grid.x), len(grid.y)), dtype=np.bool_)
+    for mask in masks[1:]:
+        ok &= mask
+    for form, bound in judged:
+        _by_rows(len(grid.x), workers, _within(robot, grid, form, bound, ok))
     return ok
+
+
+@dataclass(slots=True, eq=False)
+class _Window:
+    """Bounds (n,) on g(a + b) = wave[0] cos + wave[1] sin, one row a position of the first joint."""
+
+    wave: Floats
+    lower: Floats
+    upper: Floats
+
+
+def _add_window(windows: list[_Window], of_row: Floats, wave: Floats, bound: float) -> None:
+    """Add |of_row + g| <= bound; joints that share g, such as shoulder and elbow, share a window."""
+    for known in windows:
+        if np.abs(known.wave - wave).max() <= 1e-14 * np.abs(wave).max():
+            np.maximum(known.lower, -bound - of_row, out=known.lower)
+            np.minimum(known.upper, bound - of_row, out=known.upper)
+            return
+    windows.append(_Window(wave, -bound - of_row, bound - of_row))
+
+
+def _window_mask(grid: Grid, window: _Window) -> Mask:
+    step = grid.y[1] - grid.y[0]
+    total = grid.x[0] + grid.y[0] + step * np.arange(len(grid.x) + len(grid.y) - 1)
+    table = window.wave[0] * np.cos(total) + window.wave[1] * np.sin(total)
+    return window_between(table, window.lower, window.upper)
 
 
 def _within(
@@ -88,15 +120,6 @@ def _equal_steps(robot: Robot, grid: Grid) -> bool:
     kinds = {robot.joint(robot.joint_names[k]).kind for k in (grid.first, grid.second)}
     steps = np.concatenate([np.diff(grid.x), np.diff(grid.y)])
     return 'prismatic' not in kinds and bool(np.ptp(steps) < 1e-12)
-
-
-def _sum_within(robot: Robot, grid: Grid, form: Floats, bound: float) -> Mask:
-    """Return where |f(a) + g(a + b)| <= bound, by a sliding window over g."""
-    of_row = along_rows(robot, grid, form)[:, 0]
-    step = grid.y[1] - grid.y[0]
-    total = grid.x[0] + grid.y[0] + step * np.arange(len(grid.x) + len(grid.y) - 1)
-    table = form[1, 1] * np.cos(total) + form[1, 2] * np.sin(total)
-    return window_between(table, -bound - of_row, bound - of_row)
 
 
 def _by_rows(count: int, workers: int, run: Callable[[slice], None]) -> None:

@@ -1,0 +1,121 @@
+"""A million random PackBot postures: all torques and all tip edges, beside Pinocchio and MuJoCo loops.
+
+Ours gives more than the loops do (four edges' angles, moments and energies, and the ZMP); the loops
+give torques and the centre of mass alone. CPU seconds, best of rounds in turn; ratios count.
+
+    python bench/bench_kernels.py [postures]
+"""
+
+import math
+import sys
+import time
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from ugv_acceptance.config import load
+from ugv_acceptance.model.planar import PAPER, planar_dynamics
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.stability import stability
+from ugv_acceptance.model.statics import static_torque
+
+ROUNDS = 3
+LOOPS = 20_000  # postures a loop is timed with; its cost a posture does not depend on their number
+
+
+def gravities(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Return gravity (count, 3) of random tilts up to 40 degrees."""
+    tilt, heading = rng.uniform(0.0, math.radians(40.0), count), rng.uniform(0, 2 * math.pi, count)
+    down = [-np.sin(tilt) * np.cos(heading), -np.sin(tilt) * np.sin(heading), -np.cos(tilt)]
+    return 9.81 * np.stack(down, axis=-1)
+
+
+def seconds(run: Callable[[], object]) -> tuple[float, float]:
+    """Return CPU and wall seconds of one run."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    run()
+    return time.process_time() - cpu, time.perf_counter() - wall
+
+
+def pinocchio_loop(path: str, robot: Robot, q: np.ndarray, g: np.ndarray) -> Callable[[], object]:
+    """Return a loop of gravity torques and the centre of mass, load of 4 kg at the gripper."""
+    model = pin.buildModelFromUrdf(path)
+    frame = model.frames[model.getFrameId('gripper_link')]
+    load = pin.Inertia(robot.payload.mass, np.zeros(3), np.zeros((3, 3)))
+    model.appendBodyToJoint(frame.parentJoint, load, frame.placement)
+    data = model.createData()
+    order = [robot.joint_names.index(name) for name in list(model.names)[1:]]
+    angles = q[:LOOPS, order]
+    # A continuous joint of Pinocchio is given by cosine and sine.
+    points = np.stack([np.cos(angles), np.sin(angles)], axis=-1).reshape(len(angles), -1)
+    direction = g[:LOOPS]
+
+    def run() -> None:
+        for point, down in zip(points, direction, strict=True):
+            model.gravity.linear = down
+            pin.computeGeneralizedGravity(model, data, point)
+            pin.centerOfMass(model, data, point)
+
+    return run
+
+
+def mujoco_loop(path: str, q: np.ndarray, g: np.ndarray) -> Callable[[], object]:
+    """Return a loop of mj_inverse at rest (torques; the centre of mass comes with it)."""
+    spec = mujoco.MjSpec.from_file(path)
+    spec.compiler.discardvisual = True
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    model = spec.compile()
+    data = mujoco.MjData(model)
+
+    def run() -> None:
+        for point, down in zip(q[:LOOPS], g[:LOOPS], strict=True):
+            model.opt.gravity[:] = down
+            data.qpos[:] = point
+            mujoco.mj_inverse(model, data)
+
+    return run
+
+
+def main(count: int = 1_000_000) -> None:
+    """Print the table."""
+    config = load()
+    robot, path = config.settings.robot, str(config.urdf_path)
+    rng = np.random.default_rng(1)
+    q, g = rng.uniform(-math.pi, math.pi, (count, 4)), gravities(rng, count)
+    stowed = q.copy()
+    stowed[:, robot.joint_names.index('flipper_joint')] = math.pi
+    arm = rng.uniform(-math.pi, math.pi, (3, count, 2))
+
+    def ours(postures: np.ndarray, workers: int) -> Callable[[], object]:
+        def run() -> None:
+            static_torque(robot, postures, g, workers=workers)
+            stability(robot, postures, g, Payload(4.0), workers)
+
+        return run
+
+    ways: dict[str, tuple[int, Callable[[], object]]] = {
+        'ours, torques + edges, 2 threads': (count, ours(q, 2)),
+        'ours, torques + edges, 1 thread': (count, ours(q, 1)),
+        'ours, flippers stowed, 1 thread': (count, ours(stowed, 1)),
+        'Pinocchio loop, torques + CoM': (LOOPS, pinocchio_loop(path, robot, q, g)),
+        'MuJoCo mj_inverse loop': (LOOPS, mujoco_loop(path, q, g)),
+        'closed two-link dynamics': (count, lambda: planar_dynamics(PAPER, *arm)),
+    }
+    best = {name: (math.inf, math.inf) for name in ways}
+    for _ in range(ROUNDS):
+        for name, (n, run) in ways.items():
+            cpu, wall = seconds(run)
+            best[name] = min(best[name][0], cpu / n), min(best[name][1], wall / n)
+    loop = best['Pinocchio loop, torques + CoM']
+    print(f'{count} postures; loops timed on {LOOPS}')
+    print(f'{"way":36}{"cpu ns":>9}{"wall ns":>9}{"cpu x":>8}{"wall x":>8}   (x: against Pinocchio)')
+    for name, (cpu, wall) in best.items():
+        ratios = f'{loop[0] / cpu:8.2f}{loop[1] / wall:8.2f}'
+        print(f'{name:36}{cpu * 1e9:9.0f}{wall * 1e9:9.0f}{ratios}')
+
+
+if __name__ == '__main__':
+    main(*(int(a) for a in sys.argv[1:]))
