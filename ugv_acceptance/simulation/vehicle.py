@@ -19,8 +19,9 @@ from ugv_acceptance.simulation.shape import numbers
 
 # Mass (kg) and inertia (kg m2) of what has none: MuJoCo wants a moving body to have some.
 LEAST = 1e-12
-# Own frequency (rad/s) of the position servos on the inertia they see at the zero posture.
-SERVO = 50.0
+# Own frequency (rad/s) of the position servos on the inertia they see at the zero posture, or on
+# this (kg m2, kg) if that is more: a flipper's drive also lifts the robot.
+SERVO, SERVO_INERTIA = 50.0, 2.0
 # Bounds of the wheels' velocity servos: gain (N m s/rad), torque (N m) of one wheel.
 WHEEL_GAIN, WHEEL_TORQUE = 200.0, 40.0
 
@@ -93,7 +94,7 @@ def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
 def _tune(vehicle: Vehicle) -> None:
     """Give every motor the gains of a critically damped servo on the inertia it sees."""
     model = vehicle.model
-    inertia = model.dof_M0[vehicle.rate]
+    inertia = np.maximum(model.dof_M0[vehicle.rate], SERVO_INERTIA)
     model.actuator_gainprm[vehicle.motor, 0] = inertia * SERVO**2
     model.actuator_biasprm[vehicle.motor, 1] = -inertia * SERVO**2
     model.actuator_biasprm[vehicle.motor, 2] = -2.0 * inertia * SERVO

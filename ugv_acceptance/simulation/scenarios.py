@@ -1,0 +1,58 @@
+"""Named runs of the PackBot that ships: what an acceptance test meets."""
+
+from collections.abc import Callable
+from math import pi, radians
+
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.simulation.scenario import Command, Scenario
+
+# Flippers folded back along the tracks, arm folded over the deck.
+STOWED = (('flipper_joint', pi), ('shoulder_joint', radians(115)), ('elbow_joint', radians(-140)))
+RIGHT = -pi / 2
+
+
+def _arm(shoulder_deg: float, elbow_deg: float) -> tuple[tuple[str, float], ...]:
+    return (('shoulder_joint', radians(shoulder_deg)), ('elbow_joint', radians(elbow_deg)))
+
+
+def gentle() -> Scenario:
+    """On level ground with 1 kg: lift, look around, drive, fold again. Nothing is wrong."""
+    return Scenario(
+        'gentle',
+        28.0,
+        start=STOWED,
+        payload=Payload(1.0),
+        commands=(
+            Command(2.0, joints=_arm(70, -60), speed=0.35),
+            Command(8.0, joints=(('turret_joint', radians(30)),), speed=0.3),
+            Command(12.0, joints=(('turret_joint', 0.0),), speed=0.3),
+            Command(16.0, drive=(0.15, 0.0)),
+            Command(18.5, drive=(0.0, 0.0)),
+            Command(20.0, joints=_arm(115, -140), speed=0.35),
+        ),
+        joint_rate=100.0,
+        imu_rate=200.0,
+    )
+
+
+def overreach() -> Scenario:
+    """On a side slope with 4 kg: the shoulder gives all it has, then the arm turns downhill."""
+    return Scenario(
+        'overreach',
+        29.0,
+        start=STOWED,
+        payload=Payload(0.0),
+        commands=(
+            Command(2.0, payload=Payload(4.0)),
+            Command(3.0, slope=(radians(12), RIGHT), slope_rate=0.06),
+            Command(7.5, joints=_arm(62, -75), speed=0.45),
+            Command(11.5, joints=_arm(75, -150), speed=0.5),
+            Command(15.5, joints=(('turret_joint', RIGHT),), speed=0.5),
+            Command(21.0, joints=_arm(60, -85), speed=0.25),
+        ),
+        joint_rate=100.0,
+        imu_rate=200.0,
+    )
+
+
+SCENARIOS: dict[str, Callable[[], Scenario]] = {'gentle': gentle, 'overreach': overreach}

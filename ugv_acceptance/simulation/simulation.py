@@ -1,0 +1,170 @@
+"""A robot that moves through time: servos with limits, wheels, slopes, a load; no clock, no ROS.
+
+The ground is the plane z = 0 of the simulation; a slope is a change of gravity's direction, so the
+attitude a gravity-aligned world would see is the ground's own times the robot's on it. The ground
+tilts slowly: what its turning adds to accelerations is left out.
+"""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.simulation.scenario import Command
+from ugv_acceptance.simulation.vehicle import (
+    SERVO,
+    Build,
+    gravity_on_slope,
+    set_payload,
+    vehicle_of,
+)
+
+BUILD = Build(wheels=True, bulk=True, armature=0.01, timestep=0.00125, contact_time=0.005)
+# Steps between two looks at commands and targets.
+STEPS = 2
+# Time (s) to come to rest before the run begins.
+SETTLE = 1.0
+
+
+@dataclass(slots=True)
+class _Move:
+    """A smooth motion of a value from `start` at time `begin`, `length` seconds long."""
+
+    start: float
+    change: float = 0.0
+    begin: float = 0.0
+    length: float = 1.0
+
+    def at(self, time: float) -> tuple[float, float]:
+        """Return value and rate: a cosine ramp, whose peak rate is pi / 2 of the mean."""
+        phase = np.pi * min(max((time - self.begin) / self.length, 0.0), 1.0)
+        rate = self.change * np.pi / (2.0 * self.length) * np.sin(phase)
+        return self.start + self.change * (1.0 - np.cos(phase)) / 2.0, float(rate)
+
+
+def _move(start: float, target: float, speed: float, time: float) -> _Move:
+    length = max(abs(target - start) * np.pi / (2.0 * speed), 1e-9)
+    return _Move(start, target - start, time, length)
+
+
+class Simulation:
+    """One robot on its ground. `advance` moves it on; the read functions tell its state.
+
+    `payload` is in the hand from the start. Raises BadConfig where the robot cannot be simulated.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        start: tuple[tuple[str, float], ...] = (),
+        slope: tuple[float, float] = (0.0, 0.0),
+        payload: Payload | None = None,
+        build: Build = BUILD,
+    ) -> None:
+        load = robot.payload if payload is None else payload
+        try:
+            self.vehicle = vehicle_of(replace(robot, payload=load), build)
+        except ValueError as error:
+            raise BadConfig(f'{robot.name}: expected a robot MuJoCo takes, got: {error}') from error
+        self.robot = self.vehicle.robot
+        self.data = mujoco.MjData(self.vehicle.model)
+        first = dict(start)
+        _check_joints(robot, first)
+        self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
+        self._tilt, self._heading = _Move(slope[0]), slope[1]
+        self._drive = (0.0, 0.0)
+        self._settle()
+
+    def _settle(self) -> None:
+        """Come to rest, so that the run starts without a drop; then time is 0."""
+        data, vehicle = self.data, self.vehicle
+        data.qpos[vehicle.position] = [move.start for move in self._moves]
+        self._steer(0.0)
+        mujoco.mj_forward(vehicle.model, data)
+        mujoco.mj_step(vehicle.model, data, nstep=round(SETTLE / vehicle.model.opt.timestep))
+        data.time = 0.0
+        self._steer(0.0)
+        mujoco.mj_forward(vehicle.model, data)
+
+    @property
+    def time(self) -> float:
+        """Simulated time (s) since the start."""
+        return float(self.data.time)
+
+    def apply(self, command: Command) -> None:
+        """Take a command now. Raises BadConfig where it names a joint the robot does not move."""
+        targets = dict(command.joints)
+        _check_joints(self.robot, targets)
+        now = self.time
+        for k, name in enumerate(self.robot.joint_names):
+            if name in targets:
+                at = self._moves[k].at(now)[0]
+                self._moves[k] = _move(at, targets[name], command.speed, now)
+        if command.drive is not None:
+            self._drive = command.drive
+        if command.slope is not None:
+            tilt, self._heading = command.slope
+            self._tilt = _move(self._tilt.at(now)[0], tilt, command.slope_rate, now)
+        if command.payload is not None:
+            set_payload(self.vehicle, command.payload)
+
+    def advance(self, duration: float) -> None:
+        """Move on by `duration` (s), a multiple of the time step."""
+        model, data = self.vehicle.model, self.data
+        left = round(duration / model.opt.timestep)
+        while left > 0:
+            steps = min(left, STEPS)
+            self._steer(self.time + steps * model.opt.timestep)
+            mujoco.mj_step(model, data, nstep=steps)
+            left -= steps
+
+    def _steer(self, time: float) -> None:
+        """Set the servos' targets and gravity for `time`."""
+        control, vehicle = self.data.ctrl, self.vehicle
+        for motor, move in zip(vehicle.motor, self._moves, strict=True):
+            target, rate = move.at(time)
+            # The damper of a critically damped servo then brakes only what differs from this rate.
+            control[motor] = target + rate * 2.0 / SERVO
+        forward, yaw = self._drive
+        for wheel, y in vehicle.wheels:
+            control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
+        tilt = self._tilt.at(time)[0]
+        vehicle.model.opt.gravity[:] = gravity_on_slope(self.robot.gravity, tilt, self._heading)
+
+    def slope(self) -> tuple[float, float]:
+        """Return tilt and heading (rad) of the ground."""
+        return self._tilt.at(self.time)[0], self._heading
+
+    def joints(self) -> tuple[Floats, Floats, Floats]:
+        """Return position, rate and motor force (j,) of the joints: rad, rad/s, N m (m, m/s, N)."""
+        data, vehicle = self.data, self.vehicle
+        return (
+            data.qpos[vehicle.position],
+            data.qvel[vehicle.rate],
+            data.actuator_force[vehicle.motor],
+        )
+
+    def imu(self) -> tuple[Floats, Floats, Floats]:
+        """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2."""
+        data = self.data
+        tilt, heading = self.slope()
+        s = np.sin(tilt / 2.0)
+        ground = np.array([np.cos(tilt / 2.0), -s * np.sin(heading), s * np.cos(heading), 0.0])
+        world = np.empty(4)
+        mujoco.mju_mulQuat(world, ground, data.sensor('orientation').data)
+        gyro, acceleration = data.sensor('gyro').data, data.sensor('accelerometer').data
+        return world[[1, 2, 3, 0]], gyro.copy(), acceleration.copy()
+
+    def base(self) -> tuple[Floats, Floats]:
+        """Return position (3,) m of `base_link` on the ground, and its z axis there (3,)."""
+        root = self.vehicle.root
+        return self.data.xpos[root].copy(), self.data.xmat[root].reshape(3, 3)[:, 2].copy()
+
+
+def _check_joints(robot: Robot, targets: dict[str, float]) -> None:
+    for name in targets:
+        if name not in robot.joint_names:
+            raise BadConfig(f'{robot.name}: expected a joint of {robot.joint_names}, got {name!r}')
