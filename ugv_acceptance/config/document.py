@@ -19,6 +19,7 @@ _PARSE_ERRORS = (
     ValueError,
 )
 _DEEPEST = 20
+_MOST = 50_000
 
 Path = tuple[str | int, ...]
 
@@ -69,8 +70,12 @@ def read_document(text: str, source: str) -> Document:
 def _walk(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> None:
     """Note the line of every key below a node."""
     lines.setdefault(path, node.start_mark.line + 1)
-    if len(path) > _DEEPEST:  # also what an alias to its own parent comes to
-        raise BadConfig(f'{source}:{node.start_mark.line + 1}: nested more than {_DEEPEST} deep')
+    # Also what an alias to its own parent, and aliases of aliases, come to.
+    if len(path) > _DEEPEST or len(lines) > _MOST:
+        raise BadConfig(
+            f'{source}:{node.start_mark.line + 1}: expected at most {_MOST} values,'
+            f' {_DEEPEST} deep, got more'
+        )
     if isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             _walk(item, (*path, index), lines, source)
