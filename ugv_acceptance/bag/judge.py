@@ -1,0 +1,95 @@
+"""A recording judged: read once, stretch by stretch, into margins, alerts, a summary, a result."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.evaluation.recorded import MarginRows, RecordedEvaluator
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.summary import Summary, result_of
+
+# Version of the result's layout; changes where a reader of results must change.
+RESULT_VERSION = 1
+
+Sink = Callable[[MarginRows], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """The result, ready for JSON, and what it was made from."""
+
+    result: dict[str, Any]
+    evaluator: RecordedEvaluator
+    facts: Facts
+
+
+def judge(
+    bag: Bag,
+    topics: Topics,
+    settings: Settings,
+    sinks: Sequence[Sink] = (),
+    progress: Callable[[int], None] = lambda _: None,
+) -> Judgement:
+    """Return the judgement of a recording.
+
+    Each sink takes every stretch of margins in order; `progress` takes the log time (ns) reached.
+    """
+    evaluator, summary = RecordedEvaluator(settings), Summary(settings)
+    evaluator.start(bag.start_ns)
+    reading = bag.batches(topics)
+    for batch in reading:
+        rows = evaluator.batch(batch)
+        summary.add(rows)
+        for sink in sinks:
+            sink(rows)
+        if len(rows.time):
+            progress(int(rows.time[-1]))
+    evaluator.finish(bag.end_ns)
+    summary.finish(bag.end_ns)
+    duration = bag.end_ns - bag.start_ns
+    result = {
+        'version': RESULT_VERSION,
+        **result_of(summary, evaluator.watch.log, bag.start_ns, duration),
+        'bag': _bag_result(bag, reading.facts),
+        'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
+    }
+    return Judgement(result, evaluator, reading.facts)
+
+
+def _bag_result(bag: Bag, facts: Facts) -> dict[str, Any]:
+    return {
+        'path': [str(path) for path in bag.paths],
+        'sha256': bag.sha256(),
+        'duration_s': bag.duration_s,
+        'messages': {name: topic.count for name, topic in bag.topics.items()},
+        'protected': bag.protected,
+        'salvaged': bag.salvaged,
+        'findings': [*bag.findings, *facts.findings],
+    }
+
+
+def _inputs_result(
+    evaluator: RecordedEvaluator, topics: Topics, facts: Facts, start: int
+) -> dict[str, Any]:
+    names = {'joint_states': topics.joint_states, 'imu': topics.imu}
+    result: dict[str, Any] = {}
+    for which, (key, topic) in enumerate(names.items()):
+        period, gaps = evaluator.fresh[which].period, evaluator.gaps[which]
+        lengths = [(end - begin) / 1e9 for begin, end in gaps]
+        faults = {a.rule.code for a in evaluator.watch.log if a.rule.subject == key}
+        malformed = facts.malformed.get(topic or '', (0, ''))
+        result[key] = {
+            'topic': topic,
+            'messages': facts.counts.get(topic or '', 0),
+            'rate_hz': 1e9 / period if period > 0 else None,
+            'malformed': malformed[0],
+            'malformed_reason': malformed[1] or None,
+            'gaps': len(gaps),
+            'longest_gap_s': max(lengths, default=0.0),
+            'first_gaps_s': [[(a - start) / 1e9, (b - start) / 1e9] for a, b in gaps[:20]],
+            'faults': sorted(faults),
+        }
+    result['late_messages'] = facts.late
+    return result

@@ -1,0 +1,142 @@
+"""A result as a person reads it in ten seconds: the verdict, why, and the worst of each margin."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, TextColumn
+from rich.table import Table
+
+COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
+MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
+_MOST_ALERTS = 12
+
+
+@contextmanager
+def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int], None]]:
+    """Show how far a recording is read (log times, ns), where a person is watching."""
+    console = Console(file=stream)
+    with Progress(
+        *Progress.get_default_columns(),
+        TextColumn('{task.fields[seconds]:.0f} s of the recording'),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as progress:
+        task = progress.add_task('reading', total=max(end - start, 1), seconds=0.0)
+
+        def reached(now: int) -> None:
+            progress.update(task, completed=now - start, seconds=(now - start) / 1e9)
+
+        yield reached
+
+
+def print_result(result: dict[str, Any], console: Console | None = None) -> None:
+    """Print a result of `evaluate`."""
+    console = console or Console(highlight=False)
+    word = result['verdict']
+    paths = result['bag']['path']
+    console.print(f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}')
+    for reason in result['reasons'][:5]:
+        console.print(f'    {escape(reason)}')
+    if len(result['reasons']) > 5:
+        console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    console.print(_margins(result))
+    _print_data(result, console)
+    _print_alerts(result, console)
+    if 'effort' in result:
+        _print_effort(result, console)
+
+
+def _margins(result: dict[str, Any]) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2))
+    for heading in ('margin', 'worst', 'limit', 'left', 'at', 'in violation'):
+        table.add_column(heading, justify='left' if heading == 'margin' else 'right')
+    for name, joint in result['torque'].items():
+        unit = joint['unit']
+        table.add_row(
+            escape(name),
+            _number(joint['max_abs'], unit),
+            _number(joint['limit'], unit),
+            _number(joint['min_margin'], unit),
+            _number(joint['time_of_min_s'], 's'),
+            _number(joint['time_in_violation_s'], 's', 2),
+        )
+    stability = result['stability']
+    table.add_row(
+        f'tip-over ({stability["edge"] or "no polygon"})',
+        '',
+        '',
+        _number(stability['min_angle_deg'], 'deg'),
+        _number(stability['time_of_min_s'], 's'),
+        _number(stability['time_in_violation_s'], 's', 2),
+    )
+    return table
+
+
+def _number(value: float | None, unit: str, digits: int = 1) -> str:
+    return '-' if value is None else f'{value:.{digits}f} {unit}'
+
+
+def _print_data(result: dict[str, Any], console: Console) -> None:
+    coverage, bag = result['coverage'], result['bag']
+    console.print(
+        f'evaluated {coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s '
+        f'({coverage["fraction"]:.1%}); '
+        + {'all': 'every chunk has a checksum', 'part': 'some chunks have no checksum'}.get(
+            bag['protected'], 'unprotected: no checksum would show a changed byte'
+        )
+    )
+    for key in ('joint_states', 'imu'):
+        source = result['inputs'][key]
+        rate = source['rate_hz']
+        faults = ', '.join([*source['faults'], *_malformed(source)])
+        console.print(
+            f'  {escape(str(source["topic"]))}: {source["messages"]} messages'
+            + (f' at {rate:.0f} Hz' if rate else '')
+            + (f', {source["gaps"]} gaps up to {source["longest_gap_s"]:.2f} s' * bool(source['gaps']))
+            + (f'; {escape(faults)}' if faults else '')
+        )
+    if bag['salvaged']:
+        console.print(f'  salvaged: {escape(bag["salvaged"])}')
+    for finding in bag['findings'][:5]:
+        console.print(f'  {escape(finding)}')
+
+
+def _malformed(source: dict[str, Any]) -> list[str]:
+    count = source['malformed']
+    return [f'{count} malformed ({source["malformed_reason"]})'] if count else []
+
+
+def _print_alerts(result: dict[str, Any], console: Console) -> None:
+    alerts = result['alerts']
+    if not alerts:
+        console.print('no alerts')
+        return
+    console.print(f'{len(alerts)} alerts:')
+    for alert in alerts[:_MOST_ALERTS]:
+        end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f}'
+        console.print(
+            f'  {alert["start_s"]:8.2f} to {end:>8} s  {alert["level"]:5}  {alert["code"]:16}  '
+            f'{escape(alert["message"])}',
+            soft_wrap=True,
+        )
+    if len(alerts) > _MOST_ALERTS:
+        console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE has all)')
+
+
+def _print_effort(result: dict[str, Any], console: Console) -> None:
+    console.print('measured effort beside static torque, at rest:')
+    for name, plateaus in result['effort'].items():
+        unit = result['torque'].get(name, {}).get('unit', '')
+        for p in plateaus:
+            payload = p['payload_kg_that_explains_it']
+            explained = '' if payload is None else f' = {payload:.2f} kg of payload'
+            console.print(
+                f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  '
+                f'measured {p["measured"]:.1f}, model {p["model"]:.1f}, '
+                f'difference {p["difference"]:+.1f} {unit}{explained}',
+                soft_wrap=True,
+            )

@@ -1,0 +1,114 @@
+"""Measured effort beside static torque at rest: where they differ, and what payload that would be."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.recorded import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.statics import static_torque
+
+Floats = NDArray[np.float64]
+
+# A joint slower than this (rad/s or m/s) is at rest; samples are taken this far apart (ns).
+REST = 0.02
+SPACING = 50_000_000
+# Medians of bins this long (ns) are compared; a plateau ends where they differ by more than this
+# share of the effort (and at least this much, N m or N).
+BIN = 1_000_000_000
+STEP_SHARE = 0.05
+STEP_LEAST = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Plateau:
+    """A stretch at rest: times (ns), medians of measured effort and static torque (N m; N)."""
+
+    start: int
+    end: int
+    measured: float
+    model: float
+    payload: float | None
+
+
+@dataclass(slots=True)
+class EffortComparison:
+    """Gathers samples at rest, at most twenty a second, and splits them into plateaus of effort."""
+
+    settings: Settings
+    _rows: list[tuple[NDArray[np.int64], Floats]] = field(default_factory=list)
+    _next: int = 0
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        picked: list[int] = []
+        at = int(np.searchsorted(rows.time, self._next))
+        while at < len(rows.time):
+            picked.append(at)
+            self._next = int(rows.time[at]) + SPACING
+            at = int(np.searchsorted(rows.time, self._next))
+        some = np.array(picked, dtype=np.intp)[rows.known[picked]] if picked else []
+        if len(some):
+            parts = (rows.effort, rows.torque, rows.qd, rows.q, rows.gravity)
+            self._rows.append((rows.time[some], np.hstack([part[some] for part in parts])))
+
+    def plateaus(self, j: int) -> list[Plateau]:
+        """Return the plateaus of joint number j; none where no effort was recorded."""
+        if not self._rows:
+            return []
+        n = len(self.settings.joints)
+        time = np.concatenate([t for t, _ in self._rows])
+        table = np.concatenate([x for _, x in self._rows])
+        moving = np.abs(np.nan_to_num(table[:, 2 * n + j])) > REST
+        good = np.isfinite(table[:, j]) & ~moving
+        time, table = time[good], table[good]
+        return [self._plateau(j, time[rows], table[rows]) for rows in _split(time, table[:, j])]
+
+    def _plateau(self, j: int, time: NDArray[np.int64], table: Floats) -> Plateau:
+        n = len(self.settings.joints)
+        measured, model = float(np.median(table[:, j])), float(np.median(table[:, n + j]))
+        q, gravity = np.median(table[:, 3 * n : 4 * n], axis=0), np.median(table[:, 4 * n :], axis=0)
+        robot = self.settings.robot
+        cog = robot.payload.cog
+        loads = [static_torque(robot, q, gravity, Payload(m, cog))[j] for m in (0.0, 1.0)]
+        slope = float(loads[1] - loads[0])
+        payload = (measured - model) / slope if abs(slope) > 1e-6 else None
+        return Plateau(int(time[0]), int(time[-1]), measured, model, payload)
+
+    def result(self, start: int) -> dict[str, Any]:
+        """Return every joint's plateaus for JSON; times in seconds since `start` (ns)."""
+        return {
+            name: [
+                {
+                    'start_s': (p.start - start) / 1e9,
+                    'end_s': (p.end - start) / 1e9,
+                    'measured': p.measured,
+                    'model': p.model,
+                    'difference': p.measured - p.model,
+                    'payload_kg_that_explains_it': p.payload,
+                }
+                for p in self.plateaus(j)
+            ]
+            for j, name in enumerate(self.settings.robot.joint_names)
+        }
+
+
+def _split(time: NDArray[np.int64], effort: Floats) -> Iterator[slice]:
+    """Yield the rows of each plateau of at least three bins."""
+    if not len(time):
+        return
+    bins = np.flatnonzero(np.diff((time - time[0]) // BIN, prepend=-1))
+    edges = [*bins.tolist(), len(time)]
+    medians = [float(np.median(effort[a:b])) for a, b in zip(edges, edges[1:], strict=False)]
+    first = 0
+    for k in range(1, len(medians) + 1):
+        level = float(np.median(medians[first:k]))
+        step = max(STEP_LEAST, STEP_SHARE * abs(level))
+        if k == len(medians) or abs(medians[k] - level) > step:
+            if k - first >= 3:
+                yield slice(edges[first], edges[k])
+            first = k

@@ -1,0 +1,96 @@
+"""Is an input alive? Judged by when its messages were received, never by their header stamps."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.settings import Delays
+
+Times = NDArray[np.int64]
+
+# Messages over which a period is learnt; until then the start-up limit holds.
+WINDOW = 32
+STARTUP = 500_000_000
+# Time (ns) by which two clocks may differ, or a stamp may jump, before it is worth a warning.
+CLOCK_SLACK = 1_000_000_000
+
+
+@dataclass(slots=True)
+class Freshness:
+    """Learns an input's period (median of every WINDOW intervals) and how long it may be silent.
+
+    `started` is when listening began (ns), `last` the receipt time of the newest message (None: none yet), `limit` the silence (ns) after
+    which the input is stale.
+    """
+
+    delays: Delays
+    started: int | None = None
+    last: int | None = None
+    stamp: int = 0
+    limit: int = STARTUP
+    period: float = float('nan')
+    _intervals: list[int] = field(default_factory=list)
+
+    @property
+    def deadline(self) -> int | None:
+        """When the input is stale unless a message comes first; None before listening began."""
+        since = self.started if self.last is None else self.last
+        return None if since is None else since + self.limit
+
+    def clock(self, now: int, stamp: int) -> float:
+        """Return 1 where a header stamp is far from the receipt time or jumped, else 0.
+
+        To be asked before `message`.
+        """
+        wrong = abs(now - stamp) > CLOCK_SLACK
+        if self.last is not None:
+            wrong = wrong or abs((stamp - self.stamp) - (now - self.last)) > CLOCK_SLACK
+        self.stamp = stamp
+        return 1.0 if wrong else 0.0
+
+    def clocks(self, times: Times, stamps: Times) -> NDArray[np.float64]:
+        """Return `clock` of many messages, to be asked before `messages`."""
+        wrong = np.abs(times - stamps) > CLOCK_SLACK
+        if not len(times):
+            return wrong.astype(np.float64)
+        first = times[0] if self.last is None else self.last
+        before = stamps[0] if self.last is None else self.stamp
+        step = np.diff(stamps, prepend=before) - np.diff(times, prepend=first)
+        self.stamp = int(stamps[-1])
+        return (wrong | (np.abs(step) > CLOCK_SLACK)).astype(np.float64)
+
+    def message(self, now: int) -> None:
+        """Take the receipt time (ns) of a message."""
+        if self.last is not None:
+            self._intervals.append(now - self.last)
+            if len(self._intervals) == WINDOW:
+                self._learn()
+        self.last = now
+
+    def messages(self, times: Times) -> tuple[Times, Times]:
+        """Take many (n,); return the limit (ns) in force before and after each one."""
+        fresh = self.last is None
+        steps = np.diff(times, prepend=times[0] if self.last is None else self.last)
+        known = np.array(self._intervals, dtype=np.int64)
+        intervals = np.concatenate((known, steps[1:] if fresh else steps))
+        blocks = intervals[: len(intervals) // WINDOW * WINDOW].reshape(-1, WINDOW)
+        middle = np.sort(blocks, axis=1)[:, WINDOW // 2 - 1 : WINDOW // 2 + 1].sum(axis=1) / 2
+        learnt = np.concatenate(([self.limit], [self._silence(float(x)) for x in middle]))
+        ends = np.arange(len(times)) + len(known) + (0 if fresh else 1)
+        limits = learnt[ends // WINDOW].astype(np.int64)
+        before = np.concatenate(([self.limit], limits[:-1]))
+        if len(middle):
+            self.period, self.limit = float(middle[-1]), int(learnt[-1])
+        self._intervals = intervals[len(blocks) * WINDOW :].tolist()
+        self.last = int(times[-1])
+        return before, limits
+
+    def _learn(self) -> None:
+        ordered = sorted(self._intervals)
+        self.period = (ordered[WINDOW // 2 - 1] + ordered[WINDOW // 2]) / 2
+        self.limit = self._silence(self.period)
+        self._intervals.clear()
+
+    def _silence(self, period: float) -> int:
+        return int(max(period * self.delays.stale_periods, self.delays.stale_after * 1e9))

@@ -1,0 +1,213 @@
+"""IMU messages to the gravity vector in `base_link`, and what is wrong with them.
+
+The orientation is used where the message claims it and it is a rotation that says something; else
+the low-passed accelerometer. Orientation and accelerometer must agree at rest. The same steps are
+written for one message and for columns; a property test holds that both give the same rows.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.alerts import Signal, feed
+from ugv_acceptance.evaluation.samples import ImuColumns
+from ugv_acceptance.evaluation.settings import ImuInput, Settings
+from ugv_acceptance.model.attitude import (
+    angle_between,
+    up_from_acceleration,
+    up_from_orientation,
+)
+from ugv_acceptance.model.expressions import add, cross, rotate, scale
+
+Floats = NDArray[np.float64]
+Times = NDArray[np.int64]
+Vector = tuple[float, float, float]
+
+NOWHERE: Vector = (math.nan, math.nan, math.nan)
+# Seconds between stamps over which the low-pass may be carried; else it starts again.
+LONGEST_STEP = 1.0
+# A unit quaternion's norm may be this far from 1 (single precision, rounding).
+NORM_SLACK = 0.01
+# Share of g by which the accelerometer may differ from g and still show where up is.
+GRAVITY_SLACK = 0.15
+
+
+@dataclass(frozen=True, slots=True)
+class ImuRows:
+    """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
+
+    `disagreement` (n,) is the angle (rad) between orientation and accelerometer, NaN while moving;
+    `strange` (n,) the share of g by which the acceleration differs from g at rest, NaN while moving.
+    """
+
+    time: Times
+    stamp: Times
+    gravity: Floats
+    disagreement: Floats
+    strange: Floats
+
+
+@dataclass(slots=True)
+class ImuTracker:
+    """The low-pass filter's state, and the fault that orientation and acceleration disagree.
+
+    While `fault` has an active alert there is no gravity.
+    """
+
+    settings: Settings
+    fault: Signal
+    smooth: Vector = NOWHERE
+    stamp: int = 0
+
+    def step(
+        self,
+        now: int,
+        stamp: int,
+        orientation: Sequence[float],
+        covariance_0: float,
+        omega: Sequence[float],
+        acceleration: Sequence[float],
+    ) -> tuple[Vector, float, float]:
+        """Take one message; return gravity, disagreement and strangeness as in ImuRows."""
+        self._filter(stamp, acceleration)
+        imu, g = self.settings.imu, self.settings.robot.gravity
+        x, y, z, w = orientation
+        ax, ay, az = self.smooth
+        size = math.sqrt(ax * ax + ay * ay + az * az)
+        still = _norm(omega) <= imu.rest_rate
+        told = _orientation_tells(x, y, z, w, covariance_0, imu.attitude)
+        shown = abs(size - g) <= GRAVITY_SLACK * g
+        by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if told else NOWHERE
+        by_acceleration = up_from_acceleration(ax, ay, az, imu.mounting) if shown else NOWHERE
+        disagreement = math.nan
+        if told and shown and still and abs(size - g) <= imu.rest_acceleration:
+            disagreement = angle_between(by_orientation, by_acceleration)
+        self.fault.step(now, disagreement)
+        self.fault.advance(now)
+        strange = abs(size - g) / g if still else math.nan
+        if self.fault.alert is not None:
+            return NOWHERE, disagreement, strange
+        if imu.specific_force:
+            return _force(self.smooth, omega, imu), disagreement, strange
+        up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
+        return (-g * up[0], -g * up[1], -g * up[2]), disagreement, strange
+
+    def _filter(self, stamp: int, acceleration: Sequence[float]) -> None:
+        ax, ay, az = acceleration
+        step = (stamp - self.stamp) * 1e-9
+        self.stamp = stamp
+        sx, sy, sz = self.smooth
+        if 0.0 < step <= LONGEST_STEP and sx == sx and sy == sy and sz == sz:  # noqa: PLR0124 - not NaN
+            keep = math.exp(-step / self.settings.imu.low_pass)
+            ax, ay, az = ax + keep * (sx - ax), ay + keep * (sy - ay), az + keep * (sz - az)
+        self.smooth = (ax, ay, az)
+
+    def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
+        """Take many messages: the same rows as `step` one at a time, in order of receipt."""
+        columns = [s for s in segments if len(s.log_time)]
+        if not columns:
+            none = np.empty(0, np.int64)
+            return ImuRows(none, none, np.empty((0, 3)), np.empty(0), np.empty(0))
+        time = np.concatenate([s.log_time for s in columns])
+        order = np.argsort(time, kind='stable')
+        time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
+        q = np.concatenate([s.orientation for s in columns])[order].T
+        covariance_0 = np.concatenate([s.orientation_covariance_0 for s in columns])[order]
+        omega = np.concatenate([s.angular_velocity for s in columns])[order].T
+        smooth = self._filter_columns(
+            stamp, np.concatenate([s.linear_acceleration for s in columns])[order].T
+        )
+        return self._rows(time, stamp, q, covariance_0, omega, smooth)
+
+    def _rows(
+        self,
+        time: Times,
+        stamp: Times,
+        q: Floats,
+        covariance_0: Floats,
+        omega: Floats,
+        smooth: Floats,
+    ) -> ImuRows:
+        imu, g = self.settings.imu, self.settings.robot.gravity
+        with np.errstate(invalid='ignore', over='ignore', divide='ignore'):
+            size = np.sqrt((smooth * smooth).sum(axis=0))
+            still = np.sqrt((omega * omega).sum(axis=0)) <= imu.rest_rate
+            told = _orientation_tells(q[0], q[1], q[2], q[3], covariance_0, imu.attitude)
+            shown = np.abs(size - g) <= GRAVITY_SLACK * g
+            oriented = np.where(told, up_from_orientation(*q, imu.mounting), np.nan)
+            leaning = np.where(shown, up_from_acceleration(*smooth, imu.mounting), np.nan)
+            rest = still & (np.abs(size - g) <= imu.rest_acceleration)
+            angle = angle_between(tuple(oriented), tuple(leaning))
+            disagreement = np.where(rest, angle, np.nan)
+            strange = np.where(still, np.abs(size - g) / g, np.nan)
+        feed(self.fault, time, disagreement)
+        if imu.specific_force:
+            gravity = np.array(_force(tuple(smooth), tuple(omega), imu))
+        else:
+            use = told if imu.attitude != 'accelerometer' else np.zeros(len(time), np.bool_)
+            gravity = -g * np.where(use, oriented, leaning)
+        for alert in self.fault.log:
+            if alert.rule is self.fault.rule:
+                end = np.inf if alert.end is None else alert.end
+                gravity[:, (time >= alert.start) & (time < end)] = np.nan
+        return ImuRows(time, stamp, gravity.T, disagreement, strange)
+
+    def _filter_columns(self, stamp: Times, x: Floats) -> Floats:
+        """Low-pass many accelerations (3, n): the recursion of `_filter` in closed form.
+
+        Stretches of a few time constants at a time, so that the products of the decay factors stay
+        far from the ends of the number range.
+        """
+        step = np.diff(stamp, prepend=self.stamp) * 1e-9
+        self.stamp = int(stamp[-1])
+        finite = np.isfinite(x).all(axis=0)
+        carried = (step > 0.0) & (step <= LONGEST_STEP) & np.concatenate(([True], finite[:-1]))
+        decay = np.where(carried, step / self.settings.imu.low_pass, 0.0)
+        elapsed = np.cumsum(decay)
+        starts = ~carried
+        starts[1:] |= np.diff(np.floor(elapsed / 8.0)) > 0
+        starts[0] = True
+        edges = np.append(np.flatnonzero(starts), len(stamp))
+        y = np.empty_like(x)
+        last = np.array(self.smooth)
+        for first, end in zip(edges[:-1], edges[1:], strict=True):
+            part = x[:, first:end]
+            if not carried[first] or not np.isfinite(last).all():
+                last = part[:, 0]
+                keep = np.exp(-(elapsed[first:end] - elapsed[first]))
+                gain = np.concatenate(([0.0], -np.expm1(-decay[first + 1 : end])))
+            else:
+                keep = np.exp(-(elapsed[first:end] - elapsed[first] + decay[first]))
+                gain = -np.expm1(-decay[first:end])
+            y[:, first:end] = keep * (last[:, None] + np.cumsum(gain * part / keep, axis=1))
+            last = y[:, end - 1]
+        self.smooth = (float(last[0]), float(last[1]), float(last[2]))
+        return y
+
+
+def _orientation_tells(
+    x: Any, y: Any, z: Any, w: Any, covariance_0: Any, attitude: str  # noqa: ANN401 - floats or arrays
+) -> Any:  # noqa: ANN401
+    """Return whether a quaternion is claimed, is a rotation, and is not just a default identity."""
+    size = x * x + y * y + z * z + w * w
+    told = (abs(size - 1.0) <= 2.0 * NORM_SLACK) & (covariance_0 != -1.0)
+    if attitude == 'auto':
+        told = told & ((x != 0.0) | (y != 0.0) | (z != 0.0))
+    return told
+
+
+def _norm(v: Sequence[float]) -> float:
+    x, y, z = v
+    return math.sqrt(x * x + y * y + z * z)
+
+
+def _force(smooth: Any, omega: Any, imu: ImuInput) -> Any:  # noqa: ANN401 - floats or arrays
+    """Return minus the specific force at base_link's origin, in base axes (centripetal part undone)."""
+    force = rotate(imu.mounting, smooth)
+    spin = rotate(imu.mounting, omega)
+    arm = scale(imu.position, -1.0)
+    return scale(add(force, cross(spin, cross(spin, arm))), -1.0)

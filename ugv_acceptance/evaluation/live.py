@@ -1,0 +1,189 @@
+"""The evaluation of a live robot: each message gives the margins of the newest pair at once."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.alerts import OK, STALE
+from ugv_acceptance.evaluation.freshness import Freshness
+from ugv_acceptance.evaluation.imu import NOWHERE, ImuTracker, Vector
+from ugv_acceptance.evaluation.joints import NEVER, JointMerger
+from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.watch import InputSignals, Watch
+from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import NO_CONTACT, Stability, Stance, stability_of, stance_of
+from ugv_acceptance.model.statics import torque_of
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """The margins of one pair of joints and attitude: `time` of receipt and header `stamp` (ns).
+
+    `torque` is the static torque of each joint (N m; N); `stability` the tip-over margins.
+    """
+
+    time: int
+    stamp: int
+    q: tuple[float, ...]
+    gravity: Vector
+    torque: tuple[float, ...]
+    stability: Stability
+
+
+@dataclass(slots=True)
+class LiveEvaluator:
+    """Takes messages as numbers with their receipt time (ns); holds the newest margins and alerts.
+
+    `margins` is None while they are not known: an input missing, stale or not to be used.
+    """
+
+    settings: Settings
+    watch: Watch = field(init=False)
+    payload: Payload = field(init=False)
+    margins: Margins | None = None
+    evaluated: int = 0
+    _mechanics: Mechanics = field(init=False)
+    _joints: JointMerger = field(init=False)
+    _imu: ImuTracker = field(init=False)
+    _fresh: tuple[Freshness, Freshness] = field(init=False)
+    _posture: Posture | None = None
+    _stance: Stance | None = None
+    _gravity: Vector = NOWHERE
+
+    def __post_init__(self) -> None:
+        self.watch = Watch(self.settings)
+        self.payload = self.settings.robot.payload
+        self._mechanics = mechanics_of(self.settings.robot)
+        self._joints = JointMerger(self.settings)
+        self._imu = ImuTracker(self.settings, self.watch.disagreement)
+        delays = self.settings.delays
+        self._fresh = (Freshness(delays), Freshness(delays))
+
+    def start(self, now: int) -> None:
+        """Say when listening began: an input that never comes is stale from then on."""
+        for fresh in self._fresh:
+            fresh.started = now
+
+    def joint_state(
+        self,
+        now: int,
+        stamp: int,
+        names: tuple[str, ...],
+        position: Sequence[float],
+        velocity: Sequence[float],
+        effort: Sequence[float],
+    ) -> Margins | None:
+        """Take a JointState; return the margins of the newest pair, None where they are unknown.
+
+        A message that names none of the robot's joints is no event at all.
+        """
+        joints, watch = self._joints, self.watch
+        if not joints.merge(now, names, position, velocity, effort):
+            return self.margins
+        self._arrived(0, now, stamp, watch.joints)
+        known = all(map(math.isfinite, joints.q))
+        seen = min(joints.seen)
+        unusable = not known and any(
+            t != NEVER and q != q for q, t in zip(joints.q, joints.seen, strict=True)
+        )
+        watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
+        watch.missing.step(now, 1.0 if now - seen > self._fresh[0].limit else 0.0)
+        for signal, rate in zip(watch.speed, joints.qd, strict=True):
+            signal.step(now, abs(rate))
+        if known:
+            load = self.payload
+            self._posture = posture_of(self._mechanics, joints.q, load.mass, load.cog)
+            self._stance = stance_of(self._mechanics, self._posture)
+        else:
+            self._posture = self._stance = None
+        return self._evaluate(now, stamp)
+
+    def imu(
+        self,
+        now: int,
+        stamp: int,
+        orientation: Sequence[float],
+        covariance_0: float,
+        omega: Sequence[float],
+        acceleration: Sequence[float],
+    ) -> Margins | None:
+        """Take an Imu message (sensor axes); return as `joint_state` does."""
+        self._arrived(1, now, stamp, self.watch.imu)
+        gravity, _, strange = self._imu.step(
+            now, stamp, orientation, covariance_0, omega, acceleration
+        )
+        self.watch.strange.step(now, strange)
+        self.watch.imu.invalid.step(now, 0.0 if gravity[0] == gravity[0] else 1.0)
+        self._gravity = gravity
+        return self._evaluate(now, stamp)
+
+    def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
+        """Take a declared payload (kg, m); it counts from the next joint state on."""
+        payload = payload_from(self.settings.robot, mass, com, frame)
+        self.watch.payload.step(now, 0.0 if payload else 1.0)
+        if payload:
+            self.payload = payload
+
+    def tick(self, now: int) -> None:
+        """Let time pass without a message: silence and delays are judged."""
+        for fresh, signals in zip(self._fresh, (self.watch.joints, self.watch.imu), strict=True):
+            due = fresh.deadline
+            if due is not None and now > due:
+                signals.stale.set(due, 1.0)
+        for signal in self.watch.signals():
+            signal.advance(now)
+        if not self._alive(now):
+            self.margins = None
+
+    @property
+    def level(self) -> int:
+        """The most severe level now: STALE where the margins are not known."""
+        active = [alert.rule.level for alert in self.watch.active]
+        return max([*active, OK if self.margins else STALE])
+
+    def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
+        fresh = self._fresh[which]
+        due = fresh.deadline
+        if due is not None and now > due:
+            signals.stale.set(due, 1.0)
+        signals.stale.clear(now)
+        signals.clock.step(now, fresh.clock(now, stamp))
+        fresh.message(now)
+
+    def _alive(self, now: int) -> bool:
+        joints, imu = self._fresh
+        seen = min(self._joints.seen)
+        if seen == NEVER or imu.last is None:
+            return False
+        return now <= seen + joints.limit and now <= imu.last + imu.limit
+
+    def _evaluate(self, now: int, stamp: int) -> Margins | None:
+        posture, gravity = self._posture, self._gravity
+        self.margins = None
+        if posture is None or self._stance is None or gravity[0] != gravity[0]:
+            return None
+        if not self._alive(now):
+            return None
+        torque = torque_of(posture, gravity)
+        stability = stability_of(self._stance, gravity)
+        self._watch(now, torque, stability)
+        q = tuple(self._joints.q)
+        self.margins = Margins(now, stamp, q, gravity, torque, stability)
+        self.evaluated += 1
+        return self.margins
+
+    def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:
+        watch = self.watch
+        for (warn, error), tau in zip(watch.torque, torque, strict=True):
+            value = abs(tau)
+            # A quiet signal has nothing to do with a small value: most calls are saved.
+            if value >= warn.on or not (warn.quiet and error.quiet):
+                warn.step(now, value)
+                error.step(now, value)
+        for (warn, error), angle in zip(watch.tip, stability.angle, strict=True):
+            if -angle >= warn.on or not (warn.quiet and error.quiet):
+                warn.step(now, -angle)
+                error.step(now, -angle)
+        watch.support.step(now, 1.0 if stability.state >= NO_CONTACT else 0.0)

@@ -1,0 +1,216 @@
+"""What a recording came to: worst margins, time in violation, coverage, alerts and the verdict."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.alerts import LEVELS, Alert
+from ugv_acceptance.evaluation.recorded import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.watch import FAILURES
+from ugv_acceptance.evaluation.wording import describe
+from ugv_acceptance.model.stability import SIDES, STATES
+
+PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
+# Less of the recording than this evaluated can never be a pass.
+LEAST_COVERAGE = 0.95
+
+
+@dataclass(slots=True)
+class Extreme:
+    """The largest value seen, and when (ns)."""
+
+    value: float = -np.inf
+    time: int = 0
+
+    def see(self, values: NDArray[np.float64], times: NDArray[np.int64]) -> None:
+        """Take many values (NaN: unknown)."""
+        if not np.isfinite(values).any():
+            return
+        k = int(np.nanargmax(values))
+        if values[k] > self.value:
+            self.value, self.time = float(values[k]), int(times[k])
+
+
+@dataclass(slots=True)
+class Summary:
+    """Gathers margin rows stretch by stretch; times in ns, sums of time in ns."""
+
+    settings: Settings
+    evaluated: int = 0
+    messages: int = 0
+    load: list[Extreme] = field(init=False)
+    load_violation: list[int] = field(init=False)
+    tip: list[Extreme] = field(init=False)
+    tip_violation: int = 0
+    states: dict[str, int] = field(default_factory=dict)
+    _open: tuple[int, int, list[bool], bool] | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.settings.robot.joint_names)
+        self.load, self.load_violation = [Extreme() for _ in range(n)], [0] * n
+        self.tip = [Extreme() for _ in SIDES]
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch."""
+        if not len(rows.time):
+            return
+        self._close(int(rows.time[0]))
+        known = rows.known
+        limits = self.settings.limits
+        over = np.abs(rows.torque) >= limits.torque_error * np.array(limits.torque)
+        with np.errstate(invalid='ignore'):
+            tipping = rows.angle.min(axis=1) <= limits.tip_error
+        held = np.where(known, rows.until - rows.time, 0)
+        held[-1] = 0
+        self.messages += len(known)
+        self.evaluated += int(held.sum())
+        self.tip_violation += int(held[tipping].sum())
+        for j, extreme in enumerate(self.load):
+            extreme.see(np.abs(rows.torque[:, j]), rows.time)
+            self.load_violation[j] += int(held[over[:, j]].sum())
+        for side, extreme in enumerate(self.tip):
+            extreme.see(-rows.angle[:, side], rows.time)
+        counts = np.bincount(rows.state[known], minlength=len(STATES))
+        for name, count in zip(STATES, counts.tolist(), strict=True):
+            if count:
+                self.states[name] = self.states.get(name, 0) + count
+        if known[-1]:
+            last = int(rows.time[-1]), int(rows.until[-1])
+            self._open = (*last, over[-1].tolist(), bool(tipping[-1]))
+
+    def finish(self, now: int) -> None:
+        """Say when the recording ended (ns)."""
+        self._close(now)
+
+    def _close(self, now: int) -> None:
+        """The last row holds until the next message, the input's deadline or the end."""
+        if self._open is None:
+            return
+        time, until, over, tipping = self._open
+        held = max(0, min(now, until) - time)
+        self.evaluated += held
+        self.tip_violation += held if tipping else 0
+        self.load_violation = [
+            total + (held if bad else 0)
+            for total, bad in zip(self.load_violation, over, strict=True)
+        ]
+        self._open = None
+
+
+def verdict(summary: Summary, alerts: Sequence[Alert], duration: int) -> tuple[str, list[str]]:
+    """Return PASS, FAIL or INCONCLUSIVE, and the reasons in plain words.
+
+    Any evaluated sample beyond an error limit fails; too little evaluated can never pass.
+    """
+    failures = [a for a in alerts if a.rule.code in FAILURES and LEVELS[a.rule.level] == 'ERROR']
+    names = summary.settings.robot.joint_names
+    reasons = [describe(a, summary.settings) for a in failures]
+    told = {a.rule.subject for a in failures if a.rule.code == 'TORQUE_LIMIT'}
+    for name, spent in zip(names, summary.load_violation, strict=True):
+        if spent and name not in told:
+            reasons.append(f'{name} was over its torque limit for {spent / 1e9:.3f} s')
+    if summary.tip_violation and not any(a.rule.code == 'TIP_OVER' for a in failures):
+        spent_s = summary.tip_violation / 1e9
+        reasons.append(f'the tilt left was under its limit for {spent_s:.3f} s')
+    if reasons:
+        return FAIL, reasons
+    share = summary.evaluated / duration if duration > 0 else 0.0
+    if share < LEAST_COVERAGE:
+        text = f'only {share:.1%} of the recording could be evaluated ({LEAST_COVERAGE:.0%} needed)'
+        return INCONCLUSIVE, [text, *missing_reasons(alerts, summary.settings)]
+    return PASS, [f'all margins kept, {share:.1%} of the recording evaluated']
+
+
+def missing_reasons(alerts: Sequence[Alert], settings: Settings) -> list[str]:
+    """Return why margins were missing: one sentence for each kind of input fault."""
+    kinds = {(a.rule.code, a.rule.subject): a for a in alerts if a.rule.code not in FAILURES}
+    return [describe(a, settings) for a in kinds.values() if LEVELS[a.rule.level] != 'WARN']
+
+
+def result_of(
+    summary: Summary, alerts: Sequence[Alert], start: int, duration: int
+) -> dict[str, Any]:
+    """Return the part of a result that the margins and alerts decide, ready for JSON."""
+    settings = summary.settings
+    word, reasons = verdict(summary, alerts, duration)
+    seconds = duration / 1e9
+    return {
+        'verdict': word,
+        'reasons': reasons,
+        'coverage': {
+            'evaluated_s': summary.evaluated / 1e9,
+            'duration_s': seconds,
+            'fraction': summary.evaluated / duration if duration > 0 else 0.0,
+            'messages_judged': summary.messages,
+        },
+        'torque': {
+            name: _torque_result(summary, j, start)
+            for j, name in enumerate(settings.robot.joint_names)
+            if np.isfinite(settings.limits.torque[j])
+        },
+        'stability': _stability_result(summary, start),
+        'alerts': [alert_result(alert, settings, start) for alert in ordered(alerts)],
+    }
+
+
+def ordered(alerts: Sequence[Alert]) -> list[Alert]:
+    """Return alerts by start, code, subject and level: the same order whoever gathered them."""
+    return sorted(alerts, key=lambda a: (a.start, a.rule.code, a.rule.subject, a.rule.level))
+
+
+def alert_result(alert: Alert, settings: Settings, start: int) -> dict[str, Any]:
+    """Return one alert for JSON; times in seconds since `start` (ns)."""
+    rule = alert.rule
+    return {
+        'code': rule.code,
+        'subject': rule.subject,
+        'level': LEVELS[rule.level],
+        'start_s': (alert.start - start) / 1e9,
+        'end_s': None if alert.end is None else (alert.end - start) / 1e9,
+        'peak': _peak(alert),
+        'message': describe(alert, settings),
+    }
+
+
+def _peak(alert: Alert) -> float | None:
+    if alert.rule.code == 'TIP_OVER':
+        return float(np.degrees(-alert.peak))
+    return float(alert.peak) if np.isfinite(alert.peak) else None
+
+
+def _torque_result(summary: Summary, j: int, start: int) -> dict[str, Any]:
+    name = summary.settings.robot.joint_names[j]
+    worst, limit = summary.load[j], summary.settings.limits.torque[j]
+    seen = np.isfinite(worst.value)
+    return {
+        'limit': limit,
+        'unit': 'N' if summary.settings.robot.joint(name).kind == 'prismatic' else 'N m',
+        'max_abs': worst.value if seen else None,
+        'min_margin': limit - worst.value if seen else None,
+        'time_of_min_s': (worst.time - start) / 1e9 if seen else None,
+        'time_in_violation_s': summary.load_violation[j] / 1e9,
+    }
+
+
+def _stability_result(summary: Summary, start: int) -> dict[str, Any]:
+    edges = {
+        side: {
+            'min_angle_deg': float(np.degrees(-worst.value)),
+            'time_of_min_s': (worst.time - start) / 1e9,
+        }
+        for side, worst in zip(SIDES, summary.tip, strict=True)
+        if np.isfinite(worst.value)
+    }
+    edge = min(edges, key=lambda side: edges[side]['min_angle_deg'], default=None)
+    return {
+        'min_angle_deg': edges[edge]['min_angle_deg'] if edge else None,
+        'edge': edge,
+        'time_of_min_s': edges[edge]['time_of_min_s'] if edge else None,
+        'time_in_violation_s': summary.tip_violation / 1e9,
+        'edges': edges,
+        'states': summary.states,
+    }

@@ -1,0 +1,110 @@
+"""The rules of an evaluation and their signals: what is watched, live and in a recording alike."""
+
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.alerts import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+
+# Alerts of level ERROR with these codes are failures of the robot; all others are of the input.
+FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
+# Share of g by which the acceleration at rest may differ from g.
+STRANGE = 0.15
+
+
+@dataclass(slots=True)
+class Watch:
+    """One signal a rule, (WARN, ERROR) where a rule has two levels. `log` receives all alerts.
+
+    `torque` and `speed` follow `robot.joint_names`, `tip` follows SIDES.
+    """
+
+    settings: Settings
+    log: list[Alert] = field(default_factory=list)
+    torque: list[tuple[Signal, Signal]] = field(init=False)
+    speed: list[Signal] = field(init=False)
+    tip: list[tuple[Signal, Signal]] = field(init=False)
+    support: Signal = field(init=False)
+    joints: 'InputSignals' = field(init=False)
+    imu: 'InputSignals' = field(init=False)
+    payload: Signal = field(init=False)
+    missing: Signal = field(init=False)
+    strange: Signal = field(init=False)
+    disagreement: Signal = field(init=False)
+
+    def __post_init__(self) -> None:
+        limits, names = self.settings.limits, self.settings.robot.joint_names
+        speeds = limits.speed or (float('inf'),) * len(names)
+        self.torque = [
+            (
+                self._torque(name, WARN, limits.torque_warn * limit),
+                self._torque(name, ERROR, limits.torque_error * limit),
+            )
+            for name, limit in zip(names, limits.torque, strict=True)
+        ]
+        self.speed = [
+            self._signal('STATIC_MODEL', name, WARN, (speed, 0.9 * speed), self.settings.delays.tip_on)
+            for name, speed in zip(names, speeds, strict=True)
+        ]
+        self.tip = [
+            (self._tip(side, WARN, limits.tip_warn), self._tip(side, ERROR, limits.tip_error))
+            for side in SIDES
+        ]
+        self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
+        self.joints, self.imu = self._input('joint_states'), self._input('imu')
+        self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
+        self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
+        imu = self.settings.imu
+        delay = imu.agreement_delay
+        self.strange = self._signal('IMU_GRAVITY', 'imu', WARN, (STRANGE, STRANGE), delay)
+        apart = (imu.agreement, imu.agreement / 2)
+        self.disagreement = self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay)
+
+    def _signal(
+        self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
+    ) -> Signal:
+        off = int(self.settings.delays.off * 1e9)
+        return Signal(Rule(code, subject, level, *at, int(on_delay * 1e9), off), self.log)
+
+    def _torque(self, joint: str, level: int, limit: float) -> Signal:
+        at = (limit, limit - self.settings.limits.torque_deadband)
+        return self._signal('TORQUE_LIMIT', joint, level, at, self.settings.delays.torque_on)
+
+    def _tip(self, side: str, level: int, angle: float) -> Signal:
+        """The watched value is minus the tilt left (rad), so that larger is worse."""
+        at = (-angle, -angle - self.settings.limits.tip_deadband)
+        return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
+
+    def _fault(self, code: str, subject: str, level: int, on_delay: float | None = None) -> Signal:
+        """A fault is watched as 1 (there) or 0 (not there)."""
+        delay = self.settings.delays.fault_on if on_delay is None else on_delay
+        return self._signal(code, subject, level, (0.5, 0.5), delay)
+
+    def _input(self, subject: str) -> 'InputSignals':
+        return InputSignals(
+            self._fault('INPUT_STALE', subject, STALE, 0.0),
+            self._fault('INPUT_INVALID', subject, ERROR),
+            self._fault('CLOCK', subject, WARN),
+        )
+
+    @property
+    def active(self) -> list[Alert]:
+        """Return the alerts that are active now, the most severe first."""
+        found = [signal.alert for signal in self.signals() if signal.alert is not None]
+        return sorted(found, key=lambda alert: -alert.rule.level)
+
+    def signals(self) -> list[Signal]:
+        """Return all signals."""
+        pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
+        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
+        faults = [self.support, self.payload, self.missing, self.strange, self.disagreement]
+        return [*pairs, *self.speed, *inputs, *faults]
+
+
+@dataclass(frozen=True, slots=True)
+class InputSignals:
+    """What is watched of an input: silence, content that cannot be used, and its clock."""
+
+    stale: Signal
+    invalid: Signal
+    clock: Signal

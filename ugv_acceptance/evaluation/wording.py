@@ -1,0 +1,80 @@
+"""Alerts in plain words: where, what, how much, and what to do."""
+
+import math
+
+from ugv_acceptance.evaluation.alerts import WARN, Alert
+from ugv_acceptance.evaluation.settings import Settings
+
+# Code -> (what happened, what to do). {subject} is the joint, input or robot, {peak} the worst.
+WORDS = {
+    'TORQUE_LIMIT': (
+        '{subject} needs {peak:.1f} {unit}; its limit is {limit:.1f} {unit}',
+        'bring the load closer to the joint, or set it down',
+    ),
+    'TIP_OVER': (
+        '{peak:.1f} degrees of tilt left before it tips to the {subject}; {kind} {limit:.1f}',
+        'lower the arm and bring it over the tracks; turn the robot to face the slope',
+    ),
+    'NO_SUPPORT': (
+        'the contact points give no support polygon, or nothing presses on the ground',
+        'stop; check that the robot stands on its tracks',
+    ),
+    'STATIC_MODEL': (
+        '{subject} moves at {peak:.2f} rad/s, faster than the static model was shown to hold',
+        'move the joint more slowly',
+    ),
+    'INPUT_STALE': (
+        'no message from {subject}',
+        'check that its driver runs, its topic name and its quality of service',
+    ),
+    'INPUT_INCOMPLETE': (
+        'at least one joint of the robot is missing from {subject}, or is not refreshed',
+        'check the joint names in the configuration against the topic',
+    ),
+    'INPUT_INVALID': (
+        '{subject} holds numbers that cannot be used',
+        'check the sensor: not-a-number, or a position outside the limits (degrees for radians?)',
+    ),
+    'CLOCK': (
+        'header stamps of {subject} differ from the time of receipt by over a second, or jump',
+        'check the clocks and use_sim_time',
+    ),
+    'IMU_GRAVITY': (
+        'at rest the acceleration differs from gravity by {peak:.0%}',
+        'check its unit (m/s2, not g) and that gravity is not removed from it',
+    ),
+    'IMU_INCONSISTENT': (
+        'orientation and acceleration of the IMU disagree by {degrees:.1f} degrees at rest',
+        'check the IMU: its orientation may be a default, or its axes exchanged',
+    ),
+    'PAYLOAD_INVALID': (
+        'a declared payload cannot be used',
+        'give a mass in kg that is not negative, in the frame of the payload link',
+    ),
+}
+
+
+def describe(alert: Alert, settings: Settings) -> str:
+    """Return the alert as one sentence: what happened."""
+    rule = alert.rule
+    peak, limit = alert.peak, rule.on
+    unit = 'N m'
+    if rule.code == 'TORQUE_LIMIT':
+        j = settings.robot.joint_names.index(rule.subject)
+        limit = settings.limits.torque[j]
+        unit = 'N' if settings.robot.joint(rule.subject).kind == 'prismatic' else 'N m'
+    if rule.code == 'TIP_OVER':
+        peak, limit = math.degrees(-peak), math.degrees(-rule.on)
+    return WORDS[rule.code][0].format(
+        subject=rule.subject,
+        peak=peak,
+        limit=limit,
+        unit=unit,
+        degrees=math.degrees(alert.peak),
+        kind='warning limit' if rule.level == WARN else 'limit',
+    )
+
+
+def advice(code: str) -> str:
+    """Return what to do about an alert."""
+    return WORDS[code][1]
