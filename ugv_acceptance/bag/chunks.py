@@ -98,21 +98,23 @@ class Buffers:
                 room = head.size + head.size // 4
                 self._records = np.zeros(LEAD + room + SLACK, np.uint8)
             out = self._records
-            self._unpack(head, chunk.data[head.data : stop], out.data)
+            self.unpack(
+                head.compression, chunk.data[head.data : stop], out.data[LEAD:][: head.size]
+            )
         if head.crc and crc32(out.data[LEAD : LEAD + head.size]) != head.crc:
             raise BadBag('its checksum (CRC-32) does not match its content')
         return out
 
-    def _unpack(self, head: ChunkHead, source: memoryview, out: memoryview) -> None:
-        target = out[LEAD : LEAD + head.size]
-        if head.compression == 'zstd':
+    def unpack(self, compression: str, source: memoryview, target: memoryview) -> None:
+        """Decompress `source` so that it fills `target`, else BadBag."""
+        if compression == 'zstd':
             got = self._unzstd(source, target)
-        elif head.compression == 'lz4':
+        elif compression == 'lz4':
             got = _unlz4(source, target)
         else:
-            raise BadBag(f'compression {head.compression!r} is not known, expected zstd or lz4')
-        if got != head.size:
-            raise BadBag(f'expected {head.size} bytes unpacked, got {got}')
+            raise BadBag(f'compression {compression!r} is not known, expected zstd or lz4')
+        if got != len(target):
+            raise BadBag(f'expected {len(target)} bytes unpacked, got {got}')
 
     def _unzstd(self, source: memoryview, target: memoryview) -> int:
         got = 0

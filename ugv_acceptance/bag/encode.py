@@ -3,6 +3,12 @@
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Numbers: TypeAlias = Sequence[float] | NDArray[np.float64]
 
 _NS = 1_000_000_000
 _STAMP = struct.Struct('<iI')
@@ -12,9 +18,9 @@ def joint_state_cdr(
     stamp_ns: int,
     frame_id: str,
     names: Sequence[str],
-    position: Sequence[float],
-    velocity: Sequence[float] = (),
-    effort: Sequence[float] = (),
+    position: Numbers,
+    velocity: Numbers = (),
+    effort: Numbers = (),
 ) -> bytes:
     """A sensor_msgs/JointState; SI units, radians; each array empty or as long as `names`."""
     out = _head(stamp_ns, frame_id, tuple(names))
@@ -26,10 +32,10 @@ def joint_state_cdr(
 def imu_cdr(
     stamp_ns: int,
     frame_id: str,
-    orientation: Sequence[float],
-    angular_velocity: Sequence[float],
-    linear_acceleration: Sequence[float],
-    covariances: tuple[Sequence[float], Sequence[float], Sequence[float]] | None = None,
+    orientation: Numbers,
+    angular_velocity: Numbers,
+    linear_acceleration: Numbers,
+    covariances: tuple[Numbers, Numbers, Numbers] | None = None,
 ) -> bytes:
     """A sensor_msgs/Imu: quaternion x, y, z, w; rad/s; m/s2.
 
@@ -48,8 +54,8 @@ def inertia_cdr(
     stamp_ns: int,
     frame_id: str,
     mass: float,
-    com: Sequence[float],
-    moments: Sequence[float] = (0.0,) * 6,
+    com: Numbers,
+    moments: Numbers = (0.0,) * 6,
 ) -> bytes:
     """A geometry_msgs/InertiaStamped: kg, m, and kg m2 (ixx, ixy, ixz, iyy, iyz, izz)."""
     out = _head(stamp_ns, frame_id, None)
@@ -91,7 +97,7 @@ def _count(out: bytearray, number: int) -> None:
 
 
 def _floats(
-    out: bytearray, values: Sequence[float], size: int | None = None, *, counted: bool = False
+    out: bytearray, values: Numbers, size: int | None = None, *, counted: bool = False
 ) -> None:
     number = len(values)
     if size not in (None, number):
