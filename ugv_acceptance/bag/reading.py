@@ -54,7 +54,8 @@ class Member:
         """First and last log time in ns, None of a file without messages."""
         if isinstance(self.index, ForeignIndex):
             return (self.index.first, self.index.last) if any(self.index.counts.values()) else None
-        held = self.index.pieces
+        # A chunk without messages, only schemas, says that it spans from 0 to 0.
+        held = [p for p in self.index.pieces if p.last] or self.index.pieces
         return (min(p.first for p in held), max(p.last for p in held)) if held else None
 
     def findings(self) -> list[str]:
