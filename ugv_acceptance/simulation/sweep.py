@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
+from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, tune, vehicle_of
 
 FIXED = Build(base='fixed', motors=False)
-FREE = Build(wheels=True, timestep=0.0005, contact_time=0.002)
+FREE = Build(wheels=True, timestep=0.0005, contact_time=0.005)
 # Own frequency (rad/s) of the servos that hold the free vehicle's joints to the motion.
 STIFF = 500.0
 # Time (s) for the free vehicle to come to rest, and then for the joint to come to speed.
@@ -24,7 +24,7 @@ SETTLE, LEAD = 1.0, 0.5
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Joints in the order of `robot.joint_names`; `base_link` axes: x longitudinal, y lateral, z up.
+    """Joints in the order of `robot.joint_names`; axes of `base_link`: x forward, y left, z up.
 
     `position`, `rate` and `acceleration` (n, j) of each joint: rad, rad/s, rad/s2. `force` (N) and
     `torque` (N m), both (n, j, 3), are what the parent link exerts on the child at the joint;
@@ -109,14 +109,10 @@ def _target(time: float) -> float:
 
 
 def _strong(robot: Robot) -> Vehicle:
-    """Return the vehicle on wheels with servos so strong and stiff that they prescribe the motion."""
+    """Return the vehicle on wheels with servos so stiff that they prescribe the motion."""
     joints = tuple(replace(joint, effort=float('inf')) for joint in robot.joints)
     vehicle = vehicle_of(replace(robot, joints=joints), FREE)
-    model, motors = vehicle.model, vehicle.motor
-    inertia = model.dof_M0[vehicle.rate]
-    model.actuator_gainprm[motors, 0] = inertia * STIFF**2
-    model.actuator_biasprm[motors, 1] = -inertia * STIFF**2
-    model.actuator_biasprm[motors, 2] = -2.0 * inertia * STIFF
+    tune(vehicle, STIFF)
     return vehicle
 
 

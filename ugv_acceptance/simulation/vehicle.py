@@ -87,17 +87,17 @@ def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
         -1 if robot.payload_link is None else model.body('payload').id,
     )
     if build.motors:
-        _tune(vehicle)
+        tune(vehicle, SERVO)
     return vehicle
 
 
-def _tune(vehicle: Vehicle) -> None:
-    """Give every motor the gains of a critically damped servo on the inertia it sees."""
+def tune(vehicle: Vehicle, frequency: float) -> None:
+    """Make the motors critically damped servos of this own frequency (rad/s)."""
     model = vehicle.model
     inertia = np.maximum(model.dof_M0[vehicle.rate], SERVO_INERTIA)
-    model.actuator_gainprm[vehicle.motor, 0] = inertia * SERVO**2
-    model.actuator_biasprm[vehicle.motor, 1] = -inertia * SERVO**2
-    model.actuator_biasprm[vehicle.motor, 2] = -2.0 * inertia * SERVO
+    model.actuator_gainprm[vehicle.motor, 0] = inertia * frequency**2
+    model.actuator_biasprm[vehicle.motor, 1] = -inertia * frequency**2
+    model.actuator_biasprm[vehicle.motor, 2] = -2.0 * inertia * frequency
 
 
 def mjcf_of(robot: Robot, build: Build) -> str:
