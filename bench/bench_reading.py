@@ -189,7 +189,9 @@ def rerun(path: Path) -> Callable[[], int]:
     from rerun.chunk import McapReader  # type: ignore[import-not-found]  # noqa: PLC0415 (optional)
 
     def run() -> int:
-        chunks = McapReader(str(path), decoders=['ros2msg']).stream()
+        wanted = ['^/joint_states$', '^/imu/data$']
+        reader = McapReader(path, decoders=['ros2msg'], include_topic_regex=wanted)
+        chunks = reader.stream()
         return sum(chunk.num_rows for chunk in chunks)
 
     return run

@@ -52,9 +52,9 @@ class McapWriter:
         return self._counts
 
     @property
-    def pending(self) -> tuple[int, int]:
-        """Bytes in the open chunk, and the first log time in it."""
-        return self._open.size, self._open.first
+    def pending(self) -> tuple[int, int] | None:
+        """Bytes and first log time of the messages in the open chunk, None if it has none."""
+        return (self._open.size, self._open.first) if self._open.at else None
 
     def channel(self, topic: str, type_: str, schema: str, metadata: dict[str, str]) -> int:
         """Id of a new channel."""

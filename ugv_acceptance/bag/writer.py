@@ -96,9 +96,10 @@ class BagWriter:
             raise BadBag(f'{topic}: not declared with add_topic')
         if not 0 <= log_time_ns < 1 << 63:
             raise BadSample(f'{topic}: expected a log time in ns from 0 to 2^63, got {log_time_ns}')
-        size, first = self._mcap.pending
-        if size and (size >= self._chunk_bytes or abs(log_time_ns - first) >= self._flush_ns):
-            self._mcap.end_chunk()
+        if pending := self._mcap.pending:
+            size, first = pending
+            if size >= self._chunk_bytes or abs(log_time_ns - first) >= self._flush_ns:
+                self._mcap.end_chunk()
         self._mcap.message(known.channel, log_time_ns, cdr)
 
     def flush(self) -> None:
