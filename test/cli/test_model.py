@@ -50,7 +50,7 @@ def test_tables_fit_in_80_columns() -> None:
         'Total mass 28.55 kg',
         'Support polygon: ',
         'the limits allow 1.88 kg here: 2.12 kg too much',
-        'warning: shoulder_joint: limit 50 cannot hold 4 kg in every posture: up to 74.8 needed',
+        'warning: shoulder_joint: limit 50 N m cannot hold 4 kg in every posture: up to 74.8 N m',
     ],
 )
 def test_what_the_tool_believes_is_printed(text: str) -> None:
@@ -87,6 +87,13 @@ def test_a_positive_roll_lowers_the_right_side() -> None:
     """Roll turns about x, forward: the left side rises (REP-103)."""
     sides = described('--posture', 'shoulder_joint=90deg', '--tilt', 'roll=10deg')['sides']
     assert sides['right']['tilt_left_deg'] < sides['left']['tilt_left_deg']
+
+
+def test_an_inverted_robot_has_no_margins() -> None:
+    """Its state is named, and no side has a tilt left."""
+    values = described('--tilt', 'roll=180deg')
+    assert values['state'] == 'inverted'
+    assert {side['tilt_left_deg'] for side in values['sides'].values()} == {None}
 
 
 def test_a_payload_replaces_the_configured_one() -> None:

@@ -86,6 +86,26 @@ def test_the_imu_mounting_turns_sensor_axes_into_base_link(tmp_path: Path) -> No
     np.testing.assert_allclose(np.array(imu.mounting) @ [0, 0, 1], [0, 0, -1], atol=1e-15)
 
 
+def test_a_urdf_can_stand_in_a_ros_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """package://NAME is the share folder of a package of the ROS set-up."""
+    pytest.importorskip('ament_index_python', reason='needs ROS')
+    prefix = tmp_path / 'install'
+    for folder in ('share/ament_index/resource_index/packages', 'share/two_description'):
+        (prefix / folder).mkdir(parents=True)
+    (prefix / 'share/ament_index/resource_index/packages/two_description').touch()
+    (prefix / 'share/two_description/two.urdf').write_text(URDF, encoding='utf-8')
+    path = write_robot(tmp_path, swap('two.urdf', 'package://two_description/two.urdf'))
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    assert load(path).urdf_path == prefix / 'share/two_description/two.urdf'
+
+
+def test_a_ros_package_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    """With and without ROS."""
+    path = write_robot(tmp_path, swap('two.urdf', 'package://no_such_package/two.urdf'))
+    with pytest.raises(BadConfig, match='expected a ROS package of this set-up'):
+        load(path)
+
+
 REFUSED = [
     ('lift:', 'lfit:', '4: joints.lfit: the URDF has no movable joint "lfit"; did you mean lift?'),
     ('limit_nm: 30', 'limt_nm: 30', '5: joints.lift.limt_nm: unknown key; did you mean limit?'),
@@ -166,7 +186,7 @@ def test_a_section_that_makes_no_sense_is_refused(tmp_path: Path, more: str, sen
 @pytest.mark.parametrize(
     ('old', 'new', 'sentence'),
     [
-        ('limit_nm: 30', 'limit_nm: 15', 'joints.lift.limit_nm: 15 cannot hold the own weight in'),
+        ('limit_nm: 30', 'limit_nm: 15', 'lift.limit_nm: 15 N m cannot hold the own weight'),
         ('  slide:\n    limit_n: 100\n', '', 'neither under joints nor held, so held at 0: slide'),
         ('  c: {link: base, position_m: [0, -1, 0]}\n', '', '2 contact points: no tip-over margin'),
     ],

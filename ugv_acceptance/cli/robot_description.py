@@ -10,7 +10,15 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
-from ugv_acceptance.model.stability import SIDES, STATES, Stance, stability_of, stance_of
+from ugv_acceptance.model.stability import (
+    RAISED,
+    SIDES,
+    STANDING,
+    STATES,
+    Stance,
+    stability_of,
+    stance_of,
+)
 from ugv_acceptance.model.statics import payload_capacity, torque_of
 
 VERSION = 1
@@ -159,18 +167,20 @@ def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
 def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]) -> Values:
     """Return the support polygon (names, counter-clockwise from above) and the margins."""
     margins = stability_of(stance, gravity)
+    # Upside down it does not stand on these points, so their edges say nothing.
+    stands = margins.state in (STANDING, RAISED)
     return {
         'support_polygon': [robot.contacts[k].name for k in stance.support.polygon],
         'state': STATES[int(margins.state)],
         'sides': {
             side: {
-                'tilt_left_deg': _finite(math.degrees(margins.angle[k])),
-                'restoring_moment_nm': _finite(margins.moment[k]),
-                'energy_j': _finite(margins.energy[k]),
+                'tilt_left_deg': _finite(math.degrees(margins.angle[k])) if stands else None,
+                'restoring_moment_nm': _finite(margins.moment[k]) if stands else None,
+                'energy_j': _finite(margins.energy[k]) if stands else None,
             }
             for k, side in enumerate(SIDES)
         },
-        'zmp_margin_m': _finite(margins.zmp),
+        'zmp_margin_m': _finite(margins.zmp) if stands else None,
     }
 
 
@@ -186,8 +196,8 @@ def _overload(config: Config, load: Payload) -> list[str]:
     """Return a sentence for each limit that cannot hold the payload in every posture."""
     robot, limits = config.settings.robot, config.settings.limits.torque
     return [
-        f'{worst.joint}: limit {limit:g} cannot hold {load.mass:g} kg in every posture:'
-        f' up to {worst.torque:.1f} needed'
+        f'{worst.joint}: limit {limit:g} {worst.unit} cannot hold {load.mass:g} kg'
+        f' in every posture: up to {worst.torque:.1f} {worst.unit} needed'
         for worst, limit in zip(worst_torques(robot, load), limits, strict=False)
         if load.mass > 0.0 and worst.torque > limit
     ]

@@ -90,20 +90,30 @@ def find(path: Path) -> Path:
 
 def _shares() -> list[Path]:
     """Return where our data may be: the checkout the code runs from, else the installed share."""
-    shares = [Path(__file__).resolve().parents[2]]
+    checkout, ros = Path(__file__).resolve().parents[2], _share_of(PACKAGE)
+    return [checkout, *([ros] if ros else []), Path(sys.prefix) / 'share' / PACKAGE]
+
+
+def _share_of(package: str) -> Path | None:
+    """Return the share folder of a ROS package; None without ROS or such a package."""
     try:
         from ament_index_python.packages import (  # noqa: PLC0415 - ROS may be absent
             get_package_share_directory,
         )
 
-        shares.append(Path(get_package_share_directory(PACKAGE)))
-    except (ImportError, LookupError, OSError):  # OSError: no AMENT_PREFIX_PATH
-        pass
-    return [*shares, Path(sys.prefix) / 'share' / PACKAGE]
+        return Path(get_package_share_directory(package))
+    except (ImportError, LookupError, OSError, ValueError):  # OSError: no AMENT_PREFIX_PATH
+        return None
 
 
 def _beside(at: Path, urdf: str) -> Path:
-    """Return the path of a URDF that is named relative to its configuration file."""
+    """Return the path of a URDF: relative to its configuration file, or package://NAME/PATH."""
+    if urdf.startswith('package://'):
+        package, _, inside = urdf.removeprefix('package://').partition('/')
+        share = _share_of(package)
+        if share is None:
+            raise BadConfig(f'{at}: urdf: expected a ROS package of this set-up, got {package}')
+        return share / inside
     try:
         return (at.resolve().parent / urdf.removeprefix('file://')).resolve()
     except (OSError, ValueError, RuntimeError) as error:
@@ -135,5 +145,6 @@ def _check_strength(build: Build, settings: Settings) -> None:
         if math.isfinite(limit) and worst.torque > limit:
             build.warn(
                 ('joints', worst.joint, 'limit'),
-                f'{limit:g} cannot hold the own weight in every posture: {worst.torque:.1f} needed',
+                f'{limit:g} {worst.unit} cannot hold the own weight in every posture:'
+                f' {worst.torque:.1f} {worst.unit} needed',
             )

@@ -24,6 +24,7 @@ class Worst:
 
     joint: str
     torque: float
+    unit: str
     posture: tuple[float, ...]
 
 
@@ -35,9 +36,13 @@ def worst_torques(robot: Robot, payload: Payload) -> tuple[Worst, ...]:
     torque = np.abs(static_torque(robot, q, (0.0, 0.0, -robot.gravity), payload))
     rows = torque.argmax(axis=0)
     return tuple(
-        Worst(name, float(torque[row, j]), tuple(map(float, q[row])))
+        Worst(name, float(torque[row, j]), _unit(robot, name), tuple(map(float, q[row])))
         for j, (name, row) in enumerate(zip(robot.joint_names, rows, strict=True))
     )
+
+
+def _unit(robot: Robot, name: str) -> str:
+    return 'N' if robot.joint(name).kind == 'prismatic' else 'N m'
 
 
 def postures(robot: Robot) -> NDArray[np.float64]:
