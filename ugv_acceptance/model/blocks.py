@@ -10,7 +10,7 @@ from ugv_acceptance.model.expressions import Number
 
 Floats = NDArray[np.float64]
 # Samples a block: the temporaries of a kernel then stay in the processor's cache.
-BLOCK = 4096
+BLOCK = 16384
 
 
 def in_blocks(

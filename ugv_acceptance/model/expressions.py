@@ -1,18 +1,16 @@
-"""Formulas written once on scalars, specialised to one robot, run on floats or on arrays.
+"""Scalars that are numbers or symbols, and small vectors of them: what formulas are written on.
 
-A formula is an ordinary function of scalars (`x * y + sin(z)`). `compile_kernel` runs it once with
-symbols, folds what is constant for this robot (zeros of axis-aligned joints, fixed links, missing
-velocities), shares what is computed twice, and emits straight-line code. The code runs on Python
-floats for a live sample and on cache-sized blocks of arrays for a map or a recording, so there is
-one formula and no scalar twin. See docs/decisions/0002-formulas-compiled-per-robot.md.
+A formula is an ordinary function of scalars (`x * y + sin(z)`). Run with floats it gives floats;
+run with symbols it records itself, and `kernels.compile_kernel` turns the record into code. On the
+way what is constant is folded and signs are drawn out of products, so that axis-aligned joints,
+fixed links and missing velocities cost nothing.
 
 Folding drops `0 * x`, so a NaN in a joint that cannot matter does not spread; whoever calls must
-judge the inputs themselves.
+judge the inputs themselves. Constants of one product are multiplied first: the last digit may
+differ from that of the formula run with floats.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Union
 
 import numpy as np
@@ -35,27 +33,49 @@ class Expr:
         self.known = known
 
     def __add__(self, other: Scalar) -> Scalar:
-        return self if _is(other, 0.0) else _node('+', self, other)
+        if _is(other, 0.0):
+            return self
+        if isinstance(other, Expr) and other.op == 'neg':
+            return self - other.args[0]
+        if self.op == 'neg':
+            return other - self.args[0]
+        return _node('+', self, other)
 
     __radd__ = __add__
 
     def __sub__(self, other: Scalar) -> Scalar:
-        return self if _is(other, 0.0) else _node('-', self, other)
+        if _is(other, 0.0):
+            return self
+        if isinstance(other, Expr) and other.op == 'neg':
+            return self + other.args[0]
+        return _node('-', self, other)
 
     def __rsub__(self, other: Scalar) -> Scalar:
         return -self if _is(other, 0.0) else _node('-', other, self)
 
     def __mul__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):
-            if other == 0.0:
-                return 0.0
-            if other == 1.0:
-                return self
-            if other == -1.0:
-                return -self
+            return self._times(other)
+        if self.op == 'neg':
+            return -(self.args[0] * other)
+        if other.op == 'neg':
+            return -(self * other.args[0])
         return _node('*', self, other)
 
     __rmul__ = __mul__
+
+    def _times(self, factor: float) -> Scalar:
+        if factor == 0.0:
+            return 0.0
+        if factor == 1.0:
+            return self
+        if self.op == 'neg':
+            return self.args[0] * -factor
+        if factor == -1.0:
+            return -self
+        if self.op == '*' and isinstance(self.args[0], float):
+            return self.args[1] * (self.args[0] * factor)
+        return _node('*', factor, self)
 
     def __truediv__(self, other: Scalar) -> Scalar:
         return _node('/', self, other)
@@ -64,7 +84,13 @@ class Expr:
         return 0.0 if _is(other, 0.0) else _node('/', other, self)
 
     def __neg__(self) -> Scalar:
-        return self.args[0] if self.op == 'neg' else _node('neg', self)
+        if self.op == 'neg':
+            return self.args[0]
+        if self.op == '-':
+            return self.args[1] - self.args[0]
+        if self.op == '*' and isinstance(self.args[0], float):
+            return self.args[1] * -self.args[0]
+        return _node('neg', self)
 
 
 def _is(x: Scalar, value: float) -> bool:
@@ -76,7 +102,8 @@ def _node(op: str, *args: Scalar) -> Expr:
     if op in '+*' and _order(args[1]) < _order(args[0]):
         args = (args[1], args[0])
     known = next(a.known for a in args if isinstance(a, Expr))
-    key = (op, *(a if isinstance(a, float) else id(a) for a in args))
+    # A float by its digits: 0.0 and -0.0 are equal, but not to atan2 and copysign.
+    key = (op, *(repr(a) if isinstance(a, float) else id(a) for a in args))
     found = known.get(key)
     if found is None:
         found = known[key] = Expr(op, args, known)
@@ -114,6 +141,13 @@ def copysign(x: Scalar, y: Scalar) -> Scalar:
     if isinstance(y, float) and isinstance(x, float):
         return math.copysign(x, y)
     return _node('copysign', x, y)
+
+
+def minimum(x: Scalar, y: Scalar) -> Scalar:
+    """Return the smaller of two; NaN where either is NaN."""
+    if isinstance(x, float) and isinstance(y, float):
+        return x if x < y or math.isnan(x) else y
+    return _node('minimum', x, y)
 
 
 def dot(a: Vec, b: Vec) -> Scalar:
@@ -163,112 +197,3 @@ def matmul(a: Mat, b: Mat) -> Mat:
     """Return the matrix product."""
     t = transpose(b)
     return (rotate(t, a[0]), rotate(t, a[1]), rotate(t, a[2]))
-
-
-@dataclass(frozen=True, slots=True)
-class Kernel:
-    """A compiled formula: `one` takes floats, `many` takes arrays (or floats) that broadcast.
-
-    Both return a tuple; an output that is constant for this robot is a float in either.
-    """
-
-    source: str
-    one: Callable[..., tuple[float, ...]]
-    many: Callable[..., tuple[Any, ...]]
-
-
-@dataclass(slots=True)
-class _Emitter:
-    """Writes straight-line code; a name is used again as soon as its last value is dead."""
-
-    uses: dict[int, int]
-    lines: list[str] = field(default_factory=list)
-    names: dict[int, str] = field(default_factory=dict)
-    free: list[str] = field(default_factory=list)
-    count: int = 0
-
-    def text(self, x: Scalar) -> str:
-        if isinstance(x, float):
-            return f'({float(x)!r})'
-        name = self.names[id(x)]
-        self.uses[id(x)] -= 1
-        if self.uses[id(x)] == 0 and name.startswith('t'):
-            self.free.append(name)
-        return name
-
-    def assign(self, x: Expr) -> None:
-        a = [self.text(arg) for arg in x.args]
-        if x.op in '+-*/':
-            code = f'{a[0]} {x.op} {a[1]}'
-        elif x.op == 'neg':
-            code = f'-{a[0]}'
-        else:
-            code = f'{x.op}({", ".join(a)})'
-        if not self.free:
-            self.free.append(f't{self.count}')
-            self.count += 1
-        self.names[id(x)] = self.free.pop()
-        self.lines.append(f'    {self.names[id(x)]} = {code}')
-
-
-def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], dict[int, int]]:
-    """Return the operations the outputs need, arguments first, and how often each is used."""
-    order: list[Expr] = []
-    uses: dict[int, int] = {}
-    seen: set[int] = set()
-    stack: list[tuple[Scalar, bool]] = [(x, False) for x in reversed(outputs)]
-    for x in outputs:
-        uses[id(x)] = uses.get(id(x), 0) + 1
-    while stack:
-        x, done = stack.pop()
-        if isinstance(x, float) or (not done and id(x) in seen):
-            continue
-        if done:
-            order.append(x)
-            continue
-        seen.add(id(x))
-        stack.append((x, True))
-        for arg in x.args:
-            uses[id(arg)] = uses.get(id(arg), 0) + 1
-            stack.append((arg, False))
-    return order, uses
-
-
-def compile_kernel(formula: Callable[..., Sequence[Scalar]], inputs: Sequence[str]) -> Kernel:
-    """Return `formula` (a function of len(inputs) scalars to a flat sequence) as a Kernel."""
-    known: dict[Any, Expr] = {}
-    symbols = [Expr('input', (), known) for _ in inputs]
-    outputs = formula(*symbols)
-    order, uses = _reachable(outputs)
-    emitter = _Emitter(uses, names={id(s): f'x{i}' for i, s in enumerate(symbols)})
-    for x in order:
-        if x.op != 'input':
-            emitter.assign(x)
-    result = ''.join(f'{emitter.text(x)}, ' for x in outputs)
-    arguments = ', '.join(f'x{i}' for i in range(len(symbols)))
-    source = '\n'.join([f'def kernel({arguments}):', *emitter.lines, f'    return ({result})', ''])
-    return Kernel(source, _function(source, _FLOAT), _function(source, _ARRAY))
-
-
-_FLOAT = {
-    'sin': math.sin,
-    'cos': math.cos,
-    'sqrt': math.sqrt,
-    'atan2': math.atan2,
-    'copysign': math.copysign,
-}
-_ARRAY = {
-    'sin': np.sin,
-    'cos': np.cos,
-    'sqrt': np.sqrt,
-    'atan2': np.arctan2,
-    'copysign': np.copysign,
-}
-
-
-def _function(source: str, functions: dict[str, Any]) -> Callable[..., tuple[Any, ...]]:
-    """Return the compiled function; the source holds only our own names and numbers."""
-    scope: dict[str, Any] = {'inf': math.inf, 'nan': math.nan, **functions}
-    exec(compile(source, '<kernel>', 'exec'), scope)  # noqa: S102 - nothing foreign in the source
-    function: Callable[..., tuple[Any, ...]] = scope['kernel']
-    return function

@@ -1,8 +1,7 @@
 """One robot's formulas, compiled: posture (what depends on joints and payload) and joint forces.
 
-Static torque is linear in gravity, so a posture holds each joint's three levers: the recursion run
-under unit gravity along x, y and z. A sample that only brings a new attitude costs three products
-a joint.
+Static torque is linear in gravity, so a posture holds each joint's lever: a sample that only brings
+a new attitude costs three products a joint.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,26 +9,17 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ugv_acceptance import BadConfig
 from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
-from ugv_acceptance.model.expressions import (
-    Kernel,
-    Number,
-    Scalar,
-    Vec,
-    add,
-    compile_kernel,
-    rotate,
-    scale,
-)
+from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.levers import PointLoad, carried_by, in_base, steps_of
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.tree import Pose, Tree, point_of, pose_of, tree_of
+from ugv_acceptance.model.rows import Rows, pick
+from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
 
 Triple = tuple[Number, Number, Number]
 
-_AXES: tuple[Vec, Vec, Vec] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class Posture:
@@ -50,26 +40,37 @@ class Posture:
 class Mechanics:
     """The compiled kernels of one robot (compared by identity: hashing a robot takes long).
 
-    Inputs of `posture`: joint positions, payload mass, payload centre of gravity (3).
-    Inputs of `forces`: positions, rates, accelerations, gravity (3), payload mass and centre (3).
+    `posture` takes joint positions, payload mass and centre of gravity (3), and returns the fields
+    of Posture. `holding` takes gravity (3) besides and returns static torques in the levers' place.
+    `forces` takes positions, rates, accelerations, gravity (3), payload mass and centre (3).
     """
 
     robot: Robot
     tree: Tree
     posture: Kernel
+    holding: Kernel
     forces: Kernel
 
 
 @lru_cache(maxsize=16)
 def mechanics_of(robot: Robot) -> Mechanics:
-    """Return the compiled mechanics of `robot`. Raises BadConfig where it is not a tree."""
+    """Return the compiled mechanics of `robot`.
+
+    Raises BadConfig where its joints are not a tree or nothing of it has a mass.
+    """
     tree = tree_of(robot)
-    n = len(robot.joint_names)
+    if not sum(body.mass for body in tree.bodies) > 0.0:
+        raise BadConfig(f'robot {robot.name}: expected a link with a mass above 0 kg, found none')
+    names = robot.joint_names
     load = ['payload_mass', 'payload_x', 'payload_y', 'payload_z']
-    posture = compile_kernel(_posture_formula(robot, tree), [*robot.joint_names, *load])
     gravity = ['gravity_x', 'gravity_y', 'gravity_z']
-    forces = compile_kernel(_force_formula(robot, tree), ['q'] * 3 * n + gravity + load)
-    return Mechanics(robot, tree, posture, forces)
+    return Mechanics(
+        robot,
+        tree,
+        compile_kernel(_posture_formula(robot, tree), [*names, *load]),
+        compile_kernel(_holding_formula(robot, tree), [*names, *load, *gravity]),
+        compile_kernel(_force_formula(robot, tree), [*names * 3, *gravity, *load]),
+    )
 
 
 def _to_tree(robot: Robot, tree: Tree) -> list[int]:
@@ -77,42 +78,41 @@ def _to_tree(robot: Robot, tree: Tree) -> list[int]:
     return [robot.joint_names.index(body.joint) for body in tree.bodies[1:]]
 
 
+def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
+    order = _to_tree(robot, tree)
+
+    def formula(*inputs: Scalar) -> tuple[Any, ...]:
+        q, (mass, *at) = inputs[:-4], inputs[-4:]
+        steps = steps_of(tree, [q[k] for k in order])
+        loads = []
+        if robot.payload_link is not None:
+            body, point = in_body(tree, robot.payload_link, (at[0], at[1], at[2]))
+            loads = [PointLoad(body, mass, point)]
+        carried = carried_by(tree, steps, loads)
+        levers = tuple(carried.levers[order.index(j)] for j in range(len(order)))
+        cog = scale(carried.moment, 1.0 / carried.mass)
+        feet = [in_body(tree, c.link, c.position) for c in robot.contacts]
+        return levers, carried.mass, cog, tuple(in_base(tree, steps, *foot) for foot in feet)
+
+    return formula
+
+
+def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
+    posture = _posture_formula(robot, tree)
+
+    def formula(*inputs: Scalar) -> tuple[Any, ...]:
+        levers, *rest = posture(*inputs[:-3])
+        gravity: Vec = (inputs[-3], inputs[-2], inputs[-1])
+        return tuple(dot(gravity, lever) for lever in levers), *rest
+
+    return formula
+
+
 def _loads(robot: Robot, tree: Tree, pose: Pose, mass: Scalar, cog: Vec) -> list[Load]:
     if robot.payload_link is None:
         return []
     body, point = point_of(tree, pose, robot.payload_link, cog)
     return [Load(body, mass, point)]
-
-
-def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
-    order = _to_tree(robot, tree)
-
-    def formula(*inputs: Scalar) -> list[Scalar]:
-        q, (mass, x, y, z) = inputs[:-4], inputs[-4:]
-        pose = pose_of(tree, [q[k] for k in order])
-        loads = _loads(robot, tree, pose, mass, (x, y, z))
-        rest = [0.0] * len(order)
-        columns = [
-            joint_forces(tree, pose, motion_of(tree, pose, rest, rest, axis), loads)
-            for axis in _AXES
-        ]
-        levers = [columns[k][order.index(j)] for j in range(len(order)) for k in range(3)]
-        points = [point_of(tree, pose, c.link, c.position)[1] for c in robot.contacts]
-        return [*levers, *_mass_and_cog(tree, pose, loads), *(x for p in points for x in p)]
-
-    return formula
-
-
-def _mass_and_cog(tree: Tree, pose: Pose, loads: Sequence[Load]) -> list[Scalar]:
-    """Return total mass and the centre of gravity's three coordinates."""
-    mass: Scalar = 0.0
-    moment: Vec = (0.0, 0.0, 0.0)
-    for k, body in enumerate(tree.bodies):
-        centre = add(pose.origin[k], rotate(pose.rotation[k], body.cog))
-        mass, moment = mass + body.mass, add(moment, scale(centre, body.mass))
-    for load in loads:
-        mass, moment = mass + load.mass, add(moment, scale(load.point, load.mass))
-    return [mass, *scale(moment, 1.0 / mass)]
 
 
 def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
@@ -133,23 +133,10 @@ def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
 
 def posture_of(mechanics: Mechanics, q: Sequence[Number], mass: Number, cog: Triple) -> Posture:
     """Return the posture for joint positions `q` and a payload: floats in, floats out."""
-    live = isinstance(mass, float) and all(isinstance(x, float) for x in q)
-    kernel = mechanics.posture.one if live else mechanics.posture.many
-    out = kernel(*q, mass, *cog)
-    n = 3 * len(mechanics.robot.joint_names)
-    levers: tuple[Any, ...] = tuple(out[k : k + 3] for k in range(0, n, 3))
-    contacts: tuple[Any, ...] = tuple(out[k : k + 3] for k in range(n + 4, len(out), 3))
-    return Posture(levers, out[n], (out[n + 1], out[n + 2], out[n + 3]), contacts)
+    return Posture(*mechanics.posture.run(*q, mass, *cog))
 
 
-def take(posture: Posture, rows: slice | NDArray[np.intp]) -> Posture:
+def take(posture: Posture, rows: Rows) -> Posture:
     """Return the rows of a posture of arrays; what is the same for all samples stays a float."""
-
-    def pick(x: Number) -> Number:
-        return x if isinstance(x, float) else x[rows]
-
-    def pick_all(triples: tuple[Triple, ...]) -> tuple[Triple, ...]:
-        return tuple((pick(x), pick(y), pick(z)) for x, y, z in triples)
-
-    (cog,) = pick_all((posture.cog,))
-    return Posture(pick_all(posture.levers), pick(posture.mass), cog, pick_all(posture.contacts))
+    p = posture
+    return Posture(*pick((p.levers, p.mass, p.cog, p.contacts), rows))

@@ -64,7 +64,7 @@ def inverse_dynamics(
 
 
 def centre_of_gravity(robot: Robot, q: ArrayLike, payload: Payload | None = None) -> Floats:
-    """Return the whole robot's centre of gravity (m, `base_link`) for `q` (..., j), shape (..., 3)."""
+    """Return the robot's centre of gravity (m, `base_link`) for `q` (..., j), shape (..., 3)."""
     mechanics, load = mechanics_of(robot), payload or robot.payload
 
     def centres(*columns: Number) -> tuple[Number, ...]:
@@ -90,8 +90,8 @@ def payload_capacity(
     """Return the largest payload mass (kg), shape (...), that no joint's `limit` (j,) forbids.
 
     Exact: torque is linear in the payload's mass. The payload's centre of gravity is that of
-    `robot.payload`. Negative where a joint saturates without any payload, so that no payload
-    is allowed; infinite where the payload loads no joint.
+    `robot.payload`. Minus infinity where a joint saturates without any payload, so that none is
+    allowed; infinite where the payload loads no joint with a limit; NaN where q or gravity is.
     """
     limit = np.asarray(limit, dtype=np.float64)
     cog = robot.payload.cog
@@ -99,8 +99,7 @@ def payload_capacity(
     slope = static_torque(robot, q, gravity, Payload(1.0, cog), workers) - empty
     with np.errstate(divide='ignore', invalid='ignore'):
         # The torque reaches +limit or -limit, whichever lies in the direction the payload pulls.
-        rise = (limit - np.sign(slope) * empty) / np.abs(slope)
-    rise = np.where(slope == 0.0, np.inf, rise)
-    rise = np.where(np.abs(empty) > limit, np.minimum(rise, -1.0) * 0.0 - 1.0, rise)
-    result: Floats = rise.min(axis=-1)
-    return result
+        mass = (limit - np.sign(slope) * empty) / np.abs(slope)
+    mass = np.where(slope == 0.0, np.inf, mass)
+    least: Floats = np.where(np.abs(empty) > limit, -np.inf, mass).min(axis=-1)
+    return least

@@ -92,7 +92,19 @@ def tree_of(robot: Robot) -> Tree:
         cog = _plain(add(frame.xyz, rotate(frame.rotation, link.cog)))
         inertia = matmul(matmul(frame.rotation, link.inertia), transpose(frame.rotation))
         members[frame.body].append((link.mass, cog, _plain_matrix(inertia)))
-    bodies = [Body(names[0], -1, False, (0.0, 0.0, 1.0), ZERO, *_lump(members[0]))]
+    base, up = _lump(members[0]), (0.0, 0.0, 1.0)
+    bodies = [
+        Body(
+            names[0],
+            -1,
+            prismatic=False,
+            axis=up,
+            offset=ZERO,
+            mass=base[0],
+            cog=base[1],
+            inertia=base[2],
+        )
+    ]
     for k, (joint, parent) in enumerate(moving, start=1):
         at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
         axis = _plain(rotate(frames[joint.child].rotation, joint.axis))
@@ -103,7 +115,7 @@ def tree_of(robot: Robot) -> Tree:
 
 
 def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Frame]]]:
-    """Return each link's frame and the moving joints (with their parents' frames), parents first."""
+    """Return each link's frame and the moving joints with their parents' frames, parents first."""
     children: dict[str, list[Joint]] = {}
     for joint in robot.joints:
         children.setdefault(joint.parent, []).append(joint)
@@ -187,8 +199,13 @@ def pose_of(tree: Tree, q: Sequence[Scalar]) -> Pose:
     return pose
 
 
+def in_body(tree: Tree, link: str, point: Vec) -> tuple[int, Vec]:
+    """Return the body that carries `point` (m, link axes) and the point in the body's axes."""
+    body, rotation, xyz = tree.frames[link]
+    return body, add(xyz, rotate(rotation, point))
+
+
 def point_of(tree: Tree, pose: Pose, link: str, point: Vec) -> tuple[int, Vec]:
     """Return the body that carries `point` (m, link axes) and the point in `base_link`."""
-    body, rotation, xyz = tree.frames[link]
-    local = add(xyz, rotate(rotation, point))
+    body, local = in_body(tree, link, point)
     return body, add(pose.origin[body], rotate(pose.rotation[body], local))

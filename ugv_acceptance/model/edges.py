@@ -1,0 +1,148 @@
+"""Margins about the edges of one support polygon, compiled: force-angle, moment, energy, ZMP.
+
+Force-angle after Papadopoulos and Rey (2000): with gravity alone the angle is the tilt that is left
+about the edge. Energy margin after Messuri and Klein (1985), for a robot that rotates about the
+edge's line. What an edge between two points of the base contributes is folded to a few constants.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance.model.expressions import (
+    Scalar,
+    Vec,
+    atan2,
+    copysign,
+    cross,
+    dot,
+    minimum,
+    scale,
+    sqrt,
+    subtract,
+)
+from ugv_acceptance.model.hull import Cycle, pairs
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.mechanics import Mechanics
+from ugv_acceptance.model.rows import Values
+from ugv_acceptance.model.tree import in_body
+
+# Sides of the robot, by the direction in which an edge's outward normal points most.
+SIDES = ('front', 'left', 'rear', 'right')
+_NO_EDGE = float('inf')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corners:
+    """A support polygon of one robot: `moving` are the corners that do not belong to the base.
+
+    The terms of a stance are the centre of gravity (3) and each moving corner (3): m, `base_link`.
+    `outward` takes the terms and returns each edge's outward normal (x, y; not of unit length).
+    """
+
+    polygon: Cycle
+    moving: tuple[int, ...]
+    outward: Kernel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edges:
+    """The margins of a polygon whose edges lie on known sides.
+
+    Both take the terms of a stance, then mass (kg) and gravity (3). `angles` returns the tip angle
+    (rad) to each of SIDES; `margins` returns a tuple of them, one of moments (N m), one of energies
+    (J), and the ZMP distance (m). Infinite where there is no edge on a side.
+    """
+
+    angles: Kernel
+    margins: Kernel
+
+
+@lru_cache(maxsize=256)
+def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
+    """Return the corners of a polygon."""
+    contacts, frames = mechanics.robot.contacts, mechanics.tree.frames
+    moving = tuple(k for k in polygon if frames[contacts[k].link][0] != 0)
+
+    def formula(*terms: Scalar) -> list[Any]:
+        points = _points(mechanics, polygon, moving, terms)
+        edges = [subtract(points[j], points[i]) for i, j in pairs(polygon)]
+        return [(along[1], -along[0]) for along in edges]
+
+    names = [f'x{k}' for k in range(3 + 3 * len(moving))]
+    return Corners(polygon, moving, compile_kernel(formula, names))
+
+
+@lru_cache(maxsize=256)
+def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> Edges:
+    """Return the kernels for a polygon whose edges lie on `sides`, numbers in SIDES."""
+
+    def table(inputs: Sequence[Scalar]) -> tuple[list[list[Scalar]], Scalar]:
+        *terms, mass, gx, gy, gz = inputs
+        points = _points(mechanics, corners.polygon, corners.moving, terms)
+        cog: Vec = (terms[0], terms[1], terms[2])
+        edges = [
+            _edge_margins(points[i], points[j], cog, (gx, gy, gz))
+            for i, j in pairs(corners.polygon)
+        ]
+        return edges, mass
+
+    def by_side(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
+        on = [[v for s, v in zip(sides, values, strict=True) if s == k] for k in range(len(SIDES))]
+        return tuple(reduce(minimum, some) if some else _NO_EDGE for some in on)
+
+    def angles(*inputs: Scalar) -> tuple[Scalar, ...]:
+        edges, _ = table(inputs)
+        return by_side([edge[0] for edge in edges])
+
+    def margins(*inputs: Scalar) -> tuple[Any, ...]:
+        edges, mass = table(inputs)
+        angle, moment, energy, zmp = (list(column) for column in zip(*edges, strict=True))
+        held = by_side([x * mass for x in moment]), by_side([x * mass for x in energy])
+        return by_side(angle), *held, reduce(minimum, zmp)
+
+    names = [f'x{k}' for k in range(3 + 3 * len(corners.moving) + 4)]
+    return Edges(compile_kernel(angles, names), compile_kernel(margins, names))
+
+
+def _points(
+    mechanics: Mechanics, polygon: Cycle, moving: Sequence[int], terms: Sequence[Scalar]
+) -> dict[int, Vec]:
+    """Return the polygon's corners: constants where the base carries them."""
+    points = {}
+    for k in polygon:
+        contact = mechanics.robot.contacts[k]
+        points[k] = in_body(mechanics.tree, contact.link, contact.position)[1]
+    for place, k in enumerate(moving, start=1):
+        points[k] = (terms[3 * place], terms[3 * place + 1], terms[3 * place + 2])
+    return points
+
+
+def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
+    """Return angle (rad), moment (N m a kg), energy (J a kg) and ZMP distance (m) of one edge."""
+    edge = subtract(end, start)
+    along = scale(edge, 1.0 / sqrt(dot(edge, edge)))
+    to_start = subtract(start, cog)
+    square = subtract(to_start, scale(along, dot(to_start, along)))
+    side = cross(to_start, along)
+    along_l, along_b = dot(gravity, square), dot(gravity, side)
+    rise = sqrt(along_l * along_l + along_b * along_b) - along_l
+    flat = 1.0 / sqrt(along[0] * along[0] + along[1] * along[1])
+    inward: Vec = (-along[1] * flat, along[0] * flat, 0.0)
+    inward_l, inward_b = dot(inward, square), dot(inward, side)
+    slope = along_l * inward_l + along_b * inward_b
+    zmp = inward_b * slope / (along_l * inward_b - along_b * inward_l) - inward_l
+    return [atan2(-along_b, along_l), -along_b, copysign(rise, -along_b), zmp]
+
+
+def side_of(x: Values, y: Values) -> Values:
+    """Return the number in SIDES towards which a normal points most: floats or arrays."""
+    if isinstance(x, float) and isinstance(y, float):
+        if abs(x) >= abs(y):
+            return 0 if x > 0 else 2
+        return 1 if y > 0 else 3
+    lengthwise = np.abs(x) >= np.abs(y)
+    return np.where(lengthwise, np.where(x > 0, 0, 2), np.where(y > 0, 1, 3))

@@ -1,0 +1,185 @@
+"""Convex hulls of a few points: seen from above, and from below the face under a place.
+
+Samples of a recording are many, the ways in which their points form hulls few: what is found for
+one sample is taken by all others it fits.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import lru_cache, reduce
+from itertools import chain, combinations, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.model.expressions import Scalar
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.rows import ALL, Rows, Values, inner, pick
+
+Point = tuple[float, float, float]
+Cycle = tuple[int, ...]
+
+# A polygon thinner than this (m) has no inside that could be stood on.
+THIN = 1e-6
+# Slack (m2) within which three points lie in one line.
+_SLACK = 1e-12
+# A place outside the hull is drawn to it, and this part of the way further, to be inside.
+_INWARD = 1e-9
+
+
+def pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
+    """Return the edges of a polygon, counter-clockwise."""
+    return zip(cycle, cycle[1:] + cycle[:1], strict=True)
+
+
+def _turn(a: Sequence[Any], b: Sequence[Any], c: Sequence[Any]) -> Values:
+    """Return twice the signed area of the triangle of three points, seen from above."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+@lru_cache(maxsize=256)
+def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
+    """Return the hull of the points (Andrew's monotone chain); () where it is degenerate."""
+    order = sorted(range(len(points)), key=lambda k: points[k][:2])
+    hull: list[int] = []
+    for run in (order, order[::-1]):
+        base = len(hull)
+        for k in run:
+            while len(hull) - base >= 2 and _turn(*(points[i] for i in (*hull[-2:], k))) <= _SLACK:
+                hull.pop()
+            hull.append(k)
+        if hull:
+            hull.pop()
+    corners = [points[k] for k in hull]
+    if len(hull) < 3 or _area(corners) < THIN * max(_lengths(corners)) ** 0.5:
+        return ()
+    cycle = tuple(numbers[k] for k in hull)
+    start = cycle.index(min(cycle))
+    return cycle[start:] + cycle[:start]
+
+
+def _area(corners: Sequence[Any]) -> Values:
+    """Return twice the area of a convex polygon, counter-clockwise."""
+    return sum(_turn(corners[0], a, b) for a, b in pairwise(corners[1:]))
+
+
+def _lengths(points: Sequence[Any]) -> list[Any]:
+    """Return the squares of the distances between all points, seen from above."""
+    return [(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)]
+
+
+def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cycle, Rows]]:
+    """Return the hulls of the active points of `count` samples, each with its rows.
+
+    The hull of the first sample is taken by all samples it fits; so on until none is left.
+    """
+    left: Rows = ALL
+    while count:
+        some = pick(tuple(points), left)
+        first: Any = tuple(tuple(float(np.ravel(x)[0]) for x in some[k]) for k in active)
+        cycle = hull(first, active)
+        same = np.array(np.broadcast_to(_is_hull(some, cycle, active), count))
+        same[0] = True
+        if same.all():
+            yield cycle, left
+            return
+        yield cycle, inner(left, np.flatnonzero(same))
+        left = inner(left, np.flatnonzero(~same))
+        count -= int(same.sum())
+
+
+def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
+    """Return where `cycle` is the hull of the active points, by the rules of `_hull`."""
+    if len(active) < 3:
+        return True
+    corners = [points[k] for k in cycle or active]
+    thin = THIN * np.sqrt(reduce(np.maximum, _lengths(corners)))
+    if not cycle:  # no triangle of many is thick: then neither is their hull
+        turns = [abs(_turn(*triple)) for triple in combinations(corners, 3)]
+        return reduce(np.maximum, turns) < thin / len(active)
+    good = _area(corners) >= thin
+    for k, (i, j) in enumerate(pairs(cycle)):
+        good = good & (_turn(points[i], points[j], corners[(k + 2) % len(cycle)]) > _SLACK)
+        for other in active:
+            if other not in cycle:
+                good = good & (_turn(points[i], points[j], points[other]) >= -_SLACK)
+    return good
+
+
+@lru_cache(maxsize=16)
+def _triples_kernel(count: int) -> Kernel:
+    """Return, for each triple of `count` points, three turns about a place and a height times area.
+
+    Inputs are the points' coordinates and the place's x and y. The place lies inside the triple
+    where the turns have one sign; the triple's height there is the fourth number over their sum.
+    """
+
+    def formula(*inputs: Scalar) -> list[Any]:
+        points = [inputs[3 * k : 3 * k + 3] for k in range(count)]
+        place = inputs[3 * count :]
+        numbered = combinations(enumerate(points), 2)
+        turn = {(i, j): _turn(a, b, place) for (i, a), (j, b) in numbered}
+        table = []
+        for i, j, k in combinations(range(count), 3):
+            a, b, c = turn[j, k], -turn[i, k], turn[i, j]
+            table.append((a, b, c, a * points[i][2] + b * points[j][2] + c * points[k][2]))
+        return table
+
+    return compile_kernel(formula, [f'x{k}' for k in range(3 * count + 2)])
+
+
+def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, ...] | None:
+    """Return the triple that is lowest under (or over) a place; None where none contains it."""
+    best, lowest = -1, math.inf
+    coordinates = chain.from_iterable(points)
+    table = _triples_kernel(len(points)).one(*coordinates, place[0], place[1])
+    for number, (a, b, c, moment) in enumerate(table):
+        if min(a, b, c) >= 0.0 or max(a, b, c) <= 0.0:
+            area = a + b + c
+            if abs(area) > THIN**2 and moment / area < lowest:
+                best, lowest = number, moment / area
+    return None if best < 0 else list(combinations(range(len(points)), 3))[best]
+
+
+def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64]:
+    """Return the number of each sample's lowest triple, as `triple_under`; -1: there is none."""
+    best, lowest = np.full(count, -1), np.full(count, np.inf)
+    coordinates = chain.from_iterable(points)
+    table = _triples_kernel(len(points)).many(*coordinates, place[0], place[1])
+    for number, (a, b, c, moment) in enumerate(table):
+        area = a + b + c
+        inside = np.minimum(np.minimum(a, b), c) >= 0.0
+        inside = inside | (np.maximum(np.maximum(a, b), c) <= 0.0)
+        inside = inside & (abs(area) > THIN**2)
+        height = np.divide(moment, area, out=np.full(count, np.inf), where=inside)
+        best[height < lowest] = number
+        lowest = np.minimum(lowest, height)
+    return best
+
+
+def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
+    """Return where the line from the points' middle to a place outside their hull leaves it."""
+    middle = [sum(p[k] for p in points) / len(points) for k in range(2)]
+    way = [place[k] - middle[k] for k in range(2)]
+    furthest: Any = 0.0
+    with np.errstate(divide='ignore', invalid='ignore'):
+        for a, b in combinations(points, 2):
+            edge, start = ([b[k] - a[k] for k in range(2)], [a[k] - middle[k] for k in range(2)])
+            across = np.float64(1.0) * (way[0] * edge[1] - way[1] * edge[0])
+            part = (start[0] * way[1] - start[1] * way[0]) / across
+            reach = (start[0] * edge[1] - start[1] * edge[0]) / across
+            hit = (part > -_INWARD) & (part < 1.0 + _INWARD) & (reach > furthest)
+            furthest = np.where(hit, reach, furthest)
+    x, y = (middle[k] + (1.0 - _INWARD) * furthest * way[k] for k in range(2))
+    return x, y
+
+
+def heights_above(points: Sequence[Any], i: int, j: int, k: int) -> list[Any]:
+    """Return how far (m) every point lies above the plane of three, along base z."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = points[i], points[j], points[k]
+    nx = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
+    ny = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)
+    nz = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    slope_x, slope_y = nx / nz, ny / nz
+    return [(z - az) + (x - ax) * slope_x + (y - ay) * slope_y for x, y, z in points]

@@ -1,0 +1,197 @@
+"""Formulas specialised to one robot and compiled: the same code for floats and for arrays.
+
+`compile_kernel` runs a formula once with symbols, shares what is computed twice and emits
+straight-line code. It runs on Python floats for a live sample and on cache-sized blocks of arrays
+for a map or a recording, so there is one formula and no scalar twin. Both follow IEEE 754: a
+division by zero is infinite or NaN, never an exception. See
+docs/decisions/0002-formulas-compiled-per-robot.md.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.model.expressions import Expr, Number, Scalar, minimum
+
+# What a formula returns: scalars, or tuples of them nested as the caller wants them.
+Outputs = Sequence[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Kernel:
+    """A compiled formula: `one` takes floats, `many` takes arrays (or floats) that broadcast.
+
+    Both return what the formula returns, tuples nested in the same way; an output that is constant
+    for this robot is a float in either.
+    """
+
+    source: str
+    one: Callable[..., tuple[Any, ...]]
+    many: Callable[..., tuple[Any, ...]]
+
+    def run(self, *inputs: Number) -> tuple[Any, ...]:
+        """Run on floats or on arrays, whatever comes."""
+        if np.ndarray not in map(type, inputs):
+            return self.one(*inputs)
+        with np.errstate(all='ignore'):
+            return self.many(*inputs)
+
+
+def compile_kernel(formula: Callable[..., Outputs], inputs: Sequence[str]) -> Kernel:
+    """Return `formula` (a function of len(inputs) scalars) as a Kernel."""
+    known: dict[Any, Expr] = {}
+    symbols = [Expr('input', (), known) for _ in inputs]
+    outputs = formula(*symbols)
+    order, uses = _reachable(list(_flat(outputs)))
+    emitter = _Emitter(uses, names={id(s): f'x{i}' for i, s in enumerate(symbols)})
+    turned = {id(x.args[0]) for x in order if x.op == 'sin'}
+    turned &= {id(x.args[0]) for x in order if x.op == 'cos'}
+    for x in order:
+        if x.op in {'sin', 'cos'} and id(x.args[0]) in turned:
+            emitter.assign_both(x)
+        elif x.op != 'input':
+            emitter.assign(x)
+    arguments = ', '.join(f'x{i}' for i in range(len(symbols)))
+    lines = [*emitter.lines, f'return {emitter.result(outputs)}']
+    source = '\n    '.join([f'def kernel({arguments}):', *lines, ''])
+    many = _function(source, _ARRAY)
+    return Kernel(source, _float_function(arguments, lines, many), many)
+
+
+def _float_function(
+    arguments: str, lines: Sequence[str], many: Callable[..., tuple[Any, ...]]
+) -> Callable[..., tuple[float, ...]]:
+    """Return the code on floats; where Python raises instead of IEEE 754, numpy's answer."""
+
+    def ieee(*values: float) -> tuple[Any, ...]:
+        with np.errstate(all='ignore'):
+            return many(*map(np.float64, values))
+
+    body = '\n        '.join(['    try:', *lines])
+    rescue = f'    except (ValueError, ZeroDivisionError):\n        return ieee({arguments})'
+    source = f'def kernel({arguments}):\n{body}\n{rescue}\n'
+    source = re.sub(r'sincos\((\w+)\)', r'sin(\1), cos(\1)', source)
+    return _function(source, {**_FLOAT, 'ieee': ieee})
+
+
+def _flat(outputs: Outputs) -> Iterator[Scalar]:
+    for x in outputs:
+        if isinstance(x, Expr | float):
+            yield x
+        else:
+            yield from _flat(x)
+
+
+def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], dict[int, int]]:
+    """Return the operations the outputs need, arguments first, and how often each is used."""
+    order: list[Expr] = []
+    uses: dict[int, int] = {}
+    seen: set[int] = set()
+    stack: list[tuple[Scalar, bool]] = [(x, False) for x in reversed(outputs)]
+    for x in outputs:
+        uses[id(x)] = uses.get(id(x), 0) + 1
+    while stack:
+        x, done = stack.pop()
+        if isinstance(x, float) or (not done and id(x) in seen):
+            continue
+        if done:
+            order.append(x)
+            continue
+        seen.add(id(x))
+        stack.append((x, True))
+        for arg in x.args:
+            uses[id(arg)] = uses.get(id(arg), 0) + 1
+            stack.append((arg, False))
+    return order, uses
+
+
+@dataclass(slots=True)
+class _Emitter:
+    """Writes straight-line code; a name is used again as soon as its last value is dead."""
+
+    uses: dict[int, int]
+    lines: list[str] = field(default_factory=list)
+    names: dict[int, str] = field(default_factory=dict)
+    free: list[str] = field(default_factory=list)
+    count: int = 0
+
+    def text(self, x: Scalar) -> str:
+        if isinstance(x, float):
+            return f'({float(x)!r})'
+        name = self.names[id(x)]
+        self.uses[id(x)] -= 1
+        if self.uses[id(x)] == 0 and name.startswith('t'):
+            self.free.append(name)
+        return name
+
+    def name(self, x: Expr) -> str:
+        if not self.free:
+            self.free.append(f't{self.count}')
+            self.count += 1
+        self.names[id(x)] = self.free.pop()
+        return self.names[id(x)]
+
+    def assign(self, x: Expr) -> None:
+        a = [self.text(arg) for arg in x.args]
+        if x.op in '+-*/':
+            code = f'{a[0]} {x.op} {a[1]}'
+        elif x.op == 'neg':
+            code = f'-{a[0]}'
+        else:
+            code = f'{x.op}({", ".join(a)})'
+        self.lines.append(f'{self.name(x)} = {code}')
+
+    def assign_both(self, x: Expr) -> None:
+        """Write sine and cosine of one angle together, where the first of them is met."""
+        if id(x) in self.names:
+            return
+        (angle,) = x.args
+        pair = [x.known[(op, id(angle))] for op in ('sin', 'cos')]
+        self.text(angle)
+        argument = self.text(angle)
+        s, c = (self.name(part) for part in pair)
+        self.lines.append(f'{s}, {c} = sincos({argument})')
+
+    def result(self, x: Scalar | Outputs) -> str:
+        if isinstance(x, Expr | float):
+            return self.text(x)
+        return f'({"".join(f"{self.result(part)}, " for part in x)})'
+
+
+def _sincos(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return sine and cosine to 4e-16: numpy has a vectorised tangent but no such sine."""
+    t = np.tan(0.5 * x)
+    d = 2.0 / (1.0 + t * t)
+    return t * d, d - 1.0
+
+
+_FLOAT = {
+    'sin': math.sin,
+    'cos': math.cos,
+    'sqrt': math.sqrt,
+    'atan2': math.atan2,
+    'copysign': math.copysign,
+    'minimum': minimum,
+}
+_ARRAY = {
+    'sin': np.sin,
+    'cos': np.cos,
+    'sincos': _sincos,
+    'sqrt': np.sqrt,
+    'atan2': np.arctan2,
+    'copysign': np.copysign,
+    'minimum': np.minimum,
+}
+
+
+def _function(source: str, functions: dict[str, Any]) -> Callable[..., tuple[Any, ...]]:
+    """Return the compiled function; the source holds only our own names and numbers."""
+    scope: dict[str, Any] = {'inf': math.inf, 'nan': math.nan, **functions}
+    exec(compile(source, '<kernel>', 'exec'), scope)  # noqa: S102 - nothing foreign in the source
+    function: Callable[..., tuple[Any, ...]] = scope['kernel']
+    return function

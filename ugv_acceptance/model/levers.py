@@ -1,0 +1,82 @@
+"""What gravity does to a posture: the lever of every joint, and the whole robot's mass moment.
+
+The torque that holds a joint is linear in gravity: torque = lever . g, where the lever is the mass
+moment S (kg m, sum of mass times position from the joint) of all that the joint carries, crossed
+with its axis: -axis . (S x g) = (S x axis) . g. One walk from the tips to the base gives all levers
+and the centre of gravity, each in the axes of the body reached so far.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ugv_acceptance.model.expressions import Mat, Scalar, Vec, add, cross, rotate, scale
+from ugv_acceptance.model.robot import IDENTITY
+from ugv_acceptance.model.tree import Body, Tree, rotation_about
+
+
+@dataclass(frozen=True, slots=True)
+class PointLoad:
+    """A point mass (kg) at `point` (m, body axes) carried by body number `body`."""
+
+    body: int
+    mass: Scalar
+    point: Vec
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """From a body's axes and origin to its parent's: p_parent = shift + turn p."""
+
+    turn: Mat
+    shift: Vec
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """Levers of the moving bodies (m kg; kg where prismatic), total mass and moment: base axes."""
+
+    levers: list[Vec]
+    mass: Scalar
+    moment: Vec
+
+
+def steps_of(tree: Tree, q: Sequence[Scalar]) -> list[Step]:
+    """Return every body's step to its parent; the base's leads nowhere."""
+    moving = zip(tree.bodies[1:], q, strict=True)
+    return [Step(IDENTITY, (0.0, 0.0, 0.0)), *(_step(body, x) for body, x in moving)]
+
+
+def _step(body: Body, position: Scalar) -> Step:
+    if body.prismatic:
+        return Step(IDENTITY, add(body.offset, scale(body.axis, position)))
+    return Step(rotation_about(body.axis, position), body.offset)
+
+
+def in_base(tree: Tree, steps: Sequence[Step], body: int, point: Vec) -> Vec:
+    """Return a point (m) given in a body's axes in `base_link`."""
+    while body:
+        point = add(steps[body].shift, rotate(steps[body].turn, point))
+        body = tree.bodies[body].parent
+    return point
+
+
+def carried_by(tree: Tree, steps: Sequence[Step], loads: Sequence[PointLoad]) -> Carried:
+    """Return the levers, the total mass and its moment about `base_link`'s origin."""
+    masses: list[Scalar] = [body.mass for body in tree.bodies]
+    moments: list[Vec] = [scale(body.cog, body.mass) for body in tree.bodies]
+    for load in loads:
+        masses[load.body] = masses[load.body] + load.mass
+        moments[load.body] = add(moments[load.body], scale(load.point, load.mass))
+    levers: list[Vec] = [(0.0, 0.0, 0.0)] * len(tree.bodies)
+    above: list[list[int]] = [[] for _ in tree.bodies]
+    for k in range(len(tree.bodies) - 1, 0, -1):
+        body, step = tree.bodies[k], steps[k]
+        moment = rotate(step.turn, moments[k])
+        for j in above[k]:
+            levers[j] = rotate(step.turn, levers[j])
+        levers[k] = scale(body.axis, -masses[k]) if body.prismatic else cross(moment, body.axis)
+        above[body.parent] += [*above[k], k]
+        moment = add(moment, scale(step.shift, masses[k]))
+        masses[body.parent] = masses[body.parent] + masses[k]
+        moments[body.parent] = add(moments[body.parent], moment)
+    return Carried(levers[1:], masses[0], moments[0])

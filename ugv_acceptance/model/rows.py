@@ -1,0 +1,40 @@
+"""Rows of columns: samples that go together are picked, worked on and put back."""
+
+from collections.abc import Iterator
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rows: TypeAlias = slice | NDArray[np.intp]
+# Floats, arrays of samples, or tuples of them.
+Values: TypeAlias = Any
+
+# All rows: nothing is picked, nothing copied.
+ALL = slice(None)
+
+
+def pick(values: Values, rows: Rows) -> Values:
+    """Return the rows of nested tuples of floats and arrays; floats stay floats."""
+    if rows is ALL:
+        return values
+    if isinstance(values, tuple):
+        return tuple([pick(x, rows) for x in values])
+    return values[rows] if isinstance(values, np.ndarray) else values
+
+
+def groups(codes: NDArray[Any]) -> Iterator[tuple[int, Rows, int]]:
+    """Return each value of `codes` with its rows and their number."""
+    if codes.size and codes.min() == codes.max():
+        yield int(codes[0]), ALL, codes.size
+        return
+    for code in np.unique(codes):
+        rows = np.flatnonzero(codes == code)
+        yield int(code), rows, rows.size
+
+
+def inner(rows: Rows, part: Rows) -> Rows:
+    """Return the rows that are `part` of `rows`."""
+    if isinstance(part, slice):
+        return rows
+    return part if isinstance(rows, slice) else rows[part]
