@@ -83,7 +83,7 @@ def test_mass_and_centre_of_gravity_of_a_link_can_be_replaced(tmp_path: Path) ->
 def test_the_imu_mounting_turns_sensor_axes_into_base_link(tmp_path: Path) -> None:
     """An IMU upside down (roll 180 deg) has its z axis pointing down."""
     imu = config_of(tmp_path, YAML + 'imu: {mounting_rpy_deg: [180, 0, 0]}\n').settings.imu
-    np.testing.assert_allclose(np.array(imu.mounting) @ [0, 0, 1], [0, 0, -1], atol=1e-15)
+    np.testing.assert_allclose(np.array(imu.mounting) @ [0, 0, 1], [0, 0, -1], rtol=0, atol=1e-15)
 
 
 def test_a_urdf_can_stand_in_a_ros_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
