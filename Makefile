@@ -92,6 +92,7 @@ colcon: .venv312/.installed
 	test -x $(INSTALLED)/lib/ugv_acceptance/ugv-acceptance
 	test -x $(INSTALLED)/lib/ugv_acceptance/acceptance_monitor
 	test -f $(INSTALLED)/share/ament_index/resource_index/packages/ugv_acceptance
+	set +u; . $(COLCON)/install/setup.sh; cd /; '$(CURDIR)/$(INSTALLED)/lib/ugv_acceptance/ugv-acceptance' model > /dev/null
 	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)

@@ -21,7 +21,7 @@ REQUIRES = [
     'rich',
     'rosbags',
     'scipy',
-    'typer',
+    'typer>=0.12.5',
 ]
 SIMULATION = ['mujoco']
 TEST = [
