@@ -126,6 +126,19 @@ class LiveEvaluator:
         if payload:
             self.payload = payload
 
+    def adopt(self, settings: Settings) -> None:
+        """Judge by other limits, delays and payload from now on; the robot's joints are the same.
+
+        What was learnt and what is active stays; an active alert is worded by its own rule.
+        """
+        if settings.robot.payload != self.settings.robot.payload:
+            self.payload = settings.robot.payload
+        self.settings = self.watch.settings = self._imu.settings = settings
+        for signal, other in zip(self.watch.signals(), Watch(settings).signals(), strict=True):
+            signal.rule = other.rule
+        for fresh in self._fresh:
+            fresh.delays = settings.delays
+
     def tick(self, now: int) -> None:
         """Let time pass without a message: silence and delays are judged."""
         for fresh, signals in zip(self._fresh, (self.watch.joints, self.watch.imu), strict=True):
