@@ -145,19 +145,23 @@ def test_force_of_a_foreign_robot_at_rest(shared_bags: Path) -> None:
     assert forces == pytest.approx([98.0, 137.2], rel=1e-9)
 
 
-def test_recorded_force_of_a_foreign_robot_agrees(shared_bags: Path) -> None:
-    """Over the rest of the recording before the grasp, the median effort of arm_3 is ours."""
+@pytest.mark.parametrize('mass', [0.0, 4.0])
+def test_recorded_force_of_a_foreign_robot_agrees(shared_bags: Path, mass: float) -> None:
+    """At rest, before and after abitobot grasps 4 kg, the median effort of arm_3 is ours."""
     config = load(Path('abitobot'), urdf=shared_bags / 'abitobot' / 'robot.urdf')
     robot = config.settings.robot
     column = robot.joint_names.index('arm_3_link_joint')
     name = config.settings.joints[column].topic_name
+    posture = np.zeros(len(robot.joint_names))
+    force = static_torque(robot, posture, (0.0, 0.0, -9.8), Payload(mass))[column]
     efforts = []
     with AnyReader([shared_bags / 'abitobot']) as reader:
         topics = [c for c in reader.connections if c.topic == '/joint_states']
         for connection, _, raw in reader.messages(topics):
             message: Any = reader.deserialize(raw, connection.msgtype)
             k = message.name.index(name)
-            if abs(message.velocity[k]) < 1e-3:
+            at_rest = abs(message.velocity[k]) < 1e-3
+            if at_rest and abs(message.effort[k] - force) < 2 * 9.8:  # half way to the other mass
                 efforts.append(message.effort[k])
-    force = static_torque(robot, np.zeros(len(robot.joint_names)), (0.0, 0.0, -9.8))[column]
+    assert len(efforts) > 200
     assert np.median(efforts) == pytest.approx(force, abs=0.1)
