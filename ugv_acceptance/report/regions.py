@@ -1,0 +1,94 @@
+"""Draw maps a person reads without colour: hatched failure, dotted caution, plain safe areas."""
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ugv_acceptance.model.blocks import Floats
+
+# Colours that stay apart in grey and for colour-blind readers; the hatch says it without them.
+COLOURS = ('#ffffff', '#fff0c2', '#e7a9a0')
+HATCHES = ('', '..', '////')
+WORDS = ('safe', 'caution', 'failure')
+
+STYLE = {
+    'svg.hashsalt': 'ugv_acceptance',
+    'svg.fonttype': 'path',
+    'font.size': 9.0,
+    'axes.titlesize': 9.0,
+    'axes.linewidth': 0.8,
+    'hatch.linewidth': 0.5,
+    'hatch.color': '#666666',
+    'legend.frameon': True,
+    'legend.framealpha': 1.0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Where a margin turns: below `failure` it fails, below `caution` it warns; larger is better."""
+
+    caution: float
+    failure: float
+
+
+def figure(width: float, height: float) -> Figure:
+    """Return an empty figure (inches) drawn without a display."""
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+        made = Figure(figsize=(width, height), layout='constrained')
+        FigureCanvasAgg(made)
+    return made
+
+
+def draw_regions(axes: Any, x: Floats, y: Floats, margin: Floats, levels: Levels) -> None:
+    """Fill the map of a `margin` (n, m) over x (n,) and y (m,), and draw where it turns."""
+    filled = np.nan_to_num(np.clip(margin, -1e6, 1e6), nan=-1e6).T
+    bounds = [-2e6, levels.failure, levels.caution, 2e6]
+    axes.contourf(x, y, filled, levels=bounds, colors=COLOURS[::-1], hatches=HATCHES[::-1])
+    if filled.min() < levels.caution < filled.max():
+        axes.contour(
+            x, y, filled, levels=[levels.caution], colors='#333333', linewidths=0.8, linestyles=':'
+        )
+    if filled.min() < levels.failure < filled.max():
+        axes.contour(x, y, filled, levels=[levels.failure], colors='black', linewidths=1.4)
+
+
+def legend(target: Any, words: Sequence[str] = WORDS, **options: Any) -> None:
+    """Add the key of the three areas to a figure or to axes."""
+    patches = [
+        Patch(facecolor=colour, hatch=hatch, edgecolor='#666666', label=word)
+        for colour, hatch, word in zip(COLOURS, HATCHES, words, strict=True)
+    ]
+    target.legend(handles=patches, **options)
+
+
+def degree_axes(axes: Any, x_name: str, y_name: str, step: float = 90.0) -> None:
+    """Label both axes in degrees with ticks every `step`."""
+    for axis, name in ((axes.xaxis, x_name), (axes.yaxis, y_name)):
+        axis.set_major_locator(mpl.ticker.MultipleLocator(step))
+        axis.set_major_formatter('{x:.0f}°')
+        axis.set_label_text(name)
+
+
+def svg_of(made: Figure) -> str:
+    """Return the figure as an <svg> element; the same figure gives the same text."""
+    target = io.StringIO()
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+        made.savefig(target, format='svg', metadata={'Date': None})
+    text = target.getvalue()
+    return text[text.index('<svg') :]
+
+
+def png_of(made: Figure, dpi: int = 150) -> bytes:
+    """Return the figure as a PNG file's bytes."""
+    target = io.BytesIO()
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+        made.savefig(target, format='png', dpi=dpi, metadata={'Software': None})
+    return target.getvalue()
