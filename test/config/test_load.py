@@ -253,3 +253,18 @@ def test_a_file_that_is_not_there_is_refused(name: str) -> None:
 def test_names_without_a_folder_are_found_among_those_that_ship() -> None:
     """packbot, packbot.yaml and nothing at all are the same robot."""
     assert load() == load(Path('packbot')) == load(Path('packbot.yaml'))
+
+
+def test_a_robot_of_five_hundred_links_is_loaded(tmp_path: Path) -> None:
+    """Its two measured joints are searched for their worst posture, the others are held."""
+    chain = ''.join(
+        f'<joint name="j{k}" type="continuous"><origin xyz="0.1 0 0"/><parent link="l{k - 1}"/>'
+        f'<child link="l{k}"/><axis xyz="0 1 0"/></joint><link name="l{k}"><inertial>'
+        '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        '</inertial></link>'
+        for k in range(1, 500)
+    )
+    urdf = f'<robot name="long"><link name="l0"/>{chain}</robot>'
+    yaml = 'robot: {name: long}\nurdf: two.urdf\njoints: {j1: {limit_nm: 1}, j499: {}}\n'
+    warnings = '\n'.join(config_of(tmp_path, yaml, urdf).warnings)
+    assert f'{9.81 * 0.1 * sum(range(499)):.1f} N m needed' in warnings
