@@ -28,7 +28,7 @@ LAST = float(np.radians(75.0))
 SETTLE, DAMPER = 1.5, 60.0
 # Time steps between two settings of gravity.
 STRIDE = 8
-BUILD = Build(motors=False, friction=20.0, timestep=0.00125, contact_time=0.0026)
+BUILD = Build(motors=False, friction=20.0, timestep=0.00125, contact_time=0.0026, impratio=100.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +102,8 @@ def _falls_over(vehicle: Vehicle, data: mujoco.MjData, rest: Floats) -> bool:
 
 
 def turn(a: Floats, b: Floats) -> float:
-    """Return the angle (rad) between two attitudes (3, 3)."""
-    cosine = (np.trace(a.T @ b) - 1.0) / 2.0
-    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    """Return the angle (rad) between the ground's normals in two attitudes (3, 3): no yaw."""
+    return float(np.arccos(np.clip(a[2] @ b[2], -1.0, 1.0)))
 
 
 def settled(vehicle: Vehicle, rest: Floats) -> mujoco.MjData:

@@ -66,13 +66,13 @@ def random_cases(
     while len(cases) < count:
         q = rng.uniform(low, high)
         load, heading, tilt = rng.uniform([0.0, -np.pi, 0.0], [heaviest, np.pi, steepest]).tolist()
-        if _clear_of_ground(vehicle, q):
+        if clear_of_ground(vehicle, q):
             case = TipCase(tuple(q.tolist()), Payload(load, robot.payload.cog), heading, tilt)
             cases.append(case)
     return cases
 
 
-def _clear_of_ground(vehicle: Vehicle, q: Floats) -> bool:
+def clear_of_ground(vehicle: Vehicle, q: Floats) -> bool:
     """Return whether all links but those with contacts are above the ground."""
     model, robot = vehicle.model, vehicle.robot
     data = mujoco.MjData(model)

@@ -34,7 +34,8 @@ class Build:
     contact of the root link, else a small sphere stands at each contact point, as it does at the
     contacts of other links. `motors` drive the joints, limited to the joint's effort, with
     `armature` (kg m2) as the rotor's share of inertia. `bulk` adds what touches the ground only
-    after a tip-over. `contact_time` (s) is the time constant of a contact: short is hard.
+    after a tip-over. `contact_time` (s) is the time constant of a contact: short is hard;
+    `impratio` is how much harder friction is than contact: more creeps less.
     """
 
     base: str = 'free'
@@ -46,6 +47,7 @@ class Build:
     armature: float = 0.0
     timestep: float = 0.001
     contact_time: float = 0.004
+    impratio: float = 10.0
     imu_position: Vector = (0.0, 0.0, 0.0)
     imu_rotation: tuple[Vector, Vector, Vector] = IDENTITY
 
@@ -111,7 +113,7 @@ def mjcf_of(robot: Robot, build: Build) -> str:
         gravity=numbers((0.0, 0.0, -robot.gravity)),
         integrator='implicitfast',
         cone='elliptic',
-        impratio='10',
+        impratio=repr(build.impratio),
     )
     default = ET.SubElement(root, 'default')
     contact = {'friction': numbers((build.friction, 0.005, 0.0001)), 'condim': '3'}
