@@ -2,21 +2,22 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the monitor as a lifecycle node; it brings itself up unless autostart is false."""
-    packbot = PathJoinSubstitution(
-        [FindPackageShare('ugv_acceptance'), 'msg_configs', 'packbot.yaml']
-    )
     return LaunchDescription(
         [
             DeclareLaunchArgument(
-                'config', default_value=packbot, description='YAML file that describes the robot'
+                'config',
+                default_value='packbot',
+                description='YAML file that describes the robot, or the name of one that ships',
+            ),
+            DeclareLaunchArgument(
+                'urdf', default_value='', description='URDF in place of the one the YAML names'
             ),
             DeclareLaunchArgument(
                 'namespace', default_value='', description='namespace of the robot'
@@ -38,6 +39,7 @@ def generate_launch_description() -> LaunchDescription:
                 parameters=[
                     {
                         'config': ParameterValue(LaunchConfiguration('config'), value_type=str),
+                        'urdf': ParameterValue(LaunchConfiguration('urdf'), value_type=str),
                         'use_sim_time': ParameterValue(
                             LaunchConfiguration('use_sim_time'), value_type=bool
                         ),

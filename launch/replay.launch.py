@@ -11,14 +11,16 @@ from launch_ros.substitutions import FindPackageShare
 
 def generate_launch_description() -> LaunchDescription:
     """Return the monitor and a player that publishes the recording on its own topics."""
-    share = FindPackageShare('ugv_acceptance')
+    monitor = PathJoinSubstitution(
+        [FindPackageShare('ugv_acceptance'), 'launch', 'monitor.launch.py']
+    )
     return LaunchDescription(
         [
             DeclareLaunchArgument('bag', description='recording: a rosbag2 folder or one file'),
             DeclareLaunchArgument(
                 'config',
-                default_value=PathJoinSubstitution([share, 'msg_configs', 'packbot.yaml']),
-                description='YAML file that describes the robot',
+                default_value='packbot',
+                description='YAML file that describes the robot, or the name of one that ships',
             ),
             DeclareLaunchArgument(
                 'namespace', default_value='', description='namespace of the robot'
@@ -30,9 +32,7 @@ def generate_launch_description() -> LaunchDescription:
                 'loop', default_value='false', description='start again at the end'
             ),
             IncludeLaunchDescription(
-                PythonLaunchDescriptionSource(
-                    PathJoinSubstitution([share, 'launch', 'monitor.launch.py'])
-                ),
+                PythonLaunchDescriptionSource(monitor),
                 launch_arguments={
                     'config': LaunchConfiguration('config'),
                     'namespace': LaunchConfiguration('namespace'),

@@ -1,8 +1,10 @@
 """The launch files against what they start: read as syntax trees, for launch has no wheel."""
 
 import ast
+import re
 from collections.abc import Iterator
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,33 @@ def test_what_a_launch_file_starts_is_installed(path: Path) -> None:
     assert started <= installed
 
 
+def declared_parameters(executable: str) -> dict[str, type]:
+    """Return the parameters a node's module declares by name, each with its default's type."""
+    (script,) = entry_points(group='console_scripts', name=executable)
+    spec = find_spec(script.module)
+    assert spec is not None
+    assert spec.origin is not None
+    declared: dict[str, type] = {'use_sim_time': bool}
+    for node in ast.walk(ast.parse(Path(spec.origin).read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Call) and 'declare' in ast.unparse(node.func):
+            match node.args:
+                case [ast.Constant(str() as name), ast.Constant(value), *_]:
+                    declared[name] = type(value)
+    return declared
+
+
+@each_file
+def test_every_parameter_is_one_of_the_node(path: Path) -> None:
+    """A launch file sets only parameters its node declares, in the type of their default."""
+    for call in calls(path, NODES):
+        declared = declared_parameters(ast.literal_eval(keywords(call)['executable']))
+        (given,) = (n for n in ast.walk(keywords(call)['parameters']) if isinstance(n, ast.Dict))
+        for key, value in zip(given.keys, given.values, strict=True):
+            assert isinstance(key, ast.Constant)
+            assert isinstance(value, ast.Call)
+            assert ast.unparse(keywords(value)['value_type']) == declared[str(key.value)].__name__
+
+
 @each_file
 def test_every_argument_is_declared_and_used(path: Path) -> None:
     """What a launch file takes it uses, and what it uses it takes."""
@@ -60,9 +89,10 @@ def test_every_argument_is_described(path: Path) -> None:
 @each_file
 def test_an_included_launch_file_takes_what_it_is_given(path: Path) -> None:
     """The arguments handed on are arguments of the file included, which is one of ours."""
+    tree = ast.parse(path.read_text(encoding='utf-8'))
     for call in calls(path, {'IncludeLaunchDescription'}):
-        names = [n.value for n in ast.walk(call.args[0]) if isinstance(n, ast.Constant)]
-        included = path.with_name(str(names[-1]))
+        texts = [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)]
+        (name,) = (t for t in texts if isinstance(t, str) and re.fullmatch(r'\w+\.launch\.py', t))
         given = {
             key.value
             for node in ast.walk(keywords(call)['launch_arguments'])
@@ -71,4 +101,4 @@ def test_an_included_launch_file_takes_what_it_is_given(path: Path) -> None:
             if isinstance(key, ast.Constant)
         }
         assert given
-        assert given <= first_arguments(included, 'DeclareLaunchArgument')
+        assert given <= first_arguments(path.with_name(name), 'DeclareLaunchArgument')
