@@ -1,0 +1,154 @@
+"""Any recording message by message, as it was serialised, in the order it was logged: for replay."""
+
+import heapq
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import yaml
+from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.typesys import Stores, get_typestore
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.chunks import Buffers, log_times, walk
+from ugv_acceptance.bag.gather import LEAD, SLACK
+from ugv_acceptance.bag.mcap_index import Piece
+from ugv_acceptance.bag.metadata import NAME
+from ugv_acceptance.bag.reader import Bag
+from ugv_acceptance.bag.reading import Member, normal_type
+
+_HEADER = 31  # bytes of a Message record before its content
+
+
+class Logged(NamedTuple):
+    """One message: log time (ns), topic, and its content as CDR."""
+
+    log_time: int
+    topic: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """What a topic's publisher offered: reliable or best_effort; volatile or transient_local."""
+
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+
+
+def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
+    """Yield the messages of `topics` in order of log time; ROS 1 messages are turned into CDR.
+
+    What cannot be read is left out, as in `Bag.batches`.
+    """
+    wanted = set(topics)
+    streams = [_member(member, wanted) for member in bag.members]
+    return heapq.merge(*streams, key=lambda message: message.log_time)
+
+
+def _member(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    read = {'mcap': _mcap, 'sqlite3': _sqlite, 'ros1': _ros1}[member.storage]
+    yield from read(member, wanted)
+
+
+def _mcap(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    """Chunks overlap in time: messages are held until no later chunk can bring an earlier one."""
+    index: Any = member.index
+    channels = {c.id: c.topic for c in index.channels.values() if c.topic in wanted}
+    buffers, held = Buffers(), list[tuple[int, int, Logged]]()
+    pieces = sorted(index.pieces, key=lambda piece: piece.first)
+    with member.content.open('rb') as file:
+        for k, piece in enumerate(pieces):
+            held += _piece(file.fileno(), piece, buffers, channels)
+            held.sort(key=lambda item: item[:2])
+            until = pieces[k + 1].first if k + 1 < len(pieces) else None
+            ready = [item for item in held if until is None or item[0] < until]
+            del held[: len(ready)]
+            yield from (message for _, _, message in ready)
+
+
+def _piece(
+    file: int, piece: Piece, buffers: Buffers, channels: dict[int, str]
+) -> list[tuple[int, int, Logged]]:
+    room = np.zeros(LEAD + piece.length + SLACK, np.uint8)
+    try:
+        if piece.head is None:
+            size, records = piece.length, room
+            os.preadv(file, [room.data[LEAD : LEAD + size]], piece.start)
+        else:
+            os.preadv(file, [room.data[: piece.length]], piece.start)
+            size, records = piece.head.size, buffers.records(piece.head, room[: piece.length + SLACK])
+    except BadBag:
+        return []
+    data = records.data[LEAD : LEAD + size]
+    found = []
+    for channel, offsets in walk(data).messages.items():
+        topic = channels.get(channel)
+        if topic is not None:
+            times = log_times(np.asarray(data), offsets).tolist()
+            for at, time in zip(offsets.tolist(), times, strict=True):
+                length = int.from_bytes(data[at + 1 : at + 9], 'little')
+                content = bytes(data[at + _HEADER : at + 9 + length])
+                found.append((time, piece.start + at, Logged(time, topic, content)))
+    return found
+
+
+def _sqlite(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    query = (
+        'SELECT messages.timestamp, topics.name, messages.data FROM messages '
+        'JOIN topics ON topics.id = messages.topic_id ORDER BY messages.timestamp, messages.id'
+    )
+    try:
+        with closing(sqlite3.connect(f'{member.content.as_uri()}?mode=ro', uri=True)) as db:
+            for log_time, topic, data in db.execute(query):
+                if topic in wanted:
+                    yield Logged(int(log_time), str(topic), bytes(data))
+    except sqlite3.Error as error:
+        raise BadBag(f'{member.path}: reading ended early ({error})') from error
+
+
+def _ros1(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Ros1Reader(member.content) as reader:
+        connections = [c for c in reader.connections if c.topic in wanted]
+        for connection, log_time, data in reader.messages(connections):
+            content = bytes(store.ros1_to_cdr(data, normal_type(connection.msgtype)))
+            yield Logged(log_time, connection.topic, content)
+
+
+def offered(bag: Bag) -> dict[str, Offered]:
+    """Return the recorded QoS of topics, from metadata.yaml of any version; absent: not known."""
+    found: dict[str, Offered] = {}
+    for folder in {path.parent for path in bag.paths}:
+        path = folder / NAME
+        if path.is_file():
+            found |= _profiles(path.read_text(encoding='utf-8', errors='replace'))
+    return found
+
+
+def _profiles(text: str) -> dict[str, Offered]:
+    found = {}
+    try:
+        info = yaml.safe_load(text)['rosbag2_bagfile_information']
+        for topic in info.get('topics_with_message_count') or ():
+            metadata = topic['topic_metadata']
+            profiles = metadata.get('offered_qos_profiles')
+            profiles = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
+            if profiles:
+                found[str(metadata['name'])] = _offered(profiles[0])
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, IndexError):
+        return found  # the reader has said what is wrong with it
+    return found
+
+
+def _offered(profile: dict[str, Any]) -> Offered:
+    """Versions before 9 write the numbers of rmw, later ones their names."""
+    best_effort = str(profile.get('reliability')) in {'2', 'best_effort'}
+    latched = str(profile.get('durability')) in {'1', 'transient_local'}
+    return Offered(
+        'best_effort' if best_effort else 'reliable', 'transient_local' if latched else 'volatile'
+    )

@@ -1,0 +1,283 @@
+"""`acceptance_monitor`: the lifecycle node that watches a robot's margins. docs/ros_interface.md.
+
+It advises; it is not a safety function. It brings itself up unless `autostart` is false. Inputs are
+subscribed as raw bytes on activation, so an inactive monitor costs nothing.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.timer import Timer
+from std_srvs.srv import Trigger
+
+from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.nodes.inputs import Inputs
+from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
+from ugv_acceptance.nodes.parameters import Knob, changed, described, described_integer, knobs_of
+from ugv_acceptance.nodes.receipt import ReceiptClock
+from ugv_acceptance.nodes.running import run
+from ugv_acceptance.nodes.session import Session
+from ugv_acceptance.nodes.status import Status, alert_status, verdict
+from ugv_acceptance.nodes.supervision import diagnostics_of, unavailable
+
+NAME = 'acceptance_monitor'
+# Parameters that are read on configuration or activation and stay as they are until the next.
+AT_REST = ('config', 'urdf', 'depth')
+
+
+class Monitor(LifecycleNode):
+    """The monitor. `listener(kind, text)` is called with every alert line, for a console."""
+
+    def __init__(
+        self, listener: Callable[[str, Status], None] = lambda _kind, _status: None, **node: Any
+    ) -> None:
+        super().__init__(NAME, **node)
+        self.listener = listener
+        self.config: Config | None = None
+        self.session: Session | None = None
+        self.problem = ''
+        self._settings: Settings | None = None
+        self._knobs: tuple[Knob, ...] = ()
+        self._inputs: Inputs | None = None
+        self._margins: MarginOutput | None = None
+        self._tick: Timer | None = None
+        self._declare()
+        self.output = StatusOutput(self)
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        self.add_post_set_parameters_callback(self._take_parameters)
+        # Steady: a frozen /clock must not silence the diagnostics.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0, self._every_second, clock=self._steady)
+        self.create_service(Trigger, '~/acknowledge', self._acknowledge)
+        self.create_service(Trigger, '~/reset', self._reset)
+        self.say()
+
+    def _declare(self) -> None:
+        declare = self.declare_parameter
+        declare('config', 'packbot', described('YAML file, or the name of one that ships'))
+        declare('urdf', '', described('URDF in place of the one the YAML names'))
+        what = 'configure and activate at once; false: a lifecycle manager does'
+        declare('autostart', True, described(what, fixed=True))
+        what = 'queue of each input; what comes while the processor is busy waits in it'
+        declare('depth', 1000, described_integer(what, 1, 100_000))
+        what = 'margin messages a second; 0: one for every input message'
+        declare('publish_rate', 50.0, described(what, 0.0, 10_000.0))
+        what = 'nodes that may publish the inputs, such as /driver; empty: any, but only one'
+        declare('allowed_publishers', [''], described(what))
+
+    # Lifecycle
+
+    def bring_up(self) -> None:
+        """Configure and activate if `autostart`; BadConfig says why that was not possible."""
+        if not self._value('autostart'):
+            return
+        success = TransitionCallbackReturn.SUCCESS
+        if self.trigger_configure() != success or self.trigger_activate() != success:
+            raise BadConfig(self.problem)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the robot's files, declare its parameters, make the margin topics."""
+        return self._transition(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start a new evaluation and subscribe the inputs."""
+        return self._transition(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening; the verdict is STALE from now on."""
+        return self._transition(self._deactivate)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the robot."""
+        return self._transition(self._clean_up)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening for good."""
+        return self._transition(self._deactivate)
+
+    def _transition(self, step: Callable[[], None]) -> TransitionCallbackReturn:
+        # rclpy swallows what a transition raises, so it is said here.
+        self.problem = ''
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001 - whatever it is, the node lives on and says it
+            self.problem = str(error) if isinstance(error, AcceptanceError) else repr(error)
+            self.get_logger().error(self.problem)
+        self.say()
+        success, failure = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+        return failure if self.problem else success
+
+    def _configure(self) -> None:
+        urdf = self._value('urdf')
+        self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
+        for warning in self.config.warnings:
+            self.get_logger().warning(warning)
+        defaults = self.config.settings
+        knobs = knobs_of(defaults)
+        for knob in knobs:
+            if not self.has_parameter(knob.name):
+                self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
+        values = {knob.name: self._value(knob.name) for knob in knobs}
+        self._settings, self._knobs = changed(defaults, knobs, values), knobs
+        self.output.hardware_id = self.config.serial or self.config.name
+        self._margins = MarginOutput(self, self._settings)
+
+    def _activate(self) -> None:
+        if self._settings is None or self.config is None:
+            raise BadConfig('expected a configured monitor')
+        self.session = self._new_session(self._settings)
+        self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
+        self._take_rates()
+        tick = self._settings.delays.tick
+        self._tick = self.create_timer(tick, self._on_tick, clock=self._steady)
+
+    def _new_session(self, settings: Settings) -> Session:
+        simulated = bool(self._value('use_sim_time'))
+        warn = self.get_logger().warning
+        return Session(
+            settings,
+            self._margins.publish if self._margins else lambda _stamp, _margins: None,
+            self._on_change,
+            lambda text: warn(text, throttle_duration_sec=5.0),
+            ReceiptClock(simulated),
+        )
+
+    def _deactivate(self) -> None:
+        if self._inputs is not None:
+            self._inputs.destroy()
+        if self._tick is not None:
+            self.destroy_timer(self._tick)
+        self._inputs = self._tick = self.session = None
+
+    def _clean_up(self) -> None:
+        for knob in self._knobs:
+            self.undeclare_parameter(knob.name)
+        if self._margins is not None:
+            self._margins.destroy()
+        self._knobs, self._margins = (), None
+        self.config = self._settings = None
+
+    # Time
+
+    def _on_tick(self) -> None:
+        session = self.session
+        if session is None:
+            return
+        if session.clock.simulated:
+            session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
+        session.tick()
+
+    def _every_second(self) -> None:
+        if self.session is not None and self._inputs is not None:
+            self._inputs.look_around(self._value('allowed_publishers'))
+            self.session.measure_rates()
+            self.session.tick()
+        if self._margins is not None:
+            self._margins.look_for_listeners()
+        self.say()
+
+    # What is said
+
+    def verdict(self) -> Status:
+        """Return the verdict now: STALE in every state but active."""
+        session = self.session
+        if session is None:
+            return unavailable(self.problem)
+        active = [*session.evaluator.watch.active, *session.faults.active]
+        return verdict(
+            session.settings,
+            session.evaluator.margins,
+            session.level,
+            active,
+            (session.faults, session.follower),
+        )
+
+    def say(self) -> None:
+        """Publish the verdict and the diagnostics."""
+        status = self.verdict()
+        self.output.verdict(status)
+        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.listener('verdict', status)
+
+    def _on_change(self) -> None:
+        session = self.session
+        if session is None:
+            return
+        found = session.follower.take()
+        self._tell([alert_status(a, how, session.settings, session.faults) for a, how in found])
+        self.say()
+
+    def _tell(self, statuses: list[Status]) -> None:
+        if statuses:
+            self.output.alerts(statuses)
+        for status in statuses:
+            self.listener('alert', status)
+
+    # Services and parameters
+
+    def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        session = self.session
+        response.success = session is not None
+        response.message = 'the monitor is not active'
+        if session is not None:
+            seen = session.follower.acknowledge()
+            told = (session.settings, session.faults)
+            self._tell([alert_status(alert, 'acknowledged', *told) for alert in seen])
+            response.message = f'acknowledged {len(seen)} alerts'
+            self.say()
+        return response
+
+    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self.session is not None
+        response.message = 'the monitor is not active'
+        if self.session is not None:
+            self._deactivate()
+            self._activate()
+            response.message = 'started a new evaluation: filters, alerts and clock are fresh'
+            self.say()
+        return response
+
+    def _value(self, name: str) -> Any:  # noqa: ANN401 - a parameter's value
+        return self.get_parameter(name).value
+
+    def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse a set as a whole, with the reason; what it would change is not touched here."""
+        values = {parameter.name: parameter.value for parameter in parameters}
+        try:
+            fixed = [name for name in AT_REST if name in values and self.session is not None]
+            if fixed:
+                raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
+            if self._settings is not None:
+                changed(self._settings, self._knobs, values)
+        except (BadConfig, TypeError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_parameters(self, parameters: list[Parameter]) -> None:
+        values = {parameter.name: parameter.value for parameter in parameters}
+        if self._settings is not None:
+            self._settings = changed(self._settings, self._knobs, values)
+            if self.session is not None:
+                self.session.adopt(self._settings)
+        self._take_rates()
+
+    def _take_rates(self) -> None:
+        rate = self._value('publish_rate')
+        if self._margins is not None and self._settings is not None:
+            self._margins.period = int(1e9 / rate) if rate > 0 else 0
+            self._margins.limits = self._settings.limits.torque
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the monitor until it is interrupted; exit code 2 where the configuration is bad."""
+    sys.exit(run(Monitor, args))

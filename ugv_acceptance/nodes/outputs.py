@@ -1,0 +1,99 @@
+"""What the monitor publishes: margins for those who listen, verdict, alerts and diagnostics."""
+
+import math
+from collections.abc import Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.nodes.conversions import JointStateBytes, diagnostic_array, status_message
+from ugv_acceptance.nodes.status import Status
+
+LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+MARGIN_TOPICS = ('~/static_torque', '~/torque_margin', '~/stability')
+
+
+class StatusOutput:
+    """Verdict, alerts and diagnostics: there in every state of the lifecycle, never silent."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self.name = node.get_fully_qualified_name().lstrip('/')
+        self.hardware_id = ''
+        self._verdict = node.create_publisher(DiagnosticStatus, '~/verdict', LATCHED)
+        self._alerts = node.create_publisher(DiagnosticArray, '~/alerts', 50)
+        self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+
+    def verdict(self, status: Status) -> None:
+        """Publish the verdict; who comes later gets the last one."""
+        self._verdict.publish(status_message(status, self.name, self.hardware_id))
+
+    def alerts(self, statuses: Sequence[Status]) -> None:
+        """Publish changes of alerts."""
+        self._alerts.publish(self._array(statuses))
+
+    def diagnostics(self, statuses: Sequence[Status]) -> None:
+        """Publish the state of everything."""
+        self._diagnostics.publish(self._array(statuses))
+
+    def _array(self, statuses: Sequence[Status]) -> DiagnosticArray:
+        stamp = self._node.get_clock().now().nanoseconds
+        return diagnostic_array(stamp, statuses, self.name, self.hardware_id)
+
+
+class MarginOutput:
+    """The three margin topics, at most `rate` times a second (0: every message)."""
+
+    def __init__(self, node: Node, settings: Settings) -> None:
+        self._node = node
+        names = settings.robot.joint_names
+        self._publishers: list[Publisher] = [
+            node.create_publisher(JointState, topic, 10) for topic in MARGIN_TOPICS
+        ]
+        self._joints, self._sides = JointStateBytes(names), JointStateBytes(SIDES)
+        self._wanted = (False, False, False)
+        self._due = 0
+        self.period = 0
+        self.limits = settings.limits.torque
+
+    def look_for_listeners(self) -> None:
+        """See which topics have subscribers; the others are not made."""
+        torque, margin, tip = (p.get_subscription_count() > 0 for p in self._publishers)
+        self._wanted = (torque, margin, tip)
+        if not any(self._wanted):
+            self._due = 1 << 62
+        elif self._due == 1 << 62:
+            self._due = 0
+
+    def publish(self, stamp: int, margins: Margins) -> None:
+        """Publish the margins of a message with this header stamp (ns), if it is time to."""
+        if margins.time < self._due:
+            return
+        late = margins.time - self._due > self.period
+        self._due = (margins.time if late else self._due) + self.period
+        torque, margin, tip = self._wanted
+        if torque:
+            self._publishers[0].publish(self._joints.fill(stamp, margins.q, margins.torque))
+        if margin:
+            pairs = zip(self.limits, margins.torque, strict=True)
+            left = [limit - abs(tau) if limit < math.inf else math.inf for limit, tau in pairs]
+            self._publishers[1].publish(self._joints.fill(stamp, margins.q, left))
+        if tip:
+            found = margins.stability
+            data = self._sides.fill(stamp, found.angle, found.moment)
+            self._publishers[2].publish(data)
+
+    def destroy(self) -> None:
+        """Take the topics away."""
+        for publisher in self._publishers:
+            self._node.destroy_publisher(publisher)

@@ -1,0 +1,206 @@
+"""Parameters: what can be set while the monitor runs, its ranges, and how it changes the settings.
+
+Names are those of the YAML file, units included. A set is checked as a whole and is wholly taken or
+wholly refused; `use ros2 param set` or, for several that belong together, set_parameters_atomically.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+
+ATTITUDES = ('auto', 'orientation', 'accelerometer')
+# Stands for a limit that is not known, so not judged (an infinite number has no range).
+NOT_JUDGED = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Knob:
+    """A parameter: how it is read from settings and put into them. `lower` to `upper` is its range."""
+
+    name: str
+    what: str
+    get: Callable[[Settings], Any]
+    put: Callable[[Settings, Any], Settings]
+    lower: float | None = None
+    upper: float | None = None
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what ROS tools show of it, and check."""
+        return described(self.what, self.lower, self.upper)
+
+
+def described(
+    what: str, lower: float | None = None, upper: float | None = None, *, fixed: bool = False
+) -> ParameterDescriptor:
+    """Return a descriptor with a range for floats, or none."""
+    ranges = []
+    if lower is not None and upper is not None:
+        ranges = [FloatingPointRange(from_value=float(lower), to_value=float(upper), step=0.0)]
+    return ParameterDescriptor(description=what, floating_point_range=ranges, read_only=fixed)
+
+
+def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
+    """Return a descriptor with a range for integers."""
+    ranges = [IntegerRange(from_value=lower, to_value=upper, step=1)]
+    return ParameterDescriptor(description=what, integer_range=ranges)
+
+
+# Parameter -> (part of Settings, field, factor of its unit, range, what it is).
+_TABLE: dict[str, tuple[str, str, float, float, float, str]] = {
+    'limits.torque_warn': ('limits', 'torque_warn', 1.0, 0.01, 10.0, 'share of the limit for WARN'),
+    'limits.torque_error': (
+        'limits', 'torque_error', 1.0, 0.01, 10.0, 'share of the limit for ERROR',
+    ),
+    'limits.torque_deadband_nm': (
+        'limits', 'torque_deadband', 1.0, 0.0, 1e6, 'torque below the limit that clears, N m',
+    ),
+    'limits.tip_warn_deg': (
+        'limits', 'tip_warn', math.pi / 180, -90.0, 90.0, 'tilt left for WARN, deg',
+    ),
+    'limits.tip_error_deg': (
+        'limits', 'tip_error', math.pi / 180, -90.0, 90.0, 'tilt left for ERROR, deg',
+    ),
+    'limits.tip_deadband_deg': (
+        'limits', 'tip_deadband', math.pi / 180, 0.0, 90.0, 'tilt above the limit that clears, deg',
+    ),
+    'delays.tip_on_s': ('delays', 'tip_on', 1.0, 0.0, 10.0, 'how long before a tip-over alert, s'),
+    'delays.torque_on_s': ('delays', 'torque_on', 1.0, 0.0, 10.0, 'how long before a torque alert, s'),
+    'delays.fault_on_s': ('delays', 'fault_on', 1.0, 0.0, 10.0, 'how long before an input alert, s'),
+    'delays.off_s': ('delays', 'off', 1.0, 0.0, 60.0, 'how long good before an alert clears, s'),
+    'delays.stale_after_s': (
+        'delays', 'stale_after', 1.0, 0.001, 60.0, 'shortest silence that is stale, s',
+    ),
+    'delays.stale_periods': (
+        'delays', 'stale_periods', 1.0, 1.0, 1000.0, 'own periods of silence that are stale',
+    ),
+    'imu.agreement_deg': (
+        'imu', 'agreement', math.pi / 180, 0.1, 180.0, 'orientation may differ from gravity, deg',
+    ),
+}  # fmt: skip
+
+
+def knobs_of(settings: Settings) -> tuple[Knob, ...]:
+    """Return the parameters of a robot."""
+    torque = tuple(_torque_knob(settings, j) for j in range(len(settings.robot.joint_names)))
+    return (*(_field_knob(name, *row) for name, row in _TABLE.items()), *torque, *_CHOICES)
+
+
+def _field_knob(  # noqa: PLR0913, PLR0917 - a row of the table
+    name: str, part: str, key: str, unit: float, lower: float, upper: float, what: str
+) -> Knob:
+    def get(settings: Settings) -> float:
+        return float(getattr(getattr(settings, part), key) / unit)
+
+    def put(settings: Settings, value: float) -> Settings:
+        section = getattr(settings, part)
+        changed: Settings = replace(settings, **{part: replace(section, **{key: value * unit})})
+        return changed
+
+    return Knob(name, what, get, put, lower, upper)
+
+
+def _torque_knob(settings: Settings, j: int) -> Knob:
+    joint = settings.robot.joint_names[j]
+    unit = ('n', 'N') if settings.robot.joint(joint).kind == 'prismatic' else ('nm', 'N m')
+
+    def get(current: Settings) -> float:
+        limit = current.limits.torque[j]
+        return limit if math.isfinite(limit) else NOT_JUDGED
+
+    def put(current: Settings, value: float) -> Settings:
+        limits = list(current.limits.torque)
+        limits[j] = value if value > 0 else math.inf
+        return replace(current, limits=replace(current.limits, torque=tuple(limits)))
+
+    what = f'limit, {unit[1]}; 0: not known, so not judged'
+    return Knob(f'joints.{joint}.limit_{unit[0]}', what, get, put, 0.0, 1e9)
+
+
+def _with_payload(settings: Settings, mass: float, cog: Sequence[float]) -> Settings:
+    if len(cog) != 3 or not all(map(math.isfinite, cog)):
+        raise BadConfig(f'payload.cog_m: expected three finite numbers (m), got {list(cog)}')
+    payload = Payload(float(mass), (float(cog[0]), float(cog[1]), float(cog[2])))
+    return replace(settings, robot=replace(settings.robot, payload=payload))
+
+
+def _with_attitude(settings: Settings, value: str) -> Settings:
+    if value not in ATTITUDES:
+        raise BadConfig(f'imu.attitude: expected one of {", ".join(ATTITUDES)}, got {value!r}')
+    return replace(settings, imu=replace(settings.imu, attitude=value))
+
+
+_CHOICES = (
+    Knob(
+        'payload.mass_kg',
+        'mass of the load carried, kg, until the payload topic says otherwise',
+        lambda s: float(s.robot.payload.mass),
+        lambda s, v: _with_payload(s, v, s.robot.payload.cog),
+        0.0,
+        1e6,
+    ),
+    Knob(
+        'payload.cog_m',
+        'centre of gravity of the load in the axes of the payload link, m',
+        lambda s: list(s.robot.payload.cog),
+        lambda s, v: _with_payload(s, s.robot.payload.mass, v),
+    ),
+    Knob(
+        'imu.attitude',
+        f'where gravity comes from: {", ".join(ATTITUDES)}',
+        lambda s: s.imu.attitude,
+        _with_attitude,
+    ),
+    Knob(
+        'imu.specific_force',
+        'the accelerometer takes the place of gravity in every margin',
+        lambda s: s.imu.specific_force,
+        lambda s, v: replace(s, imu=replace(s.imu, specific_force=bool(v))),
+    ),
+)
+
+
+def changed(settings: Settings, knobs: Sequence[Knob], values: Mapping[str, Any]) -> Settings:
+    """Return settings with parameters changed; BadConfig names the one that cannot be taken.
+
+    A value that is what it was changes nothing, so that no digit is lost in a unit's conversion.
+    """
+    for knob in knobs:
+        value = values.get(knob.name, knob.get(settings))
+        if value == knob.get(settings) or list_of(value) == list_of(knob.get(settings)):
+            continue
+        if isinstance(value, float) and not math.isfinite(value):
+            raise BadConfig(f'{knob.name}: expected a finite number, got {value}')
+        if knob.lower is not None and knob.upper is not None:
+            if not knob.lower <= value <= knob.upper:
+                raise BadConfig(
+                    f'{knob.name}: expected {knob.lower:g} to {knob.upper:g}, got {value}'
+                )
+        settings = knob.put(settings, value)
+    _check(settings)
+    return settings
+
+
+def list_of(value: Any) -> Any:  # noqa: ANN401 - a parameter's value
+    """Return an array parameter as a list, anything else as it is."""
+    return list(value) if not isinstance(value, str | float | int | bool) else value
+
+
+def _check(settings: Settings) -> None:
+    limits = settings.limits
+    if limits.torque_warn > limits.torque_error:
+        raise BadConfig(
+            f'limits.torque_warn: expected at most limits.torque_error ({limits.torque_error:g}), '
+            f'got {limits.torque_warn:g}'
+        )
+    if limits.tip_warn < limits.tip_error:
+        raise BadConfig(
+            f'limits.tip_warn_deg: expected at least limits.tip_error_deg '
+            f'({math.degrees(limits.tip_error):g}), got {math.degrees(limits.tip_warn):g}'
+        )

@@ -1,0 +1,86 @@
+"""Run a node until it is interrupted: a bounded loop on the events executor, a clean end.
+
+EventsExecutor.spin() without a timeout burns a core and hears no signal, so it is given one.
+"""
+
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from ugv_acceptance import AcceptanceError
+
+BAD_INPUT = 2
+# Seconds after which a signal is heard at the latest.
+PATIENCE = 0.5
+
+
+@dataclass(slots=True)
+class Stop:
+    """Whether the process was asked to end."""
+
+    asked: bool = False
+
+
+def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
+    """Build a node, bring it up, spin it until SIGINT or SIGTERM; return the exit code."""
+    try:
+        with ros(args) as stop:
+            node = make()
+            try:
+                node.bring_up()
+                spin(node, stop)
+            finally:
+                node.destroy_node()
+    except AcceptanceError as error:
+        sys.stderr.write(f'ugv-acceptance: {error}\n')
+        return BAD_INPUT
+    return 0
+
+
+@contextmanager
+def ros(args: list[str] | None = None) -> Iterator[Stop]:
+    """Initialise rclpy with signals that only set `asked`, and shut it down, come what may.
+
+    `args` are those behind a program's name: ROS arguments such as remaps among them.
+    """
+    if not {'HOME', 'ROS_HOME', 'ROS_LOG_DIR'} & set(os.environ):
+        os.environ['ROS_LOG_DIR'] = str(Path(tempfile.gettempdir(), 'ros_log'))
+    stop = Stop()
+
+    def ask(*_: object) -> None:
+        stop.asked = True
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield stop
+    finally:
+        # The handlers stay until the end: a second Ctrl-C must not break the shutdown off.
+        rclpy.try_shutdown()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
+    """Spin until the process is asked to stop, or `until` says so (asked twice a second)."""
+    executor = EventsExecutor()
+    executor.add_node(node)
+    never: Future = Future()
+    try:
+        while rclpy.ok() and not stop.asked and not until():
+            executor.spin_until_future_complete(never, timeout_sec=PATIENCE)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()

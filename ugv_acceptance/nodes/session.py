@@ -1,0 +1,170 @@
+"""What lives from activation to deactivation: raw messages in, margins and alerts out. No ROS here.
+
+The three `take_*` are the hot path. Bytes are decoded by the decoder that reads bags, so no message
+object is made; whatever they hold, the worst that happens is that they are counted as malformed.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
+from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.nodes.faults import Faults
+from ugv_acceptance.nodes.following import Follower
+from ugv_acceptance.nodes.receipt import ReceiptClock
+
+INPUTS = ('joint_states', 'imu', 'payload')
+
+
+@dataclass(slots=True)
+class InputCount:
+    """Messages of one input so far: all of them, those not decoded, and when the newest came."""
+
+    taken: int = 0
+    malformed: int = 0
+    lost: int = 0
+    last: int = 0
+    reason: str = ''
+
+
+@dataclass(slots=True)
+class Session:
+    """The evaluation of a running robot. `on_margins(stamp, margins)` is called for every message
+    that gave margins, with its own header stamp (ns); `on_change()` when alerts or level changed.
+    """
+
+    settings: Settings
+    on_margins: Callable[[int, Margins], None]
+    on_change: Callable[[], None]
+    on_problem: Callable[[str], None]
+    clock: ReceiptClock = field(default_factory=ReceiptClock)
+    evaluator: LiveEvaluator = field(init=False)
+    faults: Faults = field(init=False)
+    follower: Follower = field(init=False)
+    counts: dict[str, InputCount] = field(init=False)
+    take_joint_state: Callable[[bytes], None] = field(init=False)
+    take_imu: Callable[[bytes], None] = field(init=False)
+    take_payload: Callable[[bytes], None] = field(init=False)
+    rates: dict[str, float] = field(default_factory=dict)
+    _known: bool = False
+    _counted: tuple[int, dict[str, int]] = field(default_factory=lambda: (0, {}))
+
+    def __post_init__(self) -> None:
+        self.evaluator = LiveEvaluator(self.settings)
+        log = self.evaluator.watch.log
+        self.faults, self.follower = Faults(log), Follower(log)
+        self.counts = {name: InputCount() for name in INPUTS}
+        self.evaluator.start(self.clock.now())
+        self.take_joint_state = self._guard('joint_states', self._joint_states())
+        self.take_imu = self._guard('imu', self._imu())
+        self.take_payload = self._guard('payload', self._payload())
+
+    @property
+    def level(self) -> int:
+        """The most severe level now."""
+        return max([self.evaluator.level, *(a.rule.level for a in self.faults.active)])
+
+    def tick(self) -> None:
+        """Let time pass: silence, delays and faults that are over."""
+        now = self.clock.now()
+        self.evaluator.tick(now)
+        self.faults.advance(now)
+        self._look()
+
+    def measure_rates(self) -> None:
+        """Set `rates` (Hz) of the inputs since the call before."""
+        now, (since, before) = self.clock.now(), self._counted
+        taken = {name: count.taken for name, count in self.counts.items()}
+        if before and now > since:
+            self.rates = {
+                name: (taken[name] - before[name]) * 1e9 / (now - since) for name in taken
+            }
+        self._counted = (now, taken)
+
+    def adopt(self, settings: Settings) -> None:
+        """Judge by other limits and delays from now on; what was learnt and is active stays."""
+        self.settings = settings
+        self.evaluator.adopt(settings)
+
+    def _look(self) -> None:
+        known = self.evaluator.margins is not None
+        if known is not self._known or self.follower.changed():
+            self._known = known
+            self.on_change()
+
+    def _joint_states(self) -> Callable[[bytes], None]:
+        decode, evaluate = joint_state_decoder().one, self.evaluator.joint_state
+        clock, count, follower = self.clock, self.counts['joint_states'], self.follower
+
+        def take(data: bytes) -> None:
+            now = time.monotonic_ns() + clock.offset
+            stamp, _, names, position, velocity, effort = decode(data)
+            count.taken += 1
+            count.last = now
+            local = clock.stamp(now, stamp) if clock.simulated else stamp
+            margins = evaluate(now, local, names, position, velocity, effort)
+            if margins is not None:
+                self.on_margins(stamp, margins)
+            if (margins is not None) is not self._known or follower.changed():
+                self._look()
+
+        return take
+
+    def _imu(self) -> Callable[[bytes], None]:
+        decode, evaluate = imu_decoder().one, self.evaluator.imu
+        clock, count, follower = self.clock, self.counts['imu'], self.follower
+
+        def take(data: bytes) -> None:
+            now = time.monotonic_ns() + clock.offset
+            stamp, _, orientation, omega, acceleration, covariance_0, _, _ = decode(data)
+            count.taken += 1
+            count.last = now
+            local = clock.stamp(now, stamp) if clock.simulated else stamp
+            margins = evaluate(now, local, orientation, covariance_0, omega, acceleration)
+            if margins is not None:
+                self.on_margins(stamp, margins)
+            if (margins is not None) is not self._known or follower.changed():
+                self._look()
+
+        return take
+
+    def _payload(self) -> Callable[[bytes], None]:
+        decode, count = payload_decoder().one, self.counts['payload']
+
+        def take(data: bytes) -> None:
+            now = self.clock.now()
+            _, frame, mass, com = decode(data)
+            count.taken += 1
+            count.last = now
+            self.evaluator.carry(now, mass, com, frame)
+            self._look()
+
+        return take
+
+    def _guard(self, name: str, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        """Return `take` such that no content of a message can end the node."""
+
+        def guarded(data: bytes) -> None:
+            try:
+                take(data)
+            except BadSample as error:
+                self._malformed(name, error)
+            except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+                self.evaluator.margins = None
+                self.faults.set(self.clock.now(), 'MONITOR_FAULT', name, 1.0, repr(error))
+                self.on_problem(f'{name}: fault of the monitor: {error!r}')
+                self._look()
+
+        return guarded
+
+    def _malformed(self, name: str, error: BadSample) -> None:
+        count = self.counts[name]
+        count.malformed += 1
+        count.reason = str(error)
+        now = self.clock.now()
+        self.faults.set(now, 'INPUT_MALFORMED', name, float(count.malformed), count.reason)
+        self.on_problem(f'{name}: malformed message ignored: {error}')
+        self._look()
