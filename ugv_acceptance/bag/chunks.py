@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
+import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
 import zstandard
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.gather import LEAD, SLACK, Bytes, Offsets
+from ugv_acceptance.bag.lz4_frame import unlz4
 
 MESSAGE, CHUNK, MESSAGE_INDEX = 5, 6, 7
 MAX_CHUNK_BYTES = 64 << 20
@@ -29,10 +31,8 @@ def _optional(name: str) -> ModuleType | None:
         return None
 
 
-# Both only save time. zlib's CRC-32 costs a third of zstd's decompression, ISA-L's a thirtieth;
-# python-lz4 makes a new buffer a chunk, which is five times slower than LZ4 itself.
+# Only saves time: zlib's CRC-32 costs a third of zstd's decompression, ISA-L's a thirtieth.
 _isal = _optional('isal.isal_zlib')
-_cramjam = _optional('cramjam')
 crc32: Callable[[Any], int] = _isal.crc32 if _isal else zlib.crc32
 
 
@@ -110,7 +110,7 @@ class Buffers:
         if compression == 'zstd':
             got = self._unzstd(source, target)
         elif compression == 'lz4':
-            got = _unlz4(source, target)
+            got = unlz4(source, target)
         else:
             raise BadBag(f'compression {compression!r} is not known, expected zstd or lz4')
         if got != len(target):
@@ -128,30 +128,12 @@ class Buffers:
             raise BadBag(f'its zstd data is broken ({error})') from error
 
 
-def _unlz4(source: memoryview, target: memoryview) -> int:
-    # Both libraries raise RuntimeError or ValueError, cramjam its own kind of Exception.
-    broken: tuple[type[Exception], ...] = (RuntimeError, ValueError, OSError)
-    if _cramjam is not None:
-        try:
-            return int(_cramjam.lz4.decompress_into(source, target))
-        except (*broken, _cramjam.DecompressionError) as error:
-            raise BadBag(f'its lz4 data is broken ({error})') from error
-    frame = importlib.import_module('lz4.frame')
-    try:
-        stream = frame.LZ4FrameDecompressor()
-        data = stream.decompress(source, max_length=len(target) + 1)
-    except broken as error:
-        raise BadBag(f'its lz4 data is broken ({error})') from error
-    target[: len(data)] = data[: len(target)]
-    return len(data)
-
-
 def pack(compression: str, content: bytes, zstd: zstandard.ZstdCompressor) -> bytes:
     """The records of a chunk compressed; '' leaves them as they are."""
     if compression == 'zstd':
         return zstd.compress(content)
     if compression == 'lz4':
-        return bytes(importlib.import_module('lz4.frame').compress(content))
+        return bytes(lz4.frame.compress(content))
     return content
 
 
