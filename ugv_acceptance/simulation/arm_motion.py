@@ -26,14 +26,14 @@ from ugv_acceptance.simulation.vehicle import (
 )
 
 BUILD = Build(friction=20.0, timestep=0.00125, contact_time=0.0026, impratio=100.0)
-# Own frequency (rad/s) of the servos: they hold the joints to the motion.
-STIFF = 200.0
+# Own frequency (rad/s) of the servos: they hold the joints to the motion; stiffer ones hop.
+STIFF = 60.0
 # Time (s) to come to rest before, and to watch after a motion.
 SETTLE, WATCH = 0.6, 1.0
 # Dampers (N s/m, N m s/rad) while it comes to rest.
 DAMPER = 60.0
 # Postures of a motion whose static margin is looked at; time steps between two looks.
-PATH, STRIDE = 61, 4
+PATH, STRIDE = 61, 2
 # Intervals of the static margin (rad) to which random motions are spread evenly.
 MARGINS = tuple(float(x) for x in np.radians([-6, -3, -1, 0, 1, 3, 6, 10, 15, 20]))
 
