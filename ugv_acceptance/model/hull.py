@@ -99,11 +99,11 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
         turns = [abs(_turn(*triple)) for triple in combinations(corners, 3)]
         return reduce(np.maximum, turns) < thin / len(active)
     good = _area(corners) >= thin
-    for k, (i, j) in enumerate(pairs(cycle)):
-        good = good & (_turn(points[i], points[j], corners[(k + 2) % len(cycle)]) > _SLACK)
-        for other in active:
-            if other not in cycle:
-                good = good & (_turn(points[i], points[j], points[other]) >= -_SLACK)
+    for i, j in pairs(cycle):
+        for k in active:
+            if k not in {i, j}:
+                left = _turn(points[i], points[j], points[k])
+                good = good & ((left > _SLACK) if k in cycle else (left >= -_SLACK))
     return good
 
 
