@@ -21,7 +21,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'model': set(),
     'evaluation': {'model'},
     'config': {'model', 'evaluation'},
-    'bag': {'evaluation'},
+    'bag': {'model', 'evaluation'},
     'simulation': {'model'},
     'report': {'model', 'evaluation'},
     'console': {'model', 'evaluation'},
