@@ -12,6 +12,7 @@ from bag.bag_cases import (
     IMU,
     INERTIA,
     JOINT_STATE,
+    STORE,
     Message,
     cdr,
     expected,
@@ -25,8 +26,9 @@ from bag.bag_cases import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType
+from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -281,12 +283,16 @@ def test_malformed_messages_are_counted(tmp_path: Path) -> None:
 
 def write_folder(path: Path, messages: list[Message], storage: StoragePlugin) -> Path:
     """A rosbag2 folder written by rosbags."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with Ros2Writer(path, version=9, storage_plugin=storage) as writer:
+    return write_with(Ros2Writer(path, version=9, storage_plugin=storage), path, messages)
+
+
+def write_with(writer: Ros2Writer, path: Path, messages: list[Message]) -> Path:
+    """The folder after rosbags' writer wrote these messages into it."""
+    with writer:
         held: dict[str, Any] = {}
         for topic, kind, time, data in messages:
             if topic not in held:
-                held[topic] = writer.add_connection(topic, kind, typestore=store)
+                held[topic] = writer.add_connection(topic, kind, typestore=STORE)
             writer.write(held[topic], time, data)
     return path
 
@@ -361,7 +367,6 @@ def test_ros1_bags(tmp_path: Path, compressed: bool) -> None:  # noqa: FBT001
     """A ROS 1 bag gives the same numbers as the ROS 2 messages it was made from."""
     messages = run(40)
     store = get_typestore(Stores.ROS1_NOETIC)
-    jazzy = get_typestore(Stores.ROS2_JAZZY)
     writer = Ros1Writer(tmp_path / 'run.bag')
     if compressed:
         writer.set_compression(Ros1Writer.CompressionFormat.BZ2)
@@ -370,7 +375,7 @@ def test_ros1_bags(tmp_path: Path, compressed: bool) -> None:  # noqa: FBT001
         for topic, kind, time, data in messages:
             if topic not in held:
                 held[topic] = writer.add_connection(topic, kind, typestore=store)
-            writer.write(held[topic], time, bytes(jazzy.cdr_to_ros1(data, kind)))
+            writer.write(held[topic], time, bytes(STORE.cdr_to_ros1(data, kind)))
     bag, batches, facts = read(tmp_path / 'run.bag')
     assert rows(batches) == expected(messages)
     assert facts.findings == ()
@@ -386,6 +391,73 @@ def test_what_is_no_bag_is_refused(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     with pytest.raises(BadBag, match=r'thing\.mcap'):
         open_bag(path)
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_message_compression(tmp_path: Path, storage: StoragePlugin) -> None:
+    """A folder whose messages were compressed one by one is read, of either storage format."""
+    messages = run(20)
+    folder = tmp_path / 'bag'
+    writer = Ros2Writer(folder, version=9, storage_plugin=storage)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    _, batches, facts = read(write_with(writer, folder, messages))
+    assert rows(batches) == expected(messages)
+    assert facts.findings == ()
+
+
+def test_mcap_of_ros1_messages(tmp_path: Path) -> None:
+    """An MCAP converted from ROS 1, with its packing and type names, gives the same numbers."""
+    messages = run(20)
+    path = tmp_path / 'run.mcap'
+    with path.open('wb') as file:
+        writer = McapWriter(file)
+        writer.start('ros1', 'test')
+        channels = {}
+        for topic, kind, _, _ in messages[:2]:
+            schema = writer.register_schema(kind.replace('/msg/', '/'), 'ros1msg', b'')
+            channels[topic] = writer.register_channel(topic, 'ros1', schema)
+        for topic, kind, time, data in messages:
+            writer.add_message(channels[topic], time, bytes(STORE.cdr_to_ros1(data, kind)), time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    _, batches, _ = read(path)
+    assert rows(batches) == expected(messages)
+
+
+def test_other_channels_do_not_matter(tmp_path: Path) -> None:
+    """Channels without schema, of garbage schemas, of other encodings leave the rest readable."""
+    messages = run(20)
+    path = tmp_path / 'run.mcap'
+    with path.open('wb') as file:
+        writer = McapWriter(file, chunk_size=4096)
+        writer.start('ros2', 'test')
+        odd = writer.register_schema('what?!', 'nothing', b'\xff\x00')
+        others = [
+            writer.register_channel('/none', 'json', 0),
+            writer.register_channel('/odd', 'cdr', odd),
+            writer.register_channel('/joint_states/service', 'protobuf', odd),
+        ]
+        held = {kind: writer.register_schema(kind, 'ros2msg', b'') for kind in (JOINT_STATE, IMU)}
+        channels = {t: writer.register_channel(t, 'cdr', held[k]) for t, k, _, _ in messages[:2]}
+        for topic, _, time, data in messages:
+            writer.add_message(channels[topic], time, data, time)
+            writer.add_message(others[time % 3], time, b'\x05' * 40, time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    bag, batches, facts = read(path)
+    assert rows(batches) == expected(messages)
+    assert bag.findings == facts.findings == ()
+    assert bag.topics['/none'].type == ''
+
+
+@pytest.mark.parametrize('broken', [False, True])
+def test_checksum_of_the_data_section(tmp_path: Path, broken: bool) -> None:  # noqa: FBT001
+    """A file without chunks is protected by the checksum of its data section, if it is right."""
+    path = write_mcap(tmp_path / 'run.mcap', run(20), use_chunking=False, enable_data_crcs=True)
+    if broken:
+        data = path.read_bytes()
+        damaged(path, data.index(b'imu\0') + 40, b'\x99')
+    bag = open_bag(path)
+    assert bag.protected == ('none' if broken else 'all')
+    assert [('checksum' in text) for text in bag.findings] == ([True] if broken else [])
 
 
 def test_missing_path_is_refused(tmp_path: Path) -> None:

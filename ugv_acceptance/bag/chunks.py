@@ -6,7 +6,6 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 import lz4.frame  # type: ignore[import-untyped]
 import numpy as np
@@ -16,7 +15,7 @@ from ugv_acceptance import BadBag
 from ugv_acceptance.bag.gather import LEAD, SLACK, Bytes, Offsets
 from ugv_acceptance.bag.lz4_frame import unlz4
 
-MESSAGE, CHUNK, MESSAGE_INDEX = 5, 6, 7
+FOOTER, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 2, 5, 6, 7, 15
 MAX_CHUNK_BYTES = 64 << 20
 _RECORD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<BQH')
@@ -33,7 +32,7 @@ def _optional(name: str) -> ModuleType | None:
 
 # Only saves time: zlib's CRC-32 costs a third of zstd's decompression, ISA-L's a thirtieth.
 _isal = _optional('isal.isal_zlib')
-crc32: Callable[[Any], int] = _isal.crc32 if _isal else zlib.crc32
+crc32: Callable[..., int] = _isal.crc32 if _isal else zlib.crc32
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +172,7 @@ def walk(data: memoryview, *, chunked: bool = True) -> Walked:
                 found[channel] = [pos]
         else:
             others.append((opcode, pos + 9, length))
-            if opcode == 2 and not chunked:
+            if opcode == FOOTER and not chunked:
                 pos += 9 + length
                 break
         pos += 9 + length

@@ -56,13 +56,17 @@ class Piece:
 
 @dataclass(slots=True)
 class McapIndex:
-    """Channels and pieces of one file; `counts` messages a channel id, `claimed` by whom."""
+    """Channels and pieces of one file; `counts` messages a channel id.
+
+    `protected` says that a checksum of the whole data section was there and right, which is only
+    looked at where the file is scanned anyway.
+    """
 
     size: int
     channels: dict[int, Channel] = field(default_factory=dict)
     pieces: list[Piece] = field(default_factory=list)
     counts: dict[int, int] = field(default_factory=dict)
-    scanned: bool = False
+    protected: bool = False
     salvaged: str | None = None
     findings: list[str] = field(default_factory=list)
 

@@ -203,8 +203,12 @@ def _topics(members: Iterable[Member]) -> tuple[dict[str, Topic], list[str]]:
 
 
 def _protected(members: Iterable[Member]) -> str:
-    pieces = [piece for m in members if isinstance(m.index, McapIndex) for piece in m.index.pieces]
-    guarded = [bool(piece.head and piece.head.crc) for piece in pieces]
+    guarded = [
+        m.index.protected or bool(piece.head and piece.head.crc)
+        for m in members
+        if isinstance(m.index, McapIndex)
+        for piece in m.index.pieces
+    ]
     if not any(guarded):
         return 'none'
     return 'all' if all(guarded) else 'part'

@@ -8,11 +8,14 @@ import numpy as np
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.chunks import (
     CHUNK,
+    DATA_END,
+    FOOTER,
     HEAD_BYTES,
     MAX_CHUNK_BYTES,
     Buffers,
     Walked,
     chunk_head,
+    crc32,
     log_times,
     walk,
 )
@@ -44,7 +47,7 @@ class _Scan:
         self.file = file
         self.max_chunk_bytes = max_chunk_bytes
         self.size = os.fstat(file.fileno()).st_size
-        self.index = McapIndex(self.size, scanned=True)
+        self.index = McapIndex(self.size)
         self.schemas: dict[int, str] = {}
         self.buffers = Buffers()
         self.ended = False
@@ -121,8 +124,27 @@ class _Scan:
         times = self._take(data[:size], walked)
         if walked.messages:
             self.index.pieces.append(Piece(pos, walked.stop, *times))
-        self.ended = any(opcode in (2, 15) for opcode, _, _ in walked.others)
+        self._end(pos, data, walked)
         return pos + walked.stop if walked.stop else None
+
+    def _end(self, pos: int, data: Bytes, walked: Walked) -> None:
+        """Note the end of the data section and check its checksum, if it has one."""
+        for opcode, at, size in walked.others:
+            if opcode == DATA_END and size >= 4:
+                crc = int.from_bytes(data[at : at + 4].tobytes(), 'little')
+                self.index.protected = bool(crc) and crc == self._crc(pos + at - 9)
+                if crc and not self.index.protected:
+                    self.index.findings.append(
+                        'the checksum (CRC-32) of its data section does not match: '
+                        'any of its messages may be damaged'
+                    )
+            self.ended = self.ended or opcode in (FOOTER, DATA_END)
+
+    def _crc(self, size: int) -> int:
+        crc = 0
+        for pos in range(0, size, _BLOCK):
+            crc = crc32(pread(self.file, pos, min(_BLOCK, size - pos)), crc)
+        return crc
 
     def _take(self, data: Bytes, walked: Walked) -> tuple[int, int]:
         """Note channels and counts; first and last log time."""
