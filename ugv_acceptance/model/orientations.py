@@ -3,7 +3,11 @@
 import math
 from dataclasses import dataclass
 
-from ugv_acceptance.model.robot import Vector
+import numpy as np
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.robot import Robot, Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,3 +39,31 @@ def gravity_of(orientation: str, tilt: float, size: float = 9.81) -> Vector:
         return (0.0, 0.0, -size)
     low = size * math.sin(tilt)
     return (low * math.cos(heading), low * math.sin(heading), -size * math.cos(tilt))
+
+
+def grounding_angle(robot: Robot, joint: str) -> float:
+    """Return the angle (rad, nearest 0) at which contacts that `joint` moves reach the tracks' ground.
+
+    This is how flippers are put forward on the ground. Raises BadConfig where none does.
+    """
+    mechanics, k = mechanics_of(robot), robot.joint_names.index(joint)
+    nodes = np.array([0.0, 1.0, -1.0]) * 2.0 * math.pi / 3.0
+    heights = []
+    for node in nodes:
+        q = [0.0] * len(robot.joint_names)
+        q[k] = float(node)
+        posture = posture_of(mechanics, q, 0.0, (0.0, 0.0, 0.0))
+        heights.append([float(point[2]) for point in posture.contacts])
+    # z = c0 + c1 cos q + c2 sin q, told by three angles.
+    c0, c1, c2 = np.linalg.solve(
+        np.stack([np.ones(3), np.cos(nodes), np.sin(nodes)], axis=1), np.array(heights)
+    )
+    radius, phase = np.hypot(c1, c2), np.arctan2(c2, c1)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        spread = np.arccos((robot.ground - c0) / np.where(radius > 1e-9, radius, np.nan))
+    roots = np.concatenate([phase + spread, phase - spread])
+    roots = (roots + math.pi) % (2.0 * math.pi) - math.pi
+    roots = roots[np.isfinite(roots)]
+    if roots.size == 0:
+        raise BadConfig(f'joint {joint}: expected it to bring a contact to the ground, none reaches it')
+    return float(roots[np.abs(roots).argmin()])

@@ -200,3 +200,16 @@ def as_json(rows: list[Row], figures: list[str]) -> dict[str, Any]:
 
 def _range(ends: np.ndarray) -> list[float]:
     return [float(ends.min() * 1e3), float(ends.max() * 1e3)]
+
+
+def ideal_row() -> Row:
+    """Return what the mid-link model, without any error at rest, gives for Table 2's last cell."""
+    f = table_2(0.0, 0.0)[-1, 0]
+    return Row(
+        'Table 2, ideal model',
+        'F of joint 1 at 180°/s, centres of gravity at mid-link',
+        '163.9',
+        f'{f:.3g}',
+        False,
+        'F = 180⁴: without offsets the reference error is nearly zero',
+    )

@@ -18,7 +18,7 @@ COLOURS = ('#ffffff', '#fff0c2', '#e7a9a0')
 HATCHES = ('', '..', '////')
 WORDS = ('safe', 'caution', 'failure')
 
-STYLE = {
+STYLE: Any = {
     'svg.hashsalt': 'ugv_acceptance',
     'svg.fonttype': 'path',
     'font.size': 9.0,
@@ -41,7 +41,7 @@ class Levels:
 
 def figure(width: float, height: float) -> Figure:
     """Return an empty figure (inches) drawn without a display."""
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+    with mpl.rc_context(STYLE):
         made = Figure(figsize=(width, height), layout='constrained')
         FigureCanvasAgg(made)
     return made
@@ -77,18 +77,25 @@ def degree_axes(axes: Any, x_name: str, y_name: str, step: float = 90.0) -> None
         axis.set_label_text(name)
 
 
-def svg_of(made: Figure) -> str:
-    """Return the figure as an <svg> element; the same figure gives the same text."""
+def svg_of(made: Figure, name: str = 'map') -> str:
+    """Return the figure as an <svg> element; the same figure and name give the same text.
+
+    The name is in the ids of its clip paths and hatches, so that several fit on one page.
+    """
     target = io.StringIO()
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+    style: Any = {**STYLE, 'svg.hashsalt': f'ugv_acceptance {name}'}
+    with mpl.rc_context(style):
         made.savefig(target, format='svg', metadata={'Date': None})
     text = target.getvalue()
+    # Groups are numbered from 1 in every figure.
+    text = text.replace('id="', f'id="{name}-').replace('url(#', f'url(#{name}-')
+    text = text.replace('xlink:href="#', f'xlink:href="#{name}-')
     return text[text.index('<svg') :]
 
 
 def png_of(made: Figure, dpi: int = 150) -> bytes:
     """Return the figure as a PNG file's bytes."""
     target = io.BytesIO()
-    with mpl.rc_context(STYLE):  # type: ignore[arg-type]  # keys are checked by matplotlib
+    with mpl.rc_context(STYLE):
         made.savefig(target, format='png', dpi=dpi, metadata={'Software': None})
     return target.getvalue()

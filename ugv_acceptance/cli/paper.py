@@ -1,0 +1,79 @@
+"""`ugv-acceptance paper`: every number, table and figure of the paper, computed again."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ugv_acceptance.config import Config
+    from ugv_acceptance.report.paper import Subject
+
+
+def paper(
+    out: Annotated[Path, typer.Option(help='Folder for paper.html and paper.json.')] = Path('paper'),
+    config: Annotated[
+        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
+    ] = None,
+    simulate: Annotated[
+        bool, typer.Option(help='Run the arm in MuJoCo beside the closed form.')
+    ] = True,
+    truth: Annotated[
+        int, typer.Option(help='Random cases in which MuJoCo decides whether the robot tips.')
+    ] = 0,
+) -> None:
+    """Compute the paper again and write it as a page and as JSON; print the table of matches.
+
+    \b
+    Examples:
+      ugv-acceptance paper
+      ugv-acceptance paper --out /tmp/paper --truth 500
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    import json
+
+    from rich.console import Console
+    from rich.progress import track
+
+    from ugv_acceptance.config import load
+    from ugv_acceptance.report.page import draw, render
+    from ugv_acceptance.report.paper import SECTIONS
+    from ugv_acceptance.report.paper_numbers import as_json, summary
+
+    loaded = load(config)
+    console = Console(stderr=True)
+    subject = _subject(loaded, simulate, truth, console)
+    sections, extra = [], {}
+    for build in track(SECTIONS.values(), 'Computing', console=console):
+        section, more = build(subject)
+        sections.append(section)
+        extra |= more
+    out.mkdir(parents=True, exist_ok=True)
+    drawn = draw(sections)
+    rows = [row for section in sections for row in section.rows]
+    document = as_json(rows, [f'{name}.svg' for name in drawn]) | extra
+    (out / 'paper.html').write_text(render(loaded.name, sections, drawn), encoding='utf-8')
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    (out / 'paper.json').write_text(text + '\n', encoding='utf-8')
+    for name, svg in drawn.items():
+        (out / f'{name}.svg').write_text(svg, encoding='utf-8')
+    for place, count in summary(rows).items():
+        typer.echo(f'{place:34}{count["matches"]:3} of {count["of"]:2} match')
+    for row in rows:
+        if not row.match:
+            typer.echo(f'  differs: {row.what}: paper {row.paper}, ours {row.ours}: {row.reason}')
+    typer.echo(f'Wrote {out / "paper.html"} and {out / "paper.json"}.')
+
+
+def _subject(loaded: 'Config', simulate: bool, truth: int, console: object) -> 'Subject':
+    import numpy as np
+
+    from ugv_acceptance.report.paper import Subject
+
+    robot, limits = loaded.settings.robot, np.array(loaded.settings.limits.torque)
+    if not simulate:
+        return Subject(robot, limits)
+    from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_truth
+
+    torques, f_values = simulated_arm()
+    lines = simulated_truth(robot, truth, console) if truth else ()
+    return Subject(robot, limits, torques, f_values, lines)

@@ -1,0 +1,47 @@
+"""What the paper used ADAMS for: the arm's sweep and the tipping robot, by MuJoCo."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
+from ugv_acceptance.model.planar import paper_arm
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.model.validity import PAPER_SPEEDS_DEG_S, mean_square, paper_sweep
+from ugv_acceptance.report.arm_figures import DOWN, Simulated
+
+
+def simulated_arm() -> tuple[Simulated, Floats]:
+    """Return the torques of Figure 4's sweep and F (8, 2) of Table 2, both from MuJoCo."""
+    from ugv_acceptance.simulation.sweep import sweep
+
+    arm, start = paper_arm(OFFSET1, OFFSET2), (math.pi / 6.0, 0.0)
+    static = static_torque(paper_arm(), paper_sweep(math.pi / 6.0), DOWN)
+    runs = {
+        speed: sweep(arm, start, 'theta2', math.radians(speed)).effort
+        for speed in PAPER_SPEEDS_DEG_S
+    }
+    squares = np.array([mean_square(effort - static) for effort in runs.values()])
+    return Simulated(paper_sweep(math.pi / 6.0)[:, 1], runs[7.2]), squares / squares[0]
+
+
+def simulated_truth(robot: Robot, count: int, console: Any) -> list[list[str]]:
+    """Return the confusion matrix of the rollover map against simulated tipping, as a table."""
+    from ugv_acceptance.simulation.tip_cases import judge_all, random_cases
+
+    with console.status(f'Tilting the plane under the simulated robot, {count} cases'):
+        judged = judge_all(robot, random_cases(robot, count, seed=1))
+    known = [case for case in judged if math.isfinite(case.margin)]
+    tips = [(case.margin <= 0.0, case.truth.tilt <= case.case.tilt) for case in known]
+    errors = np.degrees([abs(case.error) for case in judged if math.isfinite(case.error)])
+    worst = f'{errors.max():.2f}°' if len(errors) else 'none'
+    half = f'{np.median(errors):.2f}°' if len(errors) else 'none'
+    return [
+        [f'{len(known)} random cases', 'MuJoCo: stands', 'MuJoCo: tips'],
+        ['map: stands', str(tips.count((False, False))), str(tips.count((False, True)))],
+        ['map: tips', str(tips.count((True, False))), str(tips.count((True, True)))],
+        ['tilt at which it tips, map less MuJoCo', f'median {half}', f'largest {worst}'],
+    ]
