@@ -1,0 +1,163 @@
+"""Recordings of every storage format and compression give the same messages."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zstandard
+from bag.bag_cases import (
+    IMU,
+    JOINT_STATE,
+    STORE,
+    expected,
+    rows,
+    run,
+)
+from bag.recordings import read, write_folder, write_with
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from ugv_acceptance.bag.reader import open_bag
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+@pytest.mark.parametrize('metadata', [True, False])
+def test_rosbag2_folders(tmp_path: Path, storage: StoragePlugin, metadata: bool) -> None:  # noqa: FBT001
+    """A folder of either storage format is read, with or without its metadata.yaml."""
+    messages = run(40)
+    folder = write_folder(tmp_path / 'bag', messages, storage)
+    if not metadata:
+        (folder / 'metadata.yaml').unlink()
+    bag, batches, facts = read(folder)
+    assert rows(batches) == expected(messages)
+    assert facts.findings == ()
+    assert bag.findings == (() if metadata else ('bag: no metadata.yaml',))
+    assert bag.duration_s == pytest.approx(0.391)
+
+
+def test_many_sqlite_messages_come_in_batches(tmp_path: Path) -> None:
+    """An SQLite bag is handed out in blocks, not as one."""
+    messages = run(3000, rate=400)
+    _, batches, _ = read(write_folder(tmp_path / 'bag', messages, StoragePlugin.SQLITE3))
+    assert len(batches) > 1
+    assert rows(batches) == expected(messages)
+
+
+def test_counts_in_metadata_are_compared(tmp_path: Path) -> None:
+    """A metadata.yaml that counts otherwise than the file is a finding."""
+    folder = write_folder(tmp_path / 'bag', run(10), StoragePlugin.MCAP)
+    text = (folder / 'metadata.yaml').read_text()
+    (folder / 'metadata.yaml').write_text(text.replace('message_count: 10', 'message_count: 12', 1))
+    bag = open_bag(folder)
+    assert any('metadata.yaml says' in text for text in bag.findings)
+
+
+@pytest.mark.parametrize('text', ['', ':', '[1, 2', 'rosbag2_bagfile_information: 3', '\x00'])
+def test_broken_metadata_is_a_finding(tmp_path: Path, text: str) -> None:
+    """Without usable metadata the files themselves are read."""
+    messages = run(10)
+    folder = write_folder(tmp_path / 'bag', messages, StoragePlugin.MCAP)
+    (folder / 'metadata.yaml').write_text(text)
+    bag, batches, _ = read(folder)
+    assert rows(batches) == expected(messages)
+    assert 'not the metadata' in bag.findings[0]
+
+
+def test_missing_part_is_a_finding(tmp_path: Path) -> None:
+    """A file that metadata.yaml lists and that is not there is named."""
+    folder = write_folder(tmp_path / 'bag', run(10), StoragePlugin.MCAP)
+    text = (folder / 'metadata.yaml').read_text()
+    (folder / 'metadata.yaml').write_text(
+        text.replace('- bag.mcap', '- bag.mcap\n  - gone.mcap', 1)
+    )
+    assert any("'gone.mcap' is missing" in text for text in open_bag(folder).findings)
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_file_compression(tmp_path: Path, storage: StoragePlugin) -> None:
+    """A file that was compressed as a whole is read like the file itself."""
+    messages = run(30)
+    folder = write_folder(tmp_path / 'bag', messages, storage)
+    path = next(p for p in folder.iterdir() if p.suffix in {'.mcap', '.db3'})
+    packed = path.with_name(path.name + '.zstd')
+    packed.write_bytes(zstandard.ZstdCompressor().compress(path.read_bytes()))
+    _, batches, _ = read(packed)
+    assert rows(batches) == expected(messages)
+
+
+@pytest.mark.parametrize('compressed', [False, True])
+def test_ros1_bags(tmp_path: Path, compressed: bool) -> None:  # noqa: FBT001
+    """A ROS 1 bag gives the same numbers as the ROS 2 messages it was made from."""
+    messages = run(40)
+    store = get_typestore(Stores.ROS1_NOETIC)
+    writer = Ros1Writer(tmp_path / 'run.bag')
+    if compressed:
+        writer.set_compression(Ros1Writer.CompressionFormat.BZ2)
+    with writer:
+        held: dict[str, Any] = {}
+        for topic, kind, time, data in messages:
+            if topic not in held:
+                held[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(held[topic], time, bytes(STORE.cdr_to_ros1(data, kind)))
+    bag, batches, facts = read(tmp_path / 'run.bag')
+    assert rows(batches) == expected(messages)
+    assert facts.findings == ()
+    assert bag.end_ns == messages[-1][2]
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_message_compression(tmp_path: Path, storage: StoragePlugin) -> None:
+    """A folder whose messages were compressed one by one is read, of either storage format."""
+    messages = run(20)
+    folder = tmp_path / 'bag'
+    writer = Ros2Writer(folder, version=9, storage_plugin=storage)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    _, batches, facts = read(write_with(writer, folder, messages))
+    assert rows(batches) == expected(messages)
+    assert facts.findings == ()
+
+
+def test_mcap_of_ros1_messages(tmp_path: Path) -> None:
+    """An MCAP converted from ROS 1, with its packing and type names, gives the same numbers."""
+    messages = run(20)
+    path = tmp_path / 'run.mcap'
+    with path.open('wb') as file:
+        writer = McapWriter(file)
+        writer.start('ros1', 'test')
+        channels = {}
+        for topic, kind, _, _ in messages[:2]:
+            schema = writer.register_schema(kind.replace('/msg/', '/'), 'ros1msg', b'')
+            channels[topic] = writer.register_channel(topic, 'ros1', schema)
+        for topic, kind, time, data in messages:
+            writer.add_message(channels[topic], time, bytes(STORE.cdr_to_ros1(data, kind)), time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    _, batches, _ = read(path)
+    assert rows(batches) == expected(messages)
+
+
+def test_other_channels_do_not_matter(tmp_path: Path) -> None:
+    """Channels without schema, of garbage schemas, of other encodings leave the rest readable."""
+    messages = run(20)
+    path = tmp_path / 'run.mcap'
+    with path.open('wb') as file:
+        writer = McapWriter(file, chunk_size=4096)
+        writer.start('ros2', 'test')
+        odd = writer.register_schema('what?!', 'nothing', b'\xff\x00')
+        others = [
+            writer.register_channel('/none', 'json', 0),
+            writer.register_channel('/odd', 'cdr', odd),
+            writer.register_channel('/joint_states/service', 'protobuf', odd),
+        ]
+        held = {kind: writer.register_schema(kind, 'ros2msg', b'') for kind in (JOINT_STATE, IMU)}
+        channels = {t: writer.register_channel(t, 'cdr', held[k]) for t, k, _, _ in messages[:2]}
+        for topic, _, time, data in messages:
+            writer.add_message(channels[topic], time, data, time)
+            writer.add_message(others[time % 3], time, b'\x05' * 40, time)
+        writer.finish()  # type: ignore[no-untyped-call]
+    bag, batches, facts = read(path)
+    assert rows(batches) == expected(messages)
+    assert bag.findings == facts.findings == ()
+    assert bag.topics['/none'].type == ''
