@@ -32,7 +32,7 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
-    version: bool = typer.Option(  # noqa: ARG001 - acted on by its callback
+    version: bool = typer.Option(
         False, '--version', callback=_version, is_eager=True, help='Print the version and exit.'
     ),
 ) -> None:
@@ -43,7 +43,8 @@ def main() -> None:
     """Run the command line; an error a user can act on is one line and exit code 2."""
     for verb in VERBS:
         module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
-        app.command(verb)(getattr(module, verb.replace('-', '_')))
+        settings = getattr(module, 'CONTEXT', None)
+        app.command(verb, context_settings=settings)(getattr(module, verb.replace('-', '_')))
     try:
         app()
     except AcceptanceError as error:

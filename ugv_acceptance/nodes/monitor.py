@@ -33,13 +33,15 @@ from ugv_acceptance.nodes.supervision import diagnostics_of, unavailable
 NAME = 'acceptance_monitor'
 # Parameters that are read on configuration or activation and stay as they are until the next.
 AT_REST = ('config', 'urdf', 'depth')
+# Takes (alert or verdict, what is said).
+Listener = Callable[[str, Status], None]
 
 
 class Monitor(LifecycleNode):
-    """The monitor. `listener(kind, text)` is called with every alert line, for a console."""
+    """The monitor. `listener` hears all verdicts and changes of alerts, for a console."""
 
     def __init__(
-        self, listener: Callable[[str, Status], None] = lambda _kind, _status: None, **node: Any
+        self, listener: Listener = lambda _kind, _status: None, **node: Any
     ) -> None:
         super().__init__(NAME, **node)
         self.listener = listener
@@ -56,8 +58,8 @@ class Monitor(LifecycleNode):
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._take_parameters)
         # Steady: a frozen /clock must not silence the diagnostics.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0, self._every_second, clock=self._steady)
+        self.steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0, self._every_second, clock=self.steady)
         self.create_service(Trigger, '~/acknowledge', self._acknowledge)
         self.create_service(Trigger, '~/reset', self._reset)
         self.say()
@@ -139,7 +141,7 @@ class Monitor(LifecycleNode):
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
-        self._tick = self.create_timer(tick, self._on_tick, clock=self._steady)
+        self._tick = self.create_timer(tick, self._on_tick, clock=self.steady)
 
     def _new_session(self, settings: Settings) -> Session:
         simulated = bool(self._value('use_sim_time'))
@@ -276,6 +278,15 @@ class Monitor(LifecycleNode):
         if self._margins is not None and self._settings is not None:
             self._margins.period = int(1e9 / rate) if rate > 0 else 0
             self._margins.limits = self._settings.limits.torque
+
+
+def build(
+    config: str | None, urdf: str | None, listener: Listener
+) -> Monitor:
+    """Return a monitor of a robot; None: what the ROS arguments say."""
+    given = {'config': config, 'urdf': urdf}
+    overrides = [Parameter(name, value=value) for name, value in given.items() if value]
+    return Monitor(listener, parameter_overrides=overrides)
 
 
 def main(args: list[str] | None = None) -> None:

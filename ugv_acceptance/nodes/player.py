@@ -134,6 +134,11 @@ def restamped(data: bytes, shift: int) -> bytes:
     return data[:4] + struct.pack(f'{order}iI', moved // _NS, moved % _NS) + data[12:]
 
 
+def player_of(play: Play) -> Player:
+    """Return a player on a node of its own; rclpy must be initialised."""
+    return Player(Node('bag_player'), play)
+
+
 def message_type(name: str) -> Any:  # noqa: ANN401 - a message class
     """Return the class of a type such as sensor_msgs/msg/Imu, None where it is not installed."""
     package, _, kind = name.partition('/msg/')

@@ -55,7 +55,7 @@ def verdict(
     left = what_is_left(margins, settings) if margins else 'margins not known'
     values: dict[str, object] = {'left': left, 'alerts_active': len(active)}
     if active:
-        first = max(active, key=lambda a: (a.rule.level, not follower.acknowledged(a)))
+        first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
         more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
         text = f'{faults.sentence(first, settings)}{more}; {left}; {what_to_do(first.rule.code)}'
         values |= {
@@ -73,6 +73,11 @@ def verdict(
         values |= {'code': last.rule.code, 'subject': last.rule.subject, 'do': 'acknowledge'}
         return Status(max(level, WARN), '', text, values)
     return Status(OK, '', f'all margins kept: {left}', values)
+
+
+def _severity(alert: Alert) -> tuple[int, bool]:
+    """At the same level a robot that tips over comes before a motor that gives way."""
+    return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
 
 
 def alert_status(alert: Alert, state: str, settings: Settings, faults: Faults) -> Status:

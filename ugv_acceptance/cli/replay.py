@@ -1,0 +1,70 @@
+"""`ugv-acceptance replay`: publish a recording on its topics."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+
+if TYPE_CHECKING:
+    from ugv_acceptance.nodes.player import Player
+    from ugv_acceptance.nodes.running import Stop
+
+__all__ = ['CONTEXT', 'replay']
+
+
+def replay(
+    context: typer.Context,
+    bag: Annotated[Path, typer.Argument(help='rosbag2 folder, .mcap, .db3 or ROS 1 .bag file')],
+    rate: Annotated[float, typer.Option(help='Speed, as a multiple of real time.')] = 1.0,
+    loop: Annotated[bool, typer.Option('--loop', help='Start again at the end.')] = False,
+    topics: Annotated[
+        list[str] | None, typer.Option(help='A topic to play; may be given several times.')
+    ] = None,
+    clock: Annotated[bool, typer.Option('--clock', help='Publish /clock.')] = False,
+    restamp: Annotated[
+        bool, typer.Option('--restamp', help='Move header stamps to the time of replay.')
+    ] = False,
+) -> None:
+    """Publish a recording byte for byte, with its timing and quality of service.
+
+    A live monitor compares header stamps with its clock: play with --restamp, or with --clock and
+    use_sim_time in the monitor.
+
+    \b
+    Examples:
+      ugv-acceptance replay bags/packbot_fail --restamp
+      ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data --topics /joint_states
+      ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.nodes.player import Play, player_of
+    from ugv_acceptance.nodes.running import ros
+
+    play = Play(bag, rate, loop, tuple(topics or ()), clock, restamp)
+    with ros(ros_arguments(context)) as stop:
+        player = player_of(play)
+        for topic, reason in player.skipped.items():
+            typer.echo(f'{topic} is not played: {reason}', err=True)
+        player.wait_for_subscribers(stop)
+        _play(player, stop)
+        player.node.destroy_node()
+    typer.echo(f'{player.published} messages of {len(player.publishers)} topics published')
+
+
+def _play(player: 'Player', stop: 'Stop') -> None:
+    import sys
+
+    from rich.console import Console
+    from rich.progress import Progress, TextColumn
+
+    console = Console(file=sys.stderr)
+    with Progress(
+        *Progress.get_default_columns(),
+        TextColumn('{task.completed:.1f} of {task.total:.1f} s'),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task('playing', total=player.bag.duration_s)
+        player.run(stop, lambda seconds: bar.update(task, completed=seconds))

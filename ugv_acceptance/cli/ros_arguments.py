@@ -1,0 +1,15 @@
+"""What stands behind --ros-args on the command line is handed to ROS: remaps, parameters, log levels."""
+
+import typer
+
+# For the verbs that run nodes: what typer does not know is kept for ROS.
+CONTEXT = {'allow_extra_args': True, 'ignore_unknown_options': True}
+
+
+def ros_arguments(context: typer.Context) -> list[str]:
+    """Return the arguments for ROS; a usage error where one does not stand behind --ros-args."""
+    if context.args and context.args[0] != '--ros-args':
+        raise typer.BadParameter(
+            f'got {context.args[0]!r}, which is no option; what is for ROS stands behind --ros-args'
+        )
+    return list(context.args)
