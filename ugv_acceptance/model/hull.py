@@ -7,7 +7,7 @@ one sample is taken by all others it fits.
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache, reduce
-from itertools import chain, combinations, pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -108,51 +108,58 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
 
 
 @lru_cache(maxsize=16)
-def _triples_kernel(count: int) -> Kernel:
-    """Return, for each triple of `count` points, three turns about a place and a height times area.
+def _turns_kernel(count: int) -> Kernel:
+    """Return the turns of all pairs of `count` points about a place, from x and y of all."""
 
-    Inputs are the points' coordinates and the place's x and y. The place lies inside the triple
-    where the turns have one sign; the triple's height there is the fourth number over their sum.
-    """
+    def formula(*inputs: Scalar) -> list[Scalar]:
+        points = [inputs[2 * k : 2 * k + 2] for k in range(count)]
+        return [_turn(a, b, inputs[2 * count :]) for a, b in combinations(points, 2)]
 
-    def formula(*inputs: Scalar) -> list[Any]:
-        points = [inputs[3 * k : 3 * k + 3] for k in range(count)]
-        place = inputs[3 * count :]
-        numbered = combinations(enumerate(points), 2)
-        turn = {(i, j): _turn(a, b, place) for (i, a), (j, b) in numbered}
-        table = []
-        for i, j, k in combinations(range(count), 3):
-            a, b, c = turn[j, k], -turn[i, k], turn[i, j]
-            table.append((a, b, c, a * points[i][2] + b * points[j][2] + c * points[k][2]))
-        return table
-
-    return compile_kernel(formula, [f'x{k}' for k in range(3 * count + 2)])
+    return compile_kernel(formula, [f'x{k}' for k in range(2 * count + 2)])
 
 
-def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, ...] | None:
+def _turns(points: Values, place: Values) -> dict[tuple[int, int], Values]:
+    flat = [x for point in points for x in point[:2]]
+    turns = _turns_kernel(len(points)).run(*flat, place[0], place[1])
+    return dict(zip(combinations(range(len(points)), 2), turns, strict=True))
+
+
+@lru_cache(maxsize=16)
+def triples(count: int) -> tuple[tuple[int, int, int], ...]:
+    """Return all triples of `count` points, in a fixed order."""
+    return tuple(combinations(range(count), 3))
+
+
+def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, int, int] | None:
     """Return the triple that is lowest under (or over) a place; None where none contains it."""
-    best, lowest = -1, math.inf
-    coordinates = chain.from_iterable(points)
-    table = _triples_kernel(len(points)).one(*coordinates, place[0], place[1])
-    for number, (a, b, c, moment) in enumerate(table):
-        if min(a, b, c) >= 0.0 or max(a, b, c) <= 0.0:
-            area = a + b + c
-            if abs(area) > THIN**2 and moment / area < lowest:
-                best, lowest = number, moment / area
-    return None if best < 0 else list(combinations(range(len(points)), 3))[best]
+    turn, lowest, best = _turns(points, place), math.inf, None
+    for i, j, k in triples(len(points)):
+        a, b, c = turn[j, k], turn[i, k], turn[i, j]
+        if (a >= 0.0 >= b and c >= 0.0) or (a <= 0.0 <= b and c <= 0.0):
+            area = a - b + c
+            if abs(area) > THIN**2:
+                height = (a * points[i][2] - b * points[j][2] + c * points[k][2]) / area
+                if height < lowest:
+                    lowest, best = height, (i, j, k)
+    return best
 
 
 def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64]:
     """Return the number of each sample's lowest triple, as `triple_under`; -1: there is none."""
     best, lowest = np.full(count, -1), np.full(count, np.inf)
-    coordinates = chain.from_iterable(points)
-    table = _triples_kernel(len(points)).many(*coordinates, place[0], place[1])
-    for number, (a, b, c, moment) in enumerate(table):
-        area = a + b + c
-        inside = np.minimum(np.minimum(a, b), c) >= 0.0
-        inside = inside | (np.maximum(np.maximum(a, b), c) <= 0.0)
+    turn = _turns(points, place)
+    left = {pair: np.asarray(t) >= 0.0 for pair, t in turn.items()}
+    right = {pair: np.asarray(t) <= 0.0 for pair, t in turn.items()}
+    for number, (i, j, k) in enumerate(triples(len(points))):
+        inside = left[j, k] & right[i, k] & left[i, j]
+        inside = inside | (right[j, k] & left[i, k] & right[i, j])
+        if not inside.any():
+            continue
+        a, b, c = turn[j, k], turn[i, k], turn[i, j]
+        area = a - b + c
         inside = inside & (abs(area) > THIN**2)
-        height = np.divide(moment, area, out=np.full(count, np.inf), where=inside)
+        height = a * points[i][2] - b * points[j][2] + c * points[k][2]
+        height = np.divide(height, area, out=np.full(count, np.inf), where=inside)
         best[height < lowest] = number
         lowest = np.minimum(lowest, height)
     return best

@@ -9,10 +9,11 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from itertools import chain, combinations
+from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.model.hull import (
     Cycle,
@@ -23,6 +24,7 @@ from ugv_acceptance.model.hull import (
     hulls,
     pairs,
     triple_under,
+    triples,
     triples_under,
 )
 from ugv_acceptance.model.robot import Robot
@@ -84,10 +86,11 @@ def supports_of(
         if regime == 2:
             parts: Iterable[tuple[Support, Rows]] = [(_UNKNOWN, ALL)]
         elif regime == 1:
-            parts = _faces(tolerance, some, at, size)
+            parts = _lying(some, _faces(tolerance, some, at, size), raised=True)
         else:
-            heights = [z - robot.ground for _, _, z in some]
-            parts = _lying(tolerance, some, heights, size, raised=False)
+            pattern = _pattern([z - robot.ground for _, _, z in some], tolerance)
+            whole = np.broadcast_to(np.asarray(pattern, dtype=np.int64), size)
+            parts = _lying(some, whole, raised=False)
         for support, part in parts:
             found.setdefault(support, []).append(inner(rows, part))
     return [
@@ -101,32 +104,37 @@ def _distinct(values: Sequence[Any]) -> list[Any]:
     return list({id(x): x for x in values}.values())
 
 
-def _lying(
-    tolerance: float, points: Sequence[Any], heights: Sequence[Any], count: int, *, raised: bool
-) -> Iterator[tuple[Support, Rows]]:
-    """Return the supports on all points that are no higher than `tolerance`, with their rows."""
-    code: Any = sum(((h <= tolerance) * (1 << k) for k, h in enumerate(heights)), 0)
-    for pattern, rows, size in groups(np.broadcast_to(np.asarray(code, dtype=np.int64), count)):
-        active = tuple(k for k in range(len(points)) if pattern >> k & 1)
-        for cycle, part in hulls(pick(tuple(points), rows), active, size):
-            yield Support(cycle, len(active), raised), inner(rows, part)
+def _pattern(heights: Sequence[Any], tolerance: float) -> Values:
+    """Return the points that are no higher than `tolerance` as the bits of a number."""
+    return sum(((h <= tolerance) * (1 << k) for k, h in enumerate(heights)), 0)
 
 
-def _faces(
-    tolerance: float, points: Values, cog: Values, count: int
-) -> Iterator[tuple[Support, Rows]]:
-    """Return the faces of the lower hull under (or nearest to) the centre of gravity."""
-    triples = list(combinations(range(len(points)), 3))
+def _faces(tolerance: float, points: Values, cog: Values, count: int) -> NDArray[np.int64]:
+    """Return each sample's points on the face of the lower hull under (or nearest to) the cog.
+
+    As bits; -1 where the points have no such face.
+    """
     chosen = triples_under(points, cog, count)
     outside = np.flatnonzero(chosen < 0)
-    if outside.size and triples:
+    if outside.size and len(points) >= 3:
         some, centre = pick((points, cog), outside)
         chosen[outside] = triples_under(some, drawn_in(some, centre), outside.size)
-    for number, rows, size in groups(chosen):
-        if number < 0:
-            yield Support((), len(points), raised=True), rows
+    patterns = np.full(count, -1)
+    for number, rows, _ in groups(chosen):
+        if number >= 0:
+            triple = triples(len(points))[number]
+            patterns[rows] = _pattern(heights_above(pick(points, rows), *triple), tolerance)
+    return patterns
+
+
+def _lying(
+    points: Values, patterns: NDArray[np.int64], *, raised: bool
+) -> Iterator[tuple[Support, Rows]]:
+    """Return the supports on the points whose bits are set, with their rows."""
+    for pattern, rows, size in groups(patterns):
+        if pattern < 0:
+            yield Support((), len(points), raised), rows
             continue
-        some = pick(points, rows)
-        heights = heights_above(some, *triples[number])
-        for support, part in _lying(tolerance, some, heights, size, raised=True):
-            yield support, inner(rows, part)
+        active = tuple(k for k in range(len(points)) if pattern >> k & 1)
+        for cycle, part in hulls(pick(points, rows), active, size):
+            yield Support(cycle, len(active), raised), inner(rows, part)
