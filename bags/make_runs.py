@@ -2,7 +2,6 @@
 
 The same seed gives the same messages on the same version of MuJoCo.
 """
-# ruff: noqa: INP001, T201 (a script; it says what it made)
 
 import argparse
 import shutil

@@ -7,6 +7,7 @@ from multiprocessing import get_context
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
@@ -112,12 +113,20 @@ def expected_rest(robot: Robot, case: TipCase) -> Floats:
     return np.array([x, np.cross(up, x), up])
 
 
+def least_angle(
+    robot: Robot, q: ArrayLike, gravity: ArrayLike, payload: Payload | None = None
+) -> Floats:
+    """Return the force-angle (rad) of the weakest side, shape (...), for `q` (..., j)."""
+    angles = stability(robot, q, gravity, payload).angle
+    least: Floats = np.min(np.array(angles, dtype=np.float64), axis=0)
+    return least
+
+
 def model_tilt(robot: Robot, case: TipCase, rest: Floats) -> tuple[float, float]:
     """Return the tilt (rad) at which the model says that it tips, and its margin on the slope."""
     tilts = np.append(np.arange(0.0, LAST, GRID), case.tilt)
     down = np.array([gravity_on_slope(robot.gravity, t, case.heading) for t in tilts]) @ rest
-    angles = stability(robot, np.tile(case.q, (len(tilts), 1)), down, case.payload).angle
-    least: Floats = np.min(np.array(angles, dtype=np.float64), axis=0)
+    least = least_angle(robot, np.tile(case.q, (len(tilts), 1)), down, case.payload)
     margin, least = float(least[-1]), least[:-1]
     if not np.isfinite(margin):
         return float('nan'), margin
