@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from ugv_acceptance.config import load
-from ugv_acceptance.model.stability import stability
 from ugv_acceptance.simulation.arm_motion import (
     ArmMotion,
     path_of,
@@ -12,6 +11,7 @@ from ugv_acceptance.simulation.arm_motion import (
     static_margin,
     tips,
 )
+from ugv_acceptance.simulation.tip_cases import least_angle
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
 ARM = ('turret_joint', 'shoulder_joint', 'elbow_joint')
@@ -47,8 +47,7 @@ def test_the_static_margin_is_the_least_on_the_way(motions: list[ArmMotion]) -> 
     robot = load().settings.robot
     for motion in motions:
         gravity = gravity_on_slope(9.81, *motion.slope)
-        angles = [
-            np.min(stability(robot, q, gravity, motion.payload).angle)
-            for q in path_of(robot, motion)
+        left = [
+            float(least_angle(robot, q, gravity, motion.payload)) for q in path_of(robot, motion)
         ]
-        assert static_margin(robot, motion) == pytest.approx(min(angles), abs=1e-12)
+        assert static_margin(robot, motion) == pytest.approx(min(left), abs=1e-12)

@@ -12,14 +12,14 @@ from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Link, Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.support import support_of
-from ugv_acceptance.simulation.oracle import BUILD, attitude, rigid, settled, tip_truth, turn
+from ugv_acceptance.simulation.oracle import BUILD, Truth, attitude, rigid, settled, tip_truth, turn
 from ugv_acceptance.simulation.tip_cases import (
     Judged,
     TipCase,
-    Truth,
     confusion,
     judge,
     judge_all,
+    least_angle,
     random_cases,
 )
 from ugv_acceptance.simulation.vehicle import gravity_on_slope, vehicle_of
@@ -89,7 +89,7 @@ def _standing_robot(rng: np.random.Generator) -> tuple[Robot, list[float]]:
     while True:
         robot = random_robot(rng, 5)
         q = rng.uniform(-1.0, 1.0, len(robot.joint_names)).tolist()
-        least = np.degrees(np.min(stability(robot, q, LEVEL).angle))
+        least = np.degrees(least_angle(robot, q, LEVEL))
         if 5.0 < least < 60.0:
             return robot, q
 
@@ -101,8 +101,8 @@ def test_the_energy_margin_is_the_push_it_takes(seed: int, energy: float, *, tip
     robot = load().settings.robot
     case = random_cases(robot, 8, seed=3)[seed]
     robot = rigid(robot, (*case.q[:3], np.pi), Payload(min(case.payload.mass, 1.5)))
-    margins = stability(robot, [], LEVEL, robot.payload)
-    assert _goes_over(robot, energy * float(np.min(margins.energy))) is tips
+    margins = np.array(stability(robot, [], LEVEL, robot.payload).energy, dtype=np.float64)
+    assert _goes_over(robot, energy * float(margins.min())) is tips
 
 
 def _goes_over(robot: Robot, energy: float) -> bool:
@@ -136,9 +136,8 @@ def _weakest_edge(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
         arm = arm - along * (arm @ along)
         return float(np.linalg.norm(arm) - arm[2])
 
-    edges = [
-        (points[i], points[j]) for i, j in zip(polygon, polygon[1:] + polygon[:1], strict=True)
-    ]
+    pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    edges = [(points[i], points[j]) for i, j in pairs]
     start, end = min(edges, key=rise)
     along = (end - start) / np.linalg.norm(end - start)
     return start, along

@@ -32,7 +32,7 @@ def read(folder: Path, topic: str) -> tuple[np.ndarray, list[Any]]:
 
 @pytest.mark.parametrize('name', RUNS)
 def test_every_message_of_a_run_can_be_read(repository: Path, name: str) -> None:
-    """rosbags reads as many messages as each topic has, in less than 1 MB."""
+    """Reading with rosbags gives as many messages as each topic has, in less than 1 MB."""
     folder = repository / 'bags' / name
     with AnyReader([folder]) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}

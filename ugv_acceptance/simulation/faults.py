@@ -1,0 +1,109 @@
+"""Faults a run can be given: their names, what they do, and how they are written on a command line.
+
+A fault is written KIND[:SUBJECT][=AMOUNT][@START[-END]]: frozen-encoder:shoulder_joint@5-9,
+imu-bias=2, dropped:imu=0.3. Times in seconds; without them it lasts the whole run.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.robot import Robot
+
+INPUTS = ('joint_states', 'imu')
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of fault: what it does, whether to a joint, an input or neither, and how much.
+
+    `subject` is joint, input or empty; `low` to `high` bound the amount, whose unit is in `text`.
+    """
+
+    text: str
+    subject: str = ''
+    amount: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+
+
+KINDS: dict[str, Kind] = {
+    'dropped': Kind('a share of the messages is lost', 'input', 0.3, 0.0, 1.0),
+    'late': Kind('messages come late by seconds', 'input', 0.3, 0.0, 60.0),
+    'reordered': Kind('a share of the messages comes after the next ones', 'input', 0.2, 0.0, 1.0),
+    'duplicated': Kind('a share of the messages comes twice', 'input', 0.2, 0.0, 1.0),
+    'dead': Kind('no message at all', 'input'),
+    'nan': Kind('numbers that are none', 'input'),
+    'dead-encoder': Kind('a joint is missing from the messages', 'joint'),
+    'frozen-encoder': Kind('a joint tells the same position for ever', 'joint'),
+    'effort-missing': Kind('no efforts in the joint states'),
+    'imu-bias': Kind('acceleration forward is off by m/s2', '', 2.0, -50.0, 50.0),
+    'wrong-mounting': Kind('the IMU is turned about its z axis by degrees', '', 90.0, -360.0, 360.0),
+    'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
+    'clock-jump': Kind('header stamps are off by seconds', 'input', -5.0, -1e8, 1e8),
+    'heavy-payload': Kind('the load is heavier than declared by a factor', '', 2.0, 0.0, 100.0),
+    'weak-motor': Kind('a motor gives a share of its torque', 'joint', 0.6, 0.0, 1.0),
+}
+# These are in the robot, not in its messages: from the start to the end.
+PHYSICAL = ('heavy-payload', 'weak-motor')
+_FORM = re.compile(
+    r'(?P<kind>[a-z-]+)(:(?P<subject>\w+))?(=(?P<amount>[-+.\de]+))?'
+    r'(@(?P<start>[.\d]+)(-(?P<end>[.\d]+))?)?'
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A fault from `start` until before `end` (s); `subject` is empty where the kind has none.
+
+    A fault of the inputs without a subject is one of both.
+    """
+
+    kind: str
+    subject: str = ''
+    amount: float = 0.0
+    start: float = 0.0
+    end: float = math.inf
+
+    def hits(self, subject: str) -> bool:
+        """Return whether the fault is one of this input or joint."""
+        return self.subject in ('', subject)
+
+
+def fault_of(kind: str, subject: str = '', start: float = 0.0, end: float = math.inf) -> Fault:
+    """Return a fault of a kind with its usual amount."""
+    return Fault(kind, subject, KINDS[kind].amount, start, end)
+
+
+def fault_from(text: str, robot: Robot) -> Fault:
+    """Return the fault a person wrote. Raises BadConfig with what was expected."""
+    match = _FORM.fullmatch(text)
+    if match is None:
+        raise BadConfig(f'fault {text!r}: expected KIND[:SUBJECT][=AMOUNT][@START[-END]]')
+    name, subject = match['kind'], match['subject'] or ''
+    kind = KINDS.get(name)
+    if kind is None:
+        raise BadConfig(f'fault {text!r}: expected one of {", ".join(KINDS)}, got {name}')
+    allowed = {'joint': robot.joint_names, 'input': INPUTS}.get(kind.subject, ())
+    if subject not in ('', *allowed) or (kind.subject == 'joint' and not subject):
+        expected = ', '.join(allowed) or 'no subject'
+        raise BadConfig(f'fault {text!r}: expected {expected} behind the colon, got {subject!r}')
+    amount = _number(text, match['amount'], kind.amount)
+    if not kind.low <= amount <= kind.high:
+        raise BadConfig(
+            f'fault {text!r}: expected an amount from {kind.low:g} to {kind.high:g}, got {amount:g}'
+        )
+    start, end = _number(text, match['start'], 0.0), _number(text, match['end'], math.inf)
+    if not start < end:
+        raise BadConfig(f'fault {text!r}: expected an end after the start, got {start:g}-{end:g}')
+    if name in PHYSICAL and match['start']:
+        raise BadConfig(f'fault {text!r}: expected no times: {name} lasts the whole run')
+    return Fault(name, subject, amount, start, end)
+
+
+def _number(text: str, part: str | None, default: float) -> float:
+    try:
+        return default if part is None else float(part)
+    except ValueError:
+        raise BadConfig(f'fault {text!r}: expected a number, got {part!r}') from None
