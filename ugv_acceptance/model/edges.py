@@ -39,12 +39,14 @@ _NO_EDGE = float('inf')
 class Corners:
     """A support polygon of one robot: `moving` are the corners that do not belong to the base.
 
+    `sides` (numbers in SIDES) are those of its edges where no corner moves, else None.
     The terms of a stance are the centre of gravity (3) and each moving corner (3): m, `base_link`.
     `outward` takes the terms and returns each edge's outward normal (x, y; not of unit length).
     """
 
     polygon: Cycle
     moving: tuple[int, ...]
+    sides: tuple[int, ...] | None
     outward: Kernel
 
 
@@ -73,7 +75,9 @@ def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
         return [(along[1], -along[0]) for along in edges]
 
     names = [f'x{k}' for k in range(3 + 3 * len(moving))]
-    return Corners(polygon, moving, compile_kernel(formula, names))
+    outward = compile_kernel(formula, names)
+    sides = None if moving else tuple(side_of(x, y) for x, y in outward.one(0.0, 0.0, 0.0))
+    return Corners(polygon, moving, sides, outward)
 
 
 @lru_cache(maxsize=256)

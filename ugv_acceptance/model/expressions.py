@@ -5,9 +5,9 @@ run with symbols it records itself, and `kernels.compile_kernel` turns the recor
 way what is constant is folded and signs are drawn out of products, so that axis-aligned joints,
 fixed links and missing velocities cost nothing.
 
-Folding drops `0 * x`, so a NaN in a joint that cannot matter does not spread; whoever calls must
-judge the inputs themselves. Constants of one product are multiplied first: the last digit may
-differ from that of the formula run with floats.
+Folding drops `0 * x` and `x - x`, so a NaN in a joint that cannot matter does not spread; whoever
+calls must judge the inputs themselves. Constants of one product are multiplied first: the last
+digit may differ from that of the formula run with floats.
 """
 
 import math
@@ -44,6 +44,8 @@ class Expr:
     __radd__ = __add__
 
     def __sub__(self, other: Scalar) -> Scalar:
+        if other is self:
+            return 0.0
         if _is(other, 0.0):
             return self
         if isinstance(other, Expr) and other.op == 'neg':

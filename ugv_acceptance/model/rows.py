@@ -15,12 +15,24 @@ ALL = slice(None)
 
 
 def pick(values: Values, rows: Rows) -> Values:
-    """Return the rows of nested tuples of floats and arrays; floats stay floats."""
+    """Return the rows of nested tuples of floats and arrays; floats stay floats.
+
+    What comes twice is picked once and stays one object.
+    """
     if rows is ALL:
         return values
-    if isinstance(values, tuple):
-        return tuple([pick(x, rows) for x in values])
-    return values[rows] if isinstance(values, np.ndarray) else values
+    picked: dict[int, Values] = {}
+
+    def take(x: Values) -> Values:
+        if isinstance(x, tuple):
+            return tuple([take(part) for part in x])
+        if not isinstance(x, np.ndarray):
+            return x
+        if id(x) not in picked:
+            picked[id(x)] = x[rows]
+        return picked[id(x)]
+
+    return take(values)
 
 
 def groups(codes: NDArray[Any]) -> Iterator[tuple[int, Rows, int]]:

@@ -96,7 +96,7 @@ def stance_of(mechanics: Mechanics, posture: Posture) -> Stance:
     terms: tuple[float, ...] = cog
     for k in corners.moving:
         terms += contacts[k]
-    sides = tuple([side_of(x, y) for x, y in corners.outward.one(*terms)])
+    sides = corners.sides or tuple([side_of(x, y) for x, y in corners.outward.one(*terms)])
     edges = edges_of(mechanics, corners, sides)
     return Stance(support, sides, terms, posture.mass, state, edges)
 
