@@ -9,8 +9,10 @@ from bag.bag_cases import (
     Message,
 )
 from mcap.writer import CompressionType, IndexType
+from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
 
 from ugv_acceptance.bag.reader import Bag, Topics, choose_topics, open_bag
 from ugv_acceptance.bag.reading import Facts
@@ -74,3 +76,19 @@ def damaged(path: Path, place: int, content: bytes) -> Path:
     data[place : place + len(content)] = content
     path.write_bytes(data)
     return path
+
+
+def write_other(path: Path, messages: list[Message]) -> None:
+    """A single SQLite (.db3) or ROS 1 (.bag) file, by its suffix."""
+    if path.suffix == '.db3':
+        folder = write_folder(path.with_suffix(''), messages, StoragePlugin.SQLITE3)
+        (source,) = folder.glob('*.db3')
+        source.rename(path)
+        return
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Ros1Writer(path) as writer:
+        held: dict[str, Any] = {}
+        for topic, kind, time, data in messages:
+            if topic not in held:
+                held[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(held[topic], time, bytes(STORE.cdr_to_ros1(data, kind)))

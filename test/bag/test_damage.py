@@ -1,6 +1,8 @@
 """Recordings that are cut off, damaged or hostile: what is whole is read, what is lost is told."""
 
+import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from bag.bag_cases import (
     run,
     write_mcap,
 )
-from bag.recordings import BOTH, SHAPES, chunk_starts, damaged, read
+from bag.recordings import BOTH, SHAPES, chunk_starts, damaged, read, write_other
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
@@ -200,3 +202,45 @@ def test_topics_not_wanted_are_not_unpacked(tmp_path: Path) -> None:
     reading = bag.batches(BOTH)
     assert rows(reading) == expected(messages)
     assert reading.facts.findings == ()
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    place=st.integers(0, 30000),
+    content=st.binary(min_size=1, max_size=12),
+    storage=st.sampled_from(['cut db3', 'db3', 'cut bag', 'bag']),
+)
+def test_no_damage_of_other_formats_crashes(
+    tmp_path: Path, place: int, content: bytes, storage: str
+) -> None:
+    """SQLite and ROS 1 bags damaged anywhere give fewer messages, findings or BadBag."""
+    suffix = storage.rsplit(maxsplit=1)[-1]
+    path = tmp_path / f'whole.{suffix}'
+    if not path.exists():
+        write_other(path, run(20))
+    data = bytearray(path.read_bytes())
+    place %= len(data)
+    data[place : place + len(content)] = content
+    broken = tmp_path / f'broken.{suffix}'
+    broken.write_bytes(data[:place] if storage.startswith('cut') else data)
+    try:
+        bag = open_bag(broken)
+        reading = bag.batches(choose_topics(bag, imu_required=False))
+    except BadBag as error:
+        assert broken.name in str(error)  # noqa: PT017 (one of the two ways that are right)
+        return
+    assert len(rows(reading)) <= 40
+    assert reading.facts.complete
+
+
+def test_sqlite_message_that_is_a_number(tmp_path: Path) -> None:
+    """A number where a message should be ends the reading with a finding and takes no memory."""
+    path = tmp_path / 'run.db3'
+    write_other(path, run(20))
+    with closing(sqlite3.connect(path)) as db:
+        db.execute('UPDATE messages SET data = 1000000000000 WHERE id = 30')
+        db.commit()
+    bag = open_bag(path)
+    reading = bag.batches(BOTH)
+    assert rows(reading) == expected(run(20))[:29]
+    assert 'expected a blob' in reading.facts.findings[0]

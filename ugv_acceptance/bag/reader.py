@@ -100,7 +100,10 @@ def open_bag(
     findings: list[str] = []
     for path in given:
         files, metadata, found = files_of(Path(path))
-        part = [_member(file, max_chunk_bytes) for file in files]
+        try:
+            part = [_member(file, max_chunk_bytes) for file in files]
+        except OSError as error:
+            raise BadBag(f'{path}: cannot be read ({error})') from error
         findings += found + _compared(metadata, part)
         members += part
     kinds = sorted({member.storage for member in members})
