@@ -1,0 +1,90 @@
+"""Live path: CPU a message, latency from publishing to the margin, loss; beside three others.
+
+    nice python bench/bench_live.py [--seconds 5] [--rounds 3]
+
+Every round starts each listener anew with the same load: an empty raw subscriber on the events
+executor (the floor), an empty decoded one, our monitor (margins of every message, its topics at
+their default rate, each with a subscriber), and a naive monitor. Medians of the rounds.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+RATES = ((200, 400), (1000, 1000), (5000, 5000))
+MODES = ('raw', 'decoded', 'monitor', 'naive')
+WARM = 200
+
+
+def once(mode: str, rates: tuple[int, int], seconds: float) -> dict[str, float]:
+    """Return figures of one listener under one load."""
+    drop = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
+    environment = {key: value for key, value in os.environ.items() if key != drop}
+    environment['ROS_DOMAIN_ID'] = str(random.randint(1, 101))
+    environment['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+    def start(script: str, *words: object) -> 'subprocess.Popen[str]':
+        command = [sys.executable, str(HERE / script), *map(str, words)]
+        return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    listener = start('live_listener.py', mode)
+    load = start('live_load.py', *rates, seconds)
+    assert load.stdout
+    assert listener.stdout
+    sent = sum(json.loads(load.stdout.readline()))
+    listener.send_signal(signal.SIGINT)
+    heard = json.loads(listener.stdout.readline())
+    listener.wait()
+    load.wait()
+    return figures(heard, sent)
+
+
+def figures(heard: dict[str, Any], sent: int) -> dict[str, float]:
+    """Return CPU (us a message), latency percentiles (ms) and loss (%)."""
+    count = len(heard['latencies'])
+    late = sorted(heard['latencies'][WARM:])
+    found = {'cpu_us': heard['cpu'] / (count - WARM) * 1e6, 'taken': heard['taken'] / sent}
+    for name, share in (('p50', 0.5), ('p99', 0.99), ('p99.9', 0.999)):
+        found[name] = late[min(int(share * len(late)), len(late) - 1)] / 1e6
+    return found
+
+
+def main() -> None:
+    """Print a table for each load."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--seconds', type=float, default=5.0)
+    parser.add_argument('--rounds', type=int, default=3)
+    parser.add_argument('--modes', nargs='*', default=MODES)
+    options = parser.parse_args()
+    for rates in RATES:
+        rows: dict[str, list[dict[str, float]]] = {mode: [] for mode in options.modes}
+        for _ in range(options.rounds):
+            for mode, found in rows.items():
+                found.append(once(mode, rates, options.seconds))
+        print(
+            f'\n{rates[0]} Hz joints + {rates[1]} Hz IMU, {options.rounds} x {options.seconds:g} s'
+        )
+        print(f'{"":10}{"CPU us":>8}{"x raw":>7}{"core %":>8}', end='')
+        print(f'{"p50 ms":>9}{"p99 ms":>9}{"p99.9":>9}{"loss %":>8}')
+        table = {
+            mode: {key: statistics.median(run[key] for run in runs) for key in runs[0]}
+            for mode, runs in rows.items()
+        }
+        floor = next(iter(table.values()))['cpu_us']
+        for mode, row in table.items():
+            core = row['cpu_us'] * row['taken'] * sum(rates) * 1e-4
+            lost = 100 * (1 - row['taken'])
+            print(f'{mode:10}{row["cpu_us"]:8.1f}{row["cpu_us"] / floor:7.2f}{core:8.1f}', end='')
+            print(f'{row["p50"]:9.3f}{row["p99"]:9.3f}{row["p99.9"]:9.3f}{lost:8.2f}')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,110 @@
+"""One way to listen to the load of bench_live.py; prints CPU, latencies and counts as JSON."""
+
+import json
+import signal
+import struct
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import Imu, JointState
+
+sys.path.insert(0, str(Path(__file__).parent))
+from naive_monitor import NaiveMonitor
+
+from ugv_acceptance.nodes.monitor import Monitor
+from ugv_acceptance.nodes.running import Stop, spin
+
+STAMP = struct.Struct('<iI')
+DEPTH = 1000
+# Messages left out at the start: first calls compile and fill caches.
+WARM = 200
+
+
+class Tally:
+    """Latencies (ns) of the messages, and the CPU time of this process since the warm-up."""
+
+    def __init__(self) -> None:
+        self.latencies: list[int] = []
+        self.cpu = 0.0
+
+    def seen(self, stamp: int) -> None:
+        """Take the stamp (ns) of a message that is dealt with."""
+        self.latencies.append(time.time_ns() - stamp)
+        if len(self.latencies) == WARM:
+            self.cpu = time.process_time()
+
+    def raw(self, data: bytes) -> None:
+        """Take a message as bytes."""
+        sec, nanosec = STAMP.unpack_from(data, 4)
+        self.seen(sec * 1_000_000_000 + nanosec)
+
+    def decoded(self, message: Any) -> None:
+        """Take a message object."""
+        self.seen(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
+
+
+def empty(tally: Tally, *, raw: bool) -> Node:
+    """Return a node that only listens."""
+    node = rclpy.create_node('empty')
+    qos = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+    take = tally.raw if raw else tally.decoded
+    node.create_subscription(JointState, 'joint_states', take, qos, raw=raw)
+    node.create_subscription(Imu, 'imu/data', take, qos, raw=raw)
+    return node
+
+
+def monitor(tally: Tally) -> Node:
+    """Return the monitor, which tells of every margin."""
+    node = Monitor()
+    node.bring_up()
+    publish = node.session.on_margins
+
+    def margins(stamp: int, found: Any) -> None:
+        tally.seen(stamp)
+        publish(stamp, found)
+
+    node.session.on_margins = margins
+    return node
+
+
+MODES = {
+    'raw': lambda tally: empty(tally, raw=True),
+    'decoded': lambda tally: empty(tally, raw=False),
+    'monitor': monitor,
+    'naive': lambda tally: NaiveMonitor(tally.seen, DEPTH),
+}
+
+
+def main() -> None:
+    """Listen until SIGINT."""
+    mode = sys.argv[1]
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    stop, tally = Stop(), Tally()
+    signal.signal(signal.SIGINT, lambda *_: setattr(stop, 'asked', True))
+    node = MODES[mode](tally)
+    if mode == 'naive':
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while not stop.asked:
+            executor.spin_once(timeout_sec=0.5)
+    else:
+        spin(node, stop)
+    cpu = time.process_time() - tally.cpu
+    # The monitor's first messages cannot have margins: the other input has not come yet.
+    taken = len(tally.latencies)
+    if isinstance(node, Monitor) and node.session is not None:
+        taken = sum(count.taken for count in node.session.counts.values())
+    told = {'cpu': cpu, 'taken': taken, 'latencies': tally.latencies}
+    print(json.dumps(told), flush=True)
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+main()
