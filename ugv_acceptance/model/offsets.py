@@ -12,7 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.planar import PAPER, PlanarArm, arm_robot
+from ugv_acceptance.model.planar import (
+    PAPER,
+    PlanarArm,
+    arm_robot,
+    planar_dynamics,
+    planar_torque,
+)
 from ugv_acceptance.model.validity import (
     PAPER_SAMPLES,
     PAPER_SPEEDS_DEG_S,
@@ -77,8 +83,11 @@ def _ends(offset2: float, arm: PlanarArm) -> tuple[float, float, float, float] |
 
 def _rest_bounds(offset2: float, arm: PlanarArm) -> tuple[float, float]:
     """Return between which mean squares at rest (N2 m2) every cell of joint 1 rounds as printed."""
-    error = table_error(0.0, offset2, arm)
-    mixed, moving = float(error.mixed[0]), float(error.moving[0])
+    moved, q, n = replace(arm, offset2=offset2), paper_sweep(THETA1), PAPER_SAMPLES - 1
+    rest = planar_torque(moved, q[:, 0], q[:, 1])[0]
+    motion = planar_dynamics(moved, q, (0.0, 1.0), (0.0, 0.0))[0] - rest
+    mixed = float(motion @ (rest - planar_torque(arm, q[:, 0], q[:, 1])[0])) / n
+    moving = float(motion @ motion) / n
     squares = np.radians(PAPER_SPEEDS_DEG_S) ** 2
     extra = 2.0 * squares * mixed + squares**2 * moving
     low, high = 0.0, math.inf

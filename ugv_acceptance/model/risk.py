@@ -1,13 +1,14 @@
 """Probability of torque saturation and of rollover when environment, load and robot are uncertain.
 
 Plain Monte Carlo in blocks: exact binomial intervals, memory that does not grow, and the same counts
-for a seed whatever the number of threads.
+for a seed whatever the number of processes.
 """
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ EVENTS = ('saturation', 'rollover', 'either')
 BINS = 20
 # Samples a generator makes, and samples whose temporaries stay in the cache.
 CHUNK, BLOCK = 2**18, 2**11
+# Samples from which starting processes (half a second each) pays.
+WORTH_A_PROCESS = 2**22
 # Samples of which the failures' inputs are looked at.
 LOOKED_AT = 2**20
 
@@ -128,7 +131,7 @@ def _tipped(robot: Robot, posture: Posture, gravity: Any, count: int) -> NDArray
     """Return where no positive moment holds the robot down; no margin at all counts as tipped."""
     tipped = np.ones(count, dtype=np.bool_)
     for rows, stance in stances_of(mechanics_of(robot), posture, count):
-        found = stability_of(stance, tuple(g[rows] for g in gravity))  # type: ignore[arg-type]
+        found = stability_of(stance, tuple(g[rows] for g in gravity))
         least = found.moment[0]
         for moment in found.moment[1:]:
             least = np.minimum(least, moment)
@@ -166,19 +169,20 @@ def run(
 
 
 def _chunks(study: Study, samples: int, seed: int, workers: int) -> Iterator[Counts]:
-    """Yield the counts of each chunk, in order; no more chunks than threads are alive at a time."""
+    """Yield the counts of each chunk, in order. A block is too small for threads to share a core."""
     sizes = [CHUNK] * (samples // CHUNK) + [samples % CHUNK] * (samples % CHUNK > 0)
     looked = range(-(-LOOKED_AT // CHUNK))
     rngs = generators(seed, len(sizes))
     tasks = [(study, rng, n, k in looked) for k, (rng, n) in enumerate(zip(rngs, sizes, strict=True))]
-    if workers < 2:
-        yield from (_chunk(*task) for task in tasks)
+    if workers < 2 or samples < WORTH_A_PROCESS:
+        yield from map(_chunk, tasks)
         return
-    with ThreadPoolExecutor(workers) as pool:
-        yield from pool.map(lambda task: _chunk(*task), tasks)
+    with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
+        yield from pool.map(_chunk, tasks)
 
 
-def _chunk(study: Study, rng: np.random.Generator, count: int, look: bool) -> Counts:  # noqa: FBT001 - one of a task's fields
+def _chunk(task: tuple[Study, np.random.Generator, int, bool]) -> Counts:
+    study, rng, count, look = task
     counts = Counts(looked_at=count if look else 0)
     for start in range(0, count, BLOCK):
         n = min(BLOCK, count - start)

@@ -1,12 +1,13 @@
 """Draw maps a person reads without colour: hatched failure, dotted caution, plain safe areas."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -47,20 +48,33 @@ def figure(width: float, height: float) -> Figure:
     return made
 
 
-def draw_regions(axes: Any, x: Floats, y: Floats, margin: Floats, levels: Levels) -> None:
-    """Fill the map of a `margin` (n, m) over x (n,) and y (m,), and draw where it turns."""
+def draw_regions(
+    axes: Axes,
+    x: Floats,
+    y: Floats,
+    margin: Floats,
+    levels: Levels,
+    label: Callable[[float], str] | None = None,
+) -> None:
+    """Fill the map of a `margin` (n, m) over x (n,) and y (m,), and draw where it turns.
+
+    `label` writes a level on its line; without it the lines stay bare.
+    """
     filled = np.nan_to_num(np.clip(margin, -1e6, 1e6), nan=-1e6).T
     bounds = [-2e6, levels.failure, levels.caution, 2e6]
     axes.contourf(x, y, filled, levels=bounds, colors=COLOURS[::-1], hatches=HATCHES[::-1])
-    if filled.min() < levels.caution < filled.max():
-        axes.contour(
-            x, y, filled, levels=[levels.caution], colors='#333333', linewidths=0.8, linestyles=':'
-        )
-    if filled.min() < levels.failure < filled.max():
-        axes.contour(x, y, filled, levels=[levels.failure], colors='black', linewidths=1.4)
+    looks = ((levels.caution, '#333333', 0.9, ':'), (levels.failure, 'black', 1.6, '-'))
+    for level, colour, width, dash in looks:
+        if filled.min() < level < filled.max():
+            lines = axes.contour(
+                x, y, filled, levels=[level], colors=colour, linewidths=width, linestyles=dash
+            )
+            if label is not None:
+                for text in axes.clabel(lines, fmt=label, fontsize=8, colors='black'):
+                    text.set_bbox({'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.8})
 
 
-def legend(target: Any, words: Sequence[str] = WORDS, **options: Any) -> None:
+def legend(target: Figure | Axes, words: Sequence[str] = WORDS, **options: Any) -> None:  # noqa: ANN401 - matplotlib's own
     """Add the key of the three areas to a figure or to axes."""
     patches = [
         Patch(facecolor=colour, hatch=hatch, edgecolor='#666666', label=word)
@@ -69,7 +83,7 @@ def legend(target: Any, words: Sequence[str] = WORDS, **options: Any) -> None:
     target.legend(handles=patches, **options)
 
 
-def degree_axes(axes: Any, x_name: str, y_name: str, step: float = 90.0) -> None:
+def degree_axes(axes: Axes, x_name: str, y_name: str, step: float = 90.0) -> None:
     """Label both axes in degrees with ticks every `step`."""
     for axis, name in ((axes.xaxis, x_name), (axes.yaxis, y_name)):
         axis.set_major_locator(mpl.ticker.MultipleLocator(step))

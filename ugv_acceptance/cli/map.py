@@ -1,0 +1,91 @@
+"""`ugv-acceptance map`: where two joints saturate, tip, carry or pull, as a picture or as numbers."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ugv_acceptance.config import Config
+    from ugv_acceptance.model.blocks import Floats
+    from ugv_acceptance.report.map_data import Scene
+
+
+def map(  # noqa: A001 - the verb's name
+    kind: Annotated[str, typer.Argument(help='torque, rollover, payload or drag.')],
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(help='File to write: .svg, .png, .csv or .npz; may be given again.'),
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
+    ] = None,
+    x: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:180deg.')] = 'shoulder_joint',
+    y: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:360deg.')] = 'elbow_joint',
+    posture: Annotated[str, typer.Option(help='joint=30deg,... of the joints not mapped.')] = '',
+    orientation: Annotated[
+        str, typer.Option(help='level, right, left, nose-up, nose-down, nose-up-right, ...')
+    ] = 'level',
+    slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',
+    payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
+    limit: Annotated[str, typer.Option(help='joint="50 N m",... in place of configured limits.')] = '',
+    caution: Annotated[
+        float | None, typer.Option(help="Caution from here on, in the map's unit.")
+    ] = None,
+    failure: Annotated[
+        float | None, typer.Option(help="Failure from here on, in the map's unit.")
+    ] = None,
+    friction: Annotated[float, typer.Option(help='Of the tracks on the ground, for drag.')] = 0.7,
+    steps: Annotated[int, typer.Option(min=2, max=5001, help='Cells along each axis.')] = 361,
+    from_bag: Annotated[
+        list[Path] | None, typer.Option(help='Recorded run to draw over the map; may be split.')
+    ] = None,
+) -> None:
+    """Map two joints: torque used, tilt left, payload or pull; at rest, on rigid ground.
+
+    \b
+    Examples:
+      ugv-acceptance map torque
+      ugv-acceptance map rollover --orientation right --slope 30deg --posture flipper_joint=180deg
+      ugv-acceptance map payload --limit shoulder_joint=70,elbow_joint=70 --out payload.png
+      ugv-acceptance map rollover --x flipper_joint=-30deg:180deg --y elbow_joint --out tip.csv
+      ugv-acceptance map rollover --from-bag bags/packbot_pass
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
+    from ugv_acceptance.config import load
+    from ugv_acceptance.model.maps import CLASSES, area_fraction, classes
+    from ugv_acceptance.report.map_data import map_of
+    from ugv_acceptance.report.map_figure import assumptions, write_map
+
+    loaded = load(config)
+    wanted = Wanted(x, y, posture, orientation, slope, payload, limit, friction, steps)
+    scene = scene_from(loaded, wanted)
+    data = with_levels(map_of(kind, scene), caution, failure)
+    track = _track(loaded, scene, from_bag) if from_bag else None
+    typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene)}')
+    found = classes(data.margin, data.levels.caution, data.levels.failure)
+    for k, name in enumerate(CLASSES):
+        typer.echo(f'  {name:8}{100.0 * area_fraction(found == k, scene.grid):6.1f} % of the map')
+    for path in out or [Path(f'{kind}_map.svg')]:
+        write_map(path, scene, data, track)
+        typer.echo(f'Wrote {path}.')
+
+
+def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':
+    """Return where a recorded run went: positions (n, 2) of the two joints (rad, m)."""
+    import numpy as np
+
+    from ugv_acceptance import BadBag
+    from ugv_acceptance.bag.judge import judge
+    from ugv_acceptance.bag.reader import choose_topics, open_bag
+
+    bag = open_bag(paths)
+    names = loaded.topics
+    topics = choose_topics(bag, names.joint_states.name, names.imu.name, names.payload.name)
+    parts: list[Floats] = []
+    judge(bag, topics, loaded.settings, [lambda rows: parts.append(rows.q)])
+    track = np.concatenate(parts)[:, [scene.grid.first, scene.grid.second]]
+    track = track[np.isfinite(track).all(axis=1)]
+    if not len(track):
+        raise BadBag(f'{paths[0]}: expected positions of both joints of the map, found none')
+    return track[:: max(1, len(track) // 20_000)]

@@ -1,0 +1,113 @@
+"""What the options of the verb map mean: axes, posture, gravity, limits, levels."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.robot_description import posture_from
+from ugv_acceptance.config import Config
+from ugv_acceptance.config.units import quantity
+from ugv_acceptance.evaluation.settings import Limits
+from ugv_acceptance.model.bilinear import Grid
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.report.map_data import MapData, Scene
+from ugv_acceptance.report.regions import Levels
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """The options as they were typed."""
+
+    x: str
+    y: str
+    posture: str
+    orientation: str
+    slope: str
+    payload: str
+    limit: str
+    friction: float
+    steps: int
+
+
+def scene_from(loaded: Config, wanted: Wanted) -> Scene:
+    """Return what is to be mapped. Raises BadConfig naming the option that does not fit."""
+    robot = loaded.settings.robot
+    first, x = _axis(robot, '--x', wanted.x, wanted.steps, (0.0, math.pi))
+    second, y = _axis(robot, '--y', wanted.y, wanted.steps, (0.0, 2.0 * math.pi))
+    if first == second:
+        raise BadConfig(f'--y: expected another joint than --x, got {robot.joint_names[first]} twice')
+    if wanted.orientation not in ORIENTATIONS:
+        known = ', '.join(ORIENTATIONS)
+        raise BadConfig(f'--orientation: expected one of {known}, got {wanted.orientation}')
+    slope = quantity(wanted.slope, 'angle', '--slope')
+    mass = quantity(wanted.payload, 'mass', '--payload') if wanted.payload else robot.payload.mass
+    if mass < 0.0:
+        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
+    if wanted.friction <= 0.0:
+        raise BadConfig(f'--friction: expected a number > 0, got {wanted.friction:g}')
+    q = np.array(posture_from(robot, wanted.posture))
+    return Scene(
+        robot,
+        Grid(first, second, x, y, q),
+        gravity_of(wanted.orientation, slope, robot.gravity),
+        Payload(mass, robot.payload.cog),
+        _limits(robot, loaded.settings.limits, wanted.limit),
+        wanted.friction,
+    )
+
+
+def _axis(
+    robot: Robot, option: str, text: str, steps: int, default: tuple[float, float]
+) -> tuple[int, Floats]:
+    name, _, span = text.partition('=')
+    if name not in robot.joint_names:
+        known = ', '.join(robot.joint_names)
+        raise BadConfig(f'{option}: expected a measured joint ({known}), got {name}')
+    joint = robot.joint(name)
+    slides = joint.kind == 'prismatic'
+    low, high = default
+    if slides or not span:
+        low, high = max(joint.lower, low), min(joint.upper, high)
+    if slides and not span:
+        low, high = joint.lower, joint.upper
+    if span:
+        start, colon, end = span.partition(':')
+        if not colon:
+            raise BadConfig(f'{option}: expected {name}=FROM:TO, got {text}')
+        kind = 'length' if slides else 'angle'
+        low, high = (quantity(part, kind, f'{option}: {name}') for part in (start, end))
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise BadConfig(f'{option}: expected {name}=FROM:TO with FROM below TO, got {low:g}:{high:g}')
+    return robot.joint_names.index(name), np.linspace(low, high, steps)
+
+
+def _limits(robot: Robot, limits: Limits, text: str) -> Limits:
+    torque = dict(zip(robot.joint_names, limits.torque, strict=True))
+    for part in filter(None, (p.strip() for p in text.split(','))):
+        name, equals, value = part.partition('=')
+        if name not in torque or not equals:
+            known = ', '.join(torque)
+            raise BadConfig(f'--limit: expected JOINT=TORQUE with one of {known}, got {part}')
+        kind = 'force' if robot.joint(name).kind == 'prismatic' else 'torque'
+        torque[name] = quantity(value, kind, f'--limit: {name}')
+        if torque[name] <= 0.0:
+            raise BadConfig(f'--limit: {name}: expected a torque > 0 N m, got {torque[name]:g}')
+    return replace(limits, torque=tuple(torque.values()))
+
+
+def with_levels(data: MapData, caution: float | None, failure: float | None) -> MapData:
+    """Return the map with its thresholds (in its unit) replaced where given."""
+    levels = Levels(
+        data.levels.caution if caution is None else data.sign * caution,
+        data.levels.failure if failure is None else data.sign * failure,
+    )
+    if levels.caution < levels.failure:
+        raise BadConfig(
+            f'--caution: expected it on the safe side of --failure ({data.sign * levels.failure:g} '
+            f'{data.unit}), got {data.sign * levels.caution:g} {data.unit}'
+        )
+    return replace(data, levels=levels)

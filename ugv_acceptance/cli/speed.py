@@ -1,0 +1,73 @@
+"""`ugv-acceptance speed`: up to which joint speed the static model may stand in for the dynamic one."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def speed(
+    config: Annotated[
+        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
+    ] = None,
+    posture: Annotated[
+        str, typer.Option(help='joint=30deg,... held while each joint turns; else all postures.')
+    ] = '',
+    payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
+    reference: Annotated[
+        float, typer.Option(help="The static model's own error, N m (rms): 1.0 as in the paper.")
+    ] = 1.0,
+    critical: Annotated[
+        float, typer.Option(help='Critical value of F; 0: computed for 5 % and the samples.')
+    ] = 0.0,
+    samples: Annotated[int, typer.Option(min=3, help='Postures; the paper takes 201.')] = 201,
+    as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not a table.')] = False,
+) -> None:
+    """Print the speed of each joint, moving alone, up to which an F-test accepts the static model.
+
+    The monitor's `static_speed` limits come from here.
+
+    \b
+    Examples:
+      ugv-acceptance speed
+      ugv-acceptance speed --payload 0 --reference 0.5
+      ugv-acceptance speed --posture shoulder_joint=30deg --critical 1.227
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    import json
+    import math
+
+    import numpy as np
+
+    from ugv_acceptance import BadConfig
+    from ugv_acceptance.cli.robot_description import posture_from
+    from ugv_acceptance.config import load
+    from ugv_acceptance.config.units import quantity
+    from ugv_acceptance.model.postures import random_postures, sweeps
+    from ugv_acceptance.model.robot import Payload
+    from ugv_acceptance.model.validity import critical_value, speed_limit
+
+    robot = load(config).settings.robot
+    if reference <= 0.0:
+        raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
+    mass = quantity(payload, 'mass', '--payload') if payload else robot.payload.mass
+    load_carried = Payload(mass, robot.payload.cog)
+    bound = critical or critical_value(samples=samples)
+    if bound <= 1.0:
+        raise BadConfig(f'--critical: expected a value > 1, got {bound:g}')
+    if posture:
+        sets = sweeps(robot, posture_from(robot, posture), samples)
+    else:
+        sets = [random_postures(robot, samples, seed=0)] * len(robot.joint_names)
+    limits = [
+        float(speed_limit(robot, q, load_carried, reference, bound)[k]) for k, q in enumerate(sets)
+    ]
+    if as_json:
+        degrees = [math.degrees(x) if np.isfinite(x) else None for x in limits]
+        found = dict(zip(robot.joint_names, degrees, strict=True))
+        typer.echo(json.dumps({'critical_value': bound, 'speed_deg_s': found}, indent=2))
+        return
+    typer.echo(f'{robot.name}, {mass:g} kg, error of the static model {reference:g} N m, F < {bound:.4f}')
+    for name, limit in zip(robot.joint_names, limits, strict=True):
+        slides = robot.joint(name).kind == 'prismatic'
+        text = f'{limit:8.3f} m/s' if slides else f'{math.degrees(limit):8.1f} deg/s'
+        typer.echo(f'  {name:24}{text if np.isfinite(limit) else "     any"}')
