@@ -15,6 +15,7 @@ REQUIRES = [
     'defusedxml',
     'jinja2',
     'matplotlib',
+    'lz4',
     'mcap',
     'numpy>=1.26,<3',
     'pydantic>=2',
@@ -22,6 +23,7 @@ REQUIRES = [
     'rosbags',
     'scipy',
     'typer>=0.12.5',
+    'zstandard',
 ]
 SIMULATION = ['mujoco']
 TEST = [
@@ -82,7 +84,7 @@ setup(
         *share('bags'),
     ],
     install_requires=REQUIRES,
-    extras_require={'sim': SIMULATION, 'fast': ['cramjam'], 'test': TEST, 'lint': LINT},
+    extras_require={'sim': SIMULATION, 'fast': ['isal'], 'test': TEST, 'lint': LINT},
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',
