@@ -15,7 +15,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / 'ugv_acceptance'
 MODULES = sorted(PACKAGE.rglob('*.py'))
 
 # What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
-BELOW_NODES = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'console'}
+BELOW_RUN = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'plan'}
+BELOW_NODES = BELOW_RUN | {'run', 'console'}
 MAY_IMPORT: dict[str, set[str]] = {
     '__init__': set(),
     'model': set(),
@@ -25,6 +26,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     'simulation': {'model'},
     'report': {'model', 'evaluation'},
     'console': {'model', 'evaluation'},
+    'plan': {'model', 'evaluation', 'config', 'report'},
+    'run': BELOW_RUN,
     'nodes': BELOW_NODES,
     'cli': BELOW_NODES | {'nodes'},
 }
@@ -36,12 +39,12 @@ HOME_OF = {
     'rclpy': {'nodes'},
     'mujoco': {'simulation'},
     'pydantic': {'config'},
-    'yaml': {'config', 'bag'},
+    'yaml': {'config', 'bag', 'plan'},
     'defusedxml': {'config'},
     'mcap': {'bag'},
     'rosbags': {'bag'},
     'matplotlib': {'report'},
-    'jinja2': {'report'},
+    'jinja2': {'report', 'plan'},
     'click': {'cli'},
     'rich': {'cli'},
     'typer': {'cli'},

@@ -13,7 +13,19 @@ from ugv_acceptance import AcceptanceError, __version__
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 
 # In the order in which people meet them; the code of a verb is cli/VERB.py, function VERB.
-VERBS = ('demo', 'evaluate', 'monitor', 'replay', 'model', 'doctor')
+VERBS = (
+    'demo',
+    'evaluate',
+    'monitor',
+    'replay',
+    'simulate',
+    'model',
+    'map',
+    'paper',
+    'speed',
+    'risk',
+    'doctor',
+)
 
 app = typer.Typer(
     name='ugv-acceptance',

@@ -86,7 +86,7 @@ class Corruption:
         return ImuLog(log.stamp, orientation, rate, force)
 
     def missing(self, time: float) -> tuple[tuple[str, ...], bool]:
-        """Return the joints that are missing from a message at `time` (s), and whether efforts are."""
+        """Return the joints missing from a message at `time` (s), and whether efforts are."""
         now = [f for f in self.faults if f.start <= time < f.end]
         joints = tuple(f.subject for f in now if f.kind == 'dead-encoder')
         return joints, any(f.kind == 'effort-missing' for f in now)

@@ -39,7 +39,9 @@ KINDS: dict[str, Kind] = {
     'frozen-encoder': Kind('a joint tells the same position for ever', 'joint'),
     'effort-missing': Kind('no efforts in the joint states'),
     'imu-bias': Kind('acceleration forward is off by m/s2', '', 2.0, -50.0, 50.0),
-    'wrong-mounting': Kind('the IMU is turned about its z axis by degrees', '', 90.0, -360.0, 360.0),
+    'wrong-mounting': Kind(
+        'the IMU is turned about its z axis by degrees', '', 90.0, -360.0, 360.0
+    ),
     'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
     'clock-jump': Kind('header stamps are off by seconds', 'input', -5.0, -1e8, 1e8),
     'heavy-payload': Kind('the load is heavier than declared by a factor', '', 2.0, 0.0, 100.0),

@@ -1,0 +1,148 @@
+"""`ugv-acceptance simulate`: a PackBot in MuJoCo as a recording, faster than real time."""
+
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ugv_acceptance.run.catalogue import Case
+    from ugv_acceptance.run.record import Outcome
+
+
+def simulate(
+    scenario: Annotated[
+        str, typer.Argument(help='A scenario by name; --list says which there are.')
+    ] = 'gentle',
+    seconds: Annotated[
+        float | None,
+        typer.Option('--seconds', '-s', help='Simulated seconds; as it comes if left out.'),
+    ] = None,
+    seed: Annotated[int, typer.Option(help='The same seed gives the same messages.')] = 1,
+    bag: Annotated[
+        Path | None, typer.Option('--bag', '-o', help='New rosbag2 folder to record into.')
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help='KIND[:SUBJECT][=AMOUNT][@START[-END]]; may be given several times.'),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
+    ] = None,
+    listed: Annotated[
+        bool, typer.Option('--list', help='Print scenarios and faults and end.')
+    ] = False,
+) -> None:
+    """Simulate a run and record it as its robot would: joint_states, imu/data, payload.
+
+    The exit code is 0 once it is recorded, tipped over or not; `evaluate` judges the recording.
+
+    \b
+    Scenarios: gentle, overreach (fixed); work, tilt, swing, reach, grasp, dash (drawn by --seed);
+    fault-KIND (gentle with a fault) for every KIND of fault:
+    dropped, late, reordered, duplicated, dead, nan, dead-encoder, frozen-encoder, effort-missing,
+    imu-bias, wrong-mounting, identity-orientation, clock-jump, heavy-payload, weak-motor.
+
+    \b
+    Examples:
+      ugv-acceptance simulate --list
+      ugv-acceptance simulate overreach --seed 2 --bag out/overreach
+      ugv-acceptance simulate work -s 600 --bag out/work --fault frozen-encoder:elbow_joint@60-90
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    if listed:
+        _print_list()
+        return
+    if bag is None:
+        raise typer.BadParameter('expected a folder to record into, got none', param_hint='--bag')
+    from ugv_acceptance.config import load
+    from ugv_acceptance.run.catalogue import case_of
+    from ugv_acceptance.run.record import record
+    from ugv_acceptance.simulation.faults import fault_from
+
+    loaded = load(config)
+    robot = loaded.settings.robot
+    faults = tuple(fault_from(text, robot) for text in fault or ())
+    case = case_of(scenario, robot, seed, seconds, faults)
+    began = time.monotonic()
+    with _bar(case) as progress:
+        outcome = record(loaded, case, seed, bag, progress)
+    _print_outcome(outcome, bag, outcome.seconds / (time.monotonic() - began))
+
+
+def _bar(case: 'Case') -> 'Bar':
+    return Bar(case.scenario.duration)
+
+
+class Bar:
+    """A progress bar of simulated seconds on a terminal, nothing elsewhere."""
+
+    def __init__(self, total: float) -> None:
+        from rich.console import Console
+        from rich.progress import Progress, TextColumn
+
+        console = Console(file=sys.stderr)
+        text = TextColumn('{task.completed:.0f} of {task.total:.0f} s')
+        self._progress = Progress(
+            *Progress.get_default_columns(),
+            text,
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task = self._progress.add_task('simulating', total=total)
+
+    def __enter__(self) -> 'Bar':  # noqa: PYI034 - Self is Python 3.11
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def __call__(self, reached: float) -> None:
+        """Take the simulated time (s) reached."""
+        self._progress.update(self._task, completed=reached)
+
+
+def _print_list() -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ugv_acceptance.run.catalogue import names
+    from ugv_acceptance.simulation.faults import KINDS
+
+    console = Console(highlight=False)
+    for title, rows in (
+        ('scenarios', names().items()),
+        (
+            'faults',
+            [
+                (name, _fault_text(kind.text, kind.subject, kind.amount))
+                for name, kind in KINDS.items()
+            ],
+        ),
+    ):
+        table = Table(box=None, pad_edge=False, padding=(0, 2), title=title, title_justify='left')
+        table.add_column('name', no_wrap=True)
+        table.add_column('what happens')
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
+
+
+def _fault_text(text: str, subject: str, amount: float) -> str:
+    usual = f' (usually {amount:g})' if amount else ''
+    return f'{text}{usual}' + (f'; of: {subject}' if subject else '')
+
+
+def _print_outcome(outcome: 'Outcome', bag: Path, speed: float) -> None:
+    tipped = outcome.tipped_at
+    events = [f'{name} saturated at {at:.2f} s' for name, at in outcome.saturated_at.items()]
+    if tipped < float('inf'):
+        events.append(f'tipped over at {tipped:.2f} s')
+    typer.echo(
+        f'{bag}: {outcome.seconds:.1f} s, {outcome.messages} messages, {speed:.0f} x real time'
+    )
+    typer.echo(f'truth: {"; ".join(events) or "nothing saturated, did not tip"}')

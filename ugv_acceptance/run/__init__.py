@@ -1,0 +1,1 @@
+"""Runs without ROS: simulated recordings, steps judged, folders of results, labelled runs."""

@@ -1,0 +1,108 @@
+"""A simulated run as the messages a driver would publish, faults of the sensors included."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
+from ugv_acceptance.config import Config
+from ugv_acceptance.simulation.corruption import Corruption
+from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recording
+
+# 2025-06-02 09:00:00 UTC: stamps look like those of a real clock.
+EPOCH = 1_748_854_800_000_000_000
+# Seconds after which a payload is told again.
+PAYLOAD_PERIOD = 1.0
+
+# Topic, time of receipt (ns) and content.
+Message = tuple[str, int, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """The robot's driver: numbers of the model to messages, as `config` says they are counted."""
+
+    config: Config
+    corruption: Corruption
+    noise: Noise
+    epoch: int = EPOCH
+
+    def joint_states(self, log: JointLog) -> Iterator[tuple[float, bytes]]:
+        """Yield the time (s) and content of a JointState for every row: sign and offset undone."""
+        log = self.corruption.joints(log)
+        joints = self.config.settings.joints
+        sign, offset = np.array([(j.sign, j.offset) for j in joints]).T
+        scale = np.array([j.effort_sign * j.effort_scale for j in joints])
+        position = ((log.position - offset) / sign).tolist()
+        velocity, effort = (log.velocity / sign).tolist(), (log.effort / scale).tolist()
+        names = [j.topic_name for j in joints]
+        for k, time in enumerate(log.stamp.tolist()):
+            stamp = self.nanoseconds(time + self.corruption.shift('joint_states', time))
+            dead, mute = self.corruption.missing(time)
+            told = [names, position[k], velocity[k], [] if mute else effort[k]]
+            if dead:
+                alive = [n not in dead for n in self.config.settings.robot.joint_names]
+                told = [[x for x, keep in zip(part, alive) if keep] for part in told]  # noqa: B905 - efforts may be none
+            yield time, joint_state_cdr(stamp, '', *told)
+
+    def imu(self, log: ImuLog) -> Iterator[tuple[float, bytes]]:
+        """Yield the time (s) and content of an Imu for every row."""
+        log = self.corruption.imu(log)
+        frame = self.config.topics.imu.frame_id or 'imu_link'
+        covariances = imu_covariances(self.noise)
+        orientation, rate = log.orientation.tolist(), log.angular_velocity.tolist()
+        force = log.linear_acceleration.tolist()
+        for k, time in enumerate(log.stamp.tolist()):
+            stamp = self.nanoseconds(time + self.corruption.shift('imu', time))
+            yield time, imu_cdr(stamp, frame, orientation[k], rate[k], force[k], covariances)
+
+    def nanoseconds(self, time: float) -> int:
+        """Return the stamp (ns) of a simulated time (s)."""
+        return self.epoch + round(time * 1e9)
+
+
+def imu_covariances(noise: Noise) -> tuple[list[float], list[float], list[float]]:
+    """Return the covariances (row by row) that a sensor of this noise states."""
+    orientation, gyro, acceleration = (
+        np.diag([deviation**2] * 3).ravel().tolist()
+        for deviation in (noise.orientation, noise.gyro, noise.acceleration)
+    )
+    return orientation, gyro, acceleration
+
+
+def messages(
+    config: Config, recording: Recording, corruption: Corruption, seed: int, factor: float = 1.0
+) -> list[Message]:
+    """Return all messages of a run as a recorder receives them, in that order.
+
+    Declared payloads are lighter than the real ones by `factor`.
+    """
+    driver = Driver(config, corruption, recording.scenario.noise)
+    rng = np.random.default_rng(seed)
+    found: list[Message] = []
+    sources = (
+        ('/joint_states', 'joint_states', driver.joint_states(recording.joints)),
+        ('/imu/data', 'imu', driver.imu(recording.imu)),
+        ('/payload', 'payload', payload_messages(driver, recording, factor)),
+    )
+    calm = replace(corruption, faults=())
+    for topic, source, sent in sources:
+        road = calm if source == 'payload' else corruption
+        for time, cdr in sent:
+            arrivals = road.arrivals(source, time, rng)
+            found += [(topic, driver.nanoseconds(due), cdr) for due in arrivals]
+    return sorted(found, key=lambda message: message[1])
+
+
+def payload_messages(
+    driver: Driver, recording: Recording, factor: float
+) -> Iterator[tuple[float, bytes]]:
+    """Yield the payload declared whenever it changes and once a period."""
+    frame = driver.config.topics.payload.frame_id or ''
+    changes = recording.payload
+    ends = [time for time, _ in changes[1:]] + [recording.scenario.duration]
+    for (start, payload), end in zip(changes, ends, strict=True):
+        for time in np.arange(start, end, PAYLOAD_PERIOD).tolist():
+            stamp = driver.nanoseconds(time)
+            yield time, inertia_cdr(stamp, frame, payload.mass / factor, payload.cog)

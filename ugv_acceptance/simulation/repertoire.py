@@ -1,0 +1,188 @@
+"""Seeded random runs of every kind an acceptance test meets, from a quiet shift to a tip-over.
+
+Each kind is a function of robot, random numbers and length. Nothing here says what will happen: the
+simulation's truth does.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi, radians
+
+import numpy as np
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.capacity import gripper_point
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.stability import margins
+from ugv_acceptance.simulation.scenario import Command, Scenario
+from ugv_acceptance.simulation.scenarios import STOWED
+from ugv_acceptance.simulation.vehicle import gravity_on_slope
+
+# Margins that a quiet shift keeps: tilt left (rad), share of the torque limit, grip height (m).
+CALM_TILT, CALM_TORQUE, LOWEST = radians(18.0), 0.62, 0.08
+# Postures of a motion that are looked at.
+_PATH = 17
+
+Rng = np.random.Generator
+Kind = Callable[[Robot, Rng, float], Scenario]
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Draws postures (name, rad) of the arm; the flippers stay folded back."""
+
+    robot: Robot
+    rng: Rng
+
+    def anywhere(self) -> Floats:
+        """Return a posture (j,) whose grip is above the ground and clear of the deck."""
+        while True:
+            q = self.vector(
+                turret_joint=self.rng.uniform(-pi, pi),
+                shoulder_joint=self.rng.uniform(radians(10), radians(150)),
+                elbow_joint=self.rng.uniform(radians(-150), radians(90)),
+            )
+            if gripper_point(self.robot, q)[2] > LOWEST:
+                return q
+
+    def vector(self, **angles: float) -> Floats:
+        """Return a posture (j,) from joint angles (rad): the stowed one but for these."""
+        known = dict(STOWED) | angles
+        return np.array([known.get(name, 0.0) for name in self.robot.joint_names])
+
+    def named(self, q: Floats) -> tuple[tuple[str, float], ...]:
+        """Return a posture as a command's targets."""
+        return tuple(zip(self.robot.joint_names, q.tolist(), strict=True))
+
+    def calm(self, start: Floats, load: Payload, tilt: float) -> Floats | None:
+        """Return a posture to which the way from `start` keeps large margins; None: none found."""
+        heads = np.array([gravity_on_slope(self.robot.gravity, tilt, h) for h in _headings()])
+        limit = np.array([self.robot.joint(n).effort for n in self.robot.joint_names])
+        for _ in range(40):
+            end = self.anywhere()
+            path = start + np.linspace(0.0, 1.0, _PATH)[:, None] * (end - start)
+            if (gripper_point(self.robot, path)[:, 2] < LOWEST).any():
+                continue
+            found = margins(self.robot, path[:, None, :], heads, load)
+            share = (np.abs(found.torque) / limit).max()
+            if found.angle.min() > CALM_TILT and share < CALM_TORQUE:
+                return end
+        return None
+
+
+def _headings() -> Floats:
+    return np.linspace(-pi, pi, 8, endpoint=False)
+
+
+def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """Arm, tracks and ground move as in a quiet shift: every margin stays large."""
+    poses = Poses(robot, rng)
+    load = Payload(float(rng.uniform(0.0, 1.5)), robot.payload.cog)
+    tilt = float(rng.uniform(0.0, radians(6.0)))
+    now, q = 2.0, poses.vector()
+    commands: list[Command] = []
+    while now < seconds - 12.0:
+        act = rng.integers(4)
+        if act == 0:
+            drive = float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))
+            commands += [Command(now, drive=drive), Command(now + 2.0, drive=(0.0, 0.0))]
+            now += 3.0
+        elif act == 1:
+            heading = float(rng.uniform(-pi, pi))
+            commands.append(Command(now, slope=(0.0, 0.0), slope_rate=0.04))
+            commands.append(Command(now + 4.5, slope=(tilt, heading), slope_rate=0.04))
+            now += 9.0
+        else:
+            end = poses.calm(q, load, tilt)
+            speed = float(rng.uniform(0.15, 0.5))
+            if end is not None:
+                commands.append(Command(now, joints=poses.named(end), speed=speed))
+                now += float(np.abs(end - q).max()) * pi / (2.0 * speed) + 0.5
+                q = end
+    return Scenario('work', seconds, STOWED, (0.0, 0.0), load, tuple(commands))
+
+
+def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """The arm is up with a load; the ground tilts until something gives."""
+    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
+    q = poses.vector(
+        turret_joint=rng.uniform(-pi, pi),
+        shoulder_joint=radians(rng.uniform(60, 95)),
+        elbow_joint=radians(rng.uniform(-60, 0)),
+    )
+    slope = radians(55.0), float(rng.uniform(-pi, pi))
+    rate = float(rng.uniform(0.03, 0.12))
+    ramp = Command(2.0, slope=slope, slope_rate=rate)
+    return Scenario('tilt', seconds, poses.named(q), (0.0, 0.0), load, (ramp,))
+
+
+def swing(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """On a slope the arm swings a load downhill and out."""
+    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 4.5)
+    heading = float(rng.uniform(-pi, pi))
+    q = poses.vector(
+        turret_joint=heading + pi, shoulder_joint=radians(80), elbow_joint=radians(-60)
+    )
+    end = poses.vector(
+        turret_joint=heading + rng.uniform(-0.4, 0.4),
+        shoulder_joint=radians(rng.uniform(20, 70)),
+        elbow_joint=radians(rng.uniform(-60, 0)),
+    )
+    go = Command(2.0, joints=poses.named(end), speed=float(rng.uniform(0.25, 0.8)))
+    slope = radians(rng.uniform(8.0, 24.0)), heading
+    return Scenario('swing', seconds, poses.named(q), slope, load, (go,))
+
+
+def reach(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """On level ground the arm stretches forward with a load until a motor gives all it has."""
+    poses, load = Poses(robot, rng), _load(robot, rng, 1.5, 5.0)
+    q = poses.vector(shoulder_joint=radians(rng.uniform(75, 110)), elbow_joint=radians(-120))
+    out = poses.vector(
+        shoulder_joint=radians(rng.uniform(15, 60)), elbow_joint=radians(rng.uniform(-40, 10))
+    )
+    go = Command(2.0, joints=poses.named(out), speed=float(rng.uniform(0.15, 0.6)))
+    return Scenario('reach', seconds, poses.named(q), (0.0, 0.0), load, (go,))
+
+
+def grasp(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """The arm is stretched out over the side; it takes a load, declared when it is taken."""
+    poses = Poses(robot, rng)
+    side = float(rng.choice([-1.0, 1.0])) * rng.uniform(radians(60), radians(120))
+    q = poses.vector(
+        turret_joint=side,
+        shoulder_joint=radians(rng.uniform(20, 60)),
+        elbow_joint=radians(rng.uniform(-50, 0)),
+    )
+    take = Command(5.0, payload=_load(robot, rng, 1.0, 6.0))
+    empty, slope = Payload(0.0, robot.payload.cog), (radians(rng.uniform(0, 12)), side)
+    return Scenario('grasp', seconds, poses.named(q), slope, empty, (take,))
+
+
+def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """On a slope, the arm up with a load, it drives fast and stops dead, again and again."""
+    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
+    q = poses.vector(
+        shoulder_joint=radians(rng.uniform(70, 90)), elbow_joint=radians(rng.uniform(-40, 0))
+    )
+    slope = radians(rng.uniform(5.0, 24.0)), float(rng.choice([0.0, pi]))
+    commands: list[Command] = []
+    for begin in np.arange(3.0, seconds - 2.0, 3.0).tolist():
+        speed = float(rng.uniform(0.5, 1.8)) * float(rng.choice([-1.0, 1.0]))
+        commands += [Command(begin, drive=(speed, 0.0)), Command(begin + 1.0, drive=(0.0, 0.0))]
+    return Scenario('dash', seconds, poses.named(q), slope, load, tuple(commands))
+
+
+def _load(robot: Robot, rng: Rng, low: float, high: float) -> Payload:
+    return Payload(float(rng.uniform(low, high)), robot.payload.cog)
+
+
+KINDS: dict[str, Kind] = {
+    'work': work,
+    'tilt': tilt,
+    'swing': swing,
+    'reach': reach,
+    'grasp': grasp,
+    'dash': dash,
+}
+# Usual lengths (s).
+SECONDS = {'work': 120.0, 'tilt': 22.0, 'swing': 12.0, 'reach': 14.0, 'grasp': 10.0, 'dash': 15.0}
