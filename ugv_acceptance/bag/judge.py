@@ -1,17 +1,22 @@
 """A recording judged: read once, stretch by stretch, into margins, alerts, a summary, a result."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
-from ugv_acceptance.evaluation.recorded import MarginRows, RecordedEvaluator
+from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.rows import MarginRows
+from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, result_of
 
 # Version of the result's layout; changes where a reader of results must change.
 RESULT_VERSION = 1
+
+# Messages judged at a time: what a kernel works on then stays in the processor's cache.
+STRETCH = 16384
 
 Sink = Callable[[MarginRows], None]
 
@@ -31,15 +36,18 @@ def judge(
     settings: Settings,
     sinks: Sequence[Sink] = (),
     progress: Callable[[int], None] = lambda _: None,
+    *,
+    detail: bool = False,
 ) -> Judgement:
     """Return the judgement of a recording.
 
-    Each sink takes every stretch of margins in order; `progress` takes the log time (ns) reached.
+    Each sink takes every stretch of margins in order, with moments, energies and ZMP only where
+    `detail` is asked for; `progress` takes the log time (ns) reached.
     """
-    evaluator, summary = RecordedEvaluator(settings), Summary(settings)
+    evaluator, summary = RecordedEvaluator(settings, detail), Summary(settings)
     evaluator.start(bag.start_ns)
     reading = bag.batches(topics)
-    for batch in reading:
+    for batch in _stretches(reading):
         rows = evaluator.batch(batch)
         summary.add(rows)
         for sink in sinks:
@@ -56,6 +64,29 @@ def judge(
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
     }
     return Judgement(result, evaluator, reading.facts)
+
+
+def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:
+    """Yield batches put together until each has STRETCH messages: calls cost more than messages."""
+    held: list[Batch] = []
+    count = 0
+    for batch in batches:
+        held.append(batch)
+        count += sum(len(s.log_time) for s in batch.joints)
+        count += sum(len(s.log_time) for s in batch.imu)
+        if count >= STRETCH:
+            yield _together(held)
+            held, count = [], 0
+    if held:
+        yield _together(held)
+
+
+def _together(batches: Sequence[Batch]) -> Batch:
+    return Batch(
+        [s for b in batches for s in b.joints],
+        [s for b in batches for s in b.imu],
+        [s for b in batches for s in b.payload],
+    )
 
 
 def _bag_result(bag: Bag, facts: Facts) -> dict[str, Any]:

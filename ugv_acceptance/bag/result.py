@@ -10,7 +10,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.evaluation.recorded import MarginRows
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES, STATES
 

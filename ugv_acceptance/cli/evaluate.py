@@ -104,7 +104,14 @@ def judge_recording(
     sinks = [effort.add] if compare_effort else []
     with CsvSink(csv_file, config.settings, bag.start_ns) as csv:
         with progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress:
-            judged = judge(bag, topics, config.settings, [*sinks, *csv.sinks], progress)
+            judged = judge(
+                bag,
+                topics,
+                config.settings,
+                [*sinks, *csv.sinks],
+                progress,
+                detail=csv_file is not None,
+            )
     result = judged.result
     result['robot'] = {
         'name': config.name,

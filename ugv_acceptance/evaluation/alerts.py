@@ -63,6 +63,10 @@ class Signal:
     def __post_init__(self) -> None:
         self.on = self.rule.on
 
+    def judge_by(self, rule: Rule) -> None:
+        """Take another rule from now on; an alert that is active keeps its own."""
+        self.rule, self.on = rule, rule.on
+
     def step(self, now: int, value: float) -> None:
         """Take a value at time `now` (ns)."""
         if value >= self.on:
@@ -136,6 +140,8 @@ def runs(rule: Rule, values: NDArray[np.float64], raw: bool) -> Iterator[tuple[i
 def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[np.float64]) -> None:
     """Give a signal many samples at once: the same alerts as `step` for each."""
     if not len(values):
+        return
+    if signal.quiet and not np.fmax.reduce(values) >= signal.on:
         return
     for first, last, bad in runs(signal.rule, values, signal.raw):
         if bad:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.recorded import MarginRows
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
@@ -51,8 +51,9 @@ class EffortComparison:
             picked.append(at)
             self._next = int(rows.time[at]) + SPACING
             at = int(np.searchsorted(rows.time, self._next))
-        some = np.array(picked, dtype=np.intp)[rows.known[picked]] if picked else []
-        if len(some):
+        some = np.array(picked, dtype=np.intp)
+        some = some[rows.known[some]]
+        if some.size:
             parts = (rows.effort, rows.torque, rows.qd, rows.q, rows.gravity)
             self._rows.append((rows.time[some], np.hstack([part[some] for part in parts])))
 

@@ -20,8 +20,8 @@ CLOCK_SLACK = 1_000_000_000
 class Freshness:
     """Learns an input's period (median of every WINDOW intervals) and how long it may be silent.
 
-    `started` is when listening began (ns), `last` the receipt time of the newest message (None: none yet), `limit` the silence (ns) after
-    which the input is stale.
+    `started` is when listening began (ns), `last` the receipt time of the newest message (None: none
+    yet), `limit` the silence (ns) after which the input is stale.
     """
 
     delays: Delays
@@ -53,12 +53,12 @@ class Freshness:
         """Return `clock` of many messages, to be asked before `messages`."""
         wrong = np.abs(times - stamps) > CLOCK_SLACK
         if not len(times):
-            return wrong.astype(np.float64)
+            return np.zeros(0)
         first = times[0] if self.last is None else self.last
         before = stamps[0] if self.last is None else self.stamp
         step = np.diff(stamps, prepend=before) - np.diff(times, prepend=first)
         self.stamp = int(stamps[-1])
-        return (wrong | (np.abs(step) > CLOCK_SLACK)).astype(np.float64)
+        return np.where(wrong | (np.abs(step) > CLOCK_SLACK), 1.0, 0.0)
 
     def message(self, now: int) -> None:
         """Take the receipt time (ns) of a message."""

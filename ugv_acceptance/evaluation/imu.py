@@ -34,6 +34,8 @@ LONGEST_STEP = 1.0
 NORM_SLACK = 0.01
 # Share of g by which the accelerometer may differ from g and still show where up is.
 GRAVITY_SLACK = 0.15
+# Larger than any acceleration (m/s2) or rate (rad/s) of a vehicle: the number is something else.
+BELIEVABLE = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,8 @@ class ImuRows:
     """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
 
     `disagreement` (n,) is the angle (rad) between orientation and accelerometer, NaN while moving;
-    `strange` (n,) the share of g by which the acceleration differs from g at rest, NaN while moving.
+    `strange` (n,) the share of g by which the acceleration differs from g at rest, NaN while moving;
+    `unusable` (n,) says that gravity cannot be told or that a number cannot be believed.
     """
 
     time: Times
@@ -49,6 +52,7 @@ class ImuRows:
     gravity: Floats
     disagreement: Floats
     strange: Floats
+    unusable: NDArray[np.bool_]
 
 
 @dataclass(slots=True)
@@ -71,90 +75,99 @@ class ImuTracker:
         covariance_0: float,
         omega: Sequence[float],
         acceleration: Sequence[float],
-    ) -> tuple[Vector, float, float]:
-        """Take one message; return gravity, disagreement and strangeness as in ImuRows."""
-        self._filter(stamp, acceleration)
+    ) -> tuple[Vector, float, bool]:
+        """Take one message; return its gravity, strange and unusable as in ImuRows."""
+        size = self._filter(stamp, acceleration)
         imu, g = self.settings.imu, self.settings.robot.gravity
         x, y, z, w = orientation
-        ax, ay, az = self.smooth
-        size = math.sqrt(ax * ax + ay * ay + az * az)
-        still = _norm(omega) <= imu.rest_rate
+        spin = _norm(omega)
+        still = spin <= imu.rest_rate
         told = _orientation_tells(x, y, z, w, covariance_0, imu.attitude)
         shown = abs(size - g) <= GRAVITY_SLACK * g
         by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if told else NOWHERE
-        by_acceleration = up_from_acceleration(ax, ay, az, imu.mounting) if shown else NOWHERE
+        by_acceleration = up_from_acceleration(*self.smooth, imu.mounting) if shown else NOWHERE
         disagreement = math.nan
         if told and shown and still and abs(size - g) <= imu.rest_acceleration:
             disagreement = angle_between(by_orientation, by_acceleration)
         self.fault.step(now, disagreement)
         self.fault.advance(now)
         strange = abs(size - g) / g if still else math.nan
+        believable = size == size and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
         if self.fault.alert is not None:
-            return NOWHERE, disagreement, strange
+            return NOWHERE, strange, True
         if imu.specific_force:
-            return _force(self.smooth, omega, imu), disagreement, strange
+            if not believable or size == 0.0:
+                return NOWHERE, strange, True
+            return _force(self.smooth, omega, imu), strange, False
         up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
-        return (-g * up[0], -g * up[1], -g * up[2]), disagreement, strange
+        return (-g * up[0], -g * up[1], -g * up[2]), strange, not believable or up[0] != up[0]
 
-    def _filter(self, stamp: int, acceleration: Sequence[float]) -> None:
+    def _filter(self, stamp: int, acceleration: Sequence[float]) -> float:
+        """Low-pass an acceleration; return the size of what comes out, NaN if that is unknown."""
         ax, ay, az = acceleration
+        if not ax * ax + ay * ay + az * az <= BELIEVABLE * BELIEVABLE:
+            ax = ay = az = math.nan
         step = (stamp - self.stamp) * 1e-9
         self.stamp = stamp
         sx, sy, sz = self.smooth
-        if 0.0 < step <= LONGEST_STEP and sx == sx and sy == sy and sz == sz:  # noqa: PLR0124 - not NaN
+        if 0.0 < step <= LONGEST_STEP and sx == sx:  # noqa: PLR0124 - not NaN
             keep = math.exp(-step / self.settings.imu.low_pass)
             ax, ay, az = ax + keep * (sx - ax), ay + keep * (sy - ay), az + keep * (sz - az)
         self.smooth = (ax, ay, az)
+        return math.sqrt(ax * ax + ay * ay + az * az)
 
     def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
         """Take many messages: the same rows as `step` one at a time, in order of receipt."""
         columns = [s for s in segments if len(s.log_time)]
         if not columns:
-            none = np.empty(0, np.int64)
-            return ImuRows(none, none, np.empty((0, 3)), np.empty(0), np.empty(0))
+            none, nothing = np.empty(0, np.int64), np.empty(0)
+            return ImuRows(none, none, np.empty((0, 3)), nothing, nothing, nothing != 0.0)
         time = np.concatenate([s.log_time for s in columns])
-        order = np.argsort(time, kind='stable')
+        order = np.argsort(time, kind='stable') if (np.diff(time) < 0).any() else slice(None)
         time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
         q = np.concatenate([s.orientation for s in columns])[order].T
         covariance_0 = np.concatenate([s.orientation_covariance_0 for s in columns])[order]
         omega = np.concatenate([s.angular_velocity for s in columns])[order].T
-        smooth = self._filter_columns(
-            stamp, np.concatenate([s.linear_acceleration for s in columns])[order].T
-        )
-        return self._rows(time, stamp, q, covariance_0, omega, smooth)
+        acceleration = np.concatenate([s.linear_acceleration for s in columns])[order].T
+        with np.errstate(all='ignore'):
+            smooth = self._filter_columns(stamp, acceleration)
+            return self._rows(time, stamp, (q, covariance_0, omega), smooth)
 
     def _rows(
-        self,
-        time: Times,
-        stamp: Times,
-        q: Floats,
-        covariance_0: Floats,
-        omega: Floats,
-        smooth: Floats,
+        self, time: Times, stamp: Times, told_by: tuple[Floats, Floats, Floats], smooth: Floats
     ) -> ImuRows:
+        """Return the rows of orientation, its covariance and rate, and the smooth acceleration."""
         imu, g = self.settings.imu, self.settings.robot.gravity
-        with np.errstate(invalid='ignore', over='ignore', divide='ignore'):
-            size = np.sqrt((smooth * smooth).sum(axis=0))
-            still = np.sqrt((omega * omega).sum(axis=0)) <= imu.rest_rate
-            told = _orientation_tells(q[0], q[1], q[2], q[3], covariance_0, imu.attitude)
-            shown = np.abs(size - g) <= GRAVITY_SLACK * g
-            oriented = np.where(told, up_from_orientation(*q, imu.mounting), np.nan)
-            leaning = np.where(shown, up_from_acceleration(*smooth, imu.mounting), np.nan)
-            rest = still & (np.abs(size - g) <= imu.rest_acceleration)
-            angle = angle_between(tuple(oriented), tuple(leaning))
-            disagreement = np.where(rest, angle, np.nan)
-            strange = np.where(still, np.abs(size - g) / g, np.nan)
-        feed(self.fault, time, disagreement)
+        q, covariance_0, omega = told_by
+        size, spin = _norms(smooth), _norms(omega)
+        still = spin <= imu.rest_rate
+        told = _orientation_tells(q[0], q[1], q[2], q[3], covariance_0, imu.attitude)
+        shown = np.abs(size - g) <= GRAVITY_SLACK * g
+        oriented = np.where(told, up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting), np.nan)
+        up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
+        leaning = np.where(shown, up, np.nan)
+        rest = still & (np.abs(size - g) <= imu.rest_acceleration)
+        disagreement = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
+        strange = np.where(still, np.abs(size - g) / g, np.nan)
+        believable = (size == size) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
-            gravity = np.array(_force(tuple(smooth), tuple(omega), imu))
+            force = np.array(_force(tuple(smooth), tuple(omega), imu))
+            gravity = np.where(believable & (size != 0.0), force, np.nan)
         else:
             use = told if imu.attitude != 'accelerometer' else np.zeros(len(time), np.bool_)
             gravity = -g * np.where(use, oriented, leaning)
-        for alert in self.fault.log:
-            if alert.rule is self.fault.rule:
+        self._judge(time, disagreement, gravity)
+        unusable = ~believable | np.isnan(gravity[0])
+        return ImuRows(time, stamp, gravity.T, disagreement, strange, unusable)
+
+    def _judge(self, time: Times, disagreement: Floats, gravity: Floats) -> None:
+        """Feed the fault and take gravity away while it is active."""
+        before, seen = self.fault.alert, len(self.fault.log)
+        feed(self.fault, time, disagreement)
+        for alert in [before, *self.fault.log[seen:]]:
+            if alert is not None and alert.rule is self.fault.rule:
                 end = np.inf if alert.end is None else alert.end
                 gravity[:, (time >= alert.start) & (time < end)] = np.nan
-        return ImuRows(time, stamp, gravity.T, disagreement, strange)
 
     def _filter_columns(self, stamp: Times, x: Floats) -> Floats:
         """Low-pass many accelerations (3, n): the recursion of `_filter` in closed form.
@@ -164,7 +177,9 @@ class ImuTracker:
         """
         step = np.diff(stamp, prepend=self.stamp) * 1e-9
         self.stamp = int(stamp[-1])
-        finite = np.isfinite(x).all(axis=0)
+        finite = (x * x).sum(axis=0) <= BELIEVABLE * BELIEVABLE
+        if not finite.all():
+            x = np.where(finite, x, np.nan)
         carried = (step > 0.0) & (step <= LONGEST_STEP) & np.concatenate(([True], finite[:-1]))
         decay = np.where(carried, step / self.settings.imu.low_pass, 0.0)
         elapsed = np.cumsum(decay)
@@ -203,6 +218,12 @@ def _orientation_tells(
 def _norm(v: Sequence[float]) -> float:
     x, y, z = v
     return math.sqrt(x * x + y * y + z * z)
+
+
+def _norms(v: Floats) -> Floats:
+    x, y, z = v
+    size: Floats = np.sqrt(x * x + y * y + z * z)
+    return size
 
 
 def _force(smooth: Any, omega: Any, imu: ImuInput) -> Any:  # noqa: ANN401 - floats or arrays

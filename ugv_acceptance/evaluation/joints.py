@@ -26,7 +26,7 @@ class JointRows:
     """Merged joint states, one row a message that names one of the robot's joints.
 
     `q` (n, j) is NaN where a joint is unknown or its value cannot be used; `qd` and `effort` NaN
-    where not reported; `oldest` (n,) is the receipt time of the oldest position in the row.
+    where not reported or beyond belief; `oldest` (n,) is the receipt time of the oldest position in the row.
     """
 
     time: Times
@@ -91,7 +91,8 @@ class JointMerger:
             q = joint.sign * position[k] + joint.offset
             self.q[j] = q if lower <= q <= upper else math.nan
             self.seen[j] = now
-            self.qd[j] = joint.sign * velocity[k] if rates else math.nan
+            qd = joint.sign * velocity[k] if rates else math.nan
+            self.qd[j] = qd if -ABSURD <= qd <= ABSURD else math.nan
             scale = joint.effort_sign * joint.effort_scale
             self.effort[j] = scale * effort[k] if efforts else math.nan
         return True
@@ -101,45 +102,53 @@ class JointMerger:
         useful = [s for s in segments if self.layout(s.names) and s.position.shape[1]]
         time = np.concatenate([s.log_time for s in useful] or [np.empty(0, np.int64)])
         stamp = np.concatenate([s.stamp for s in useful] or [np.empty(0, np.int64)])
-        n, joints = len(time), len(self.settings.joints)
-        tables = np.full((4, n, joints), np.nan)
+        joints, n = len(self.settings.joints), len(time)
+        tables, named = np.empty((3, joints, n)), np.empty((joints, n), np.bool_)
         first = 0
         for segment in useful:
             rows = slice(first, first + len(segment.log_time))
-            self._fill(tables[:, rows], segment)
+            self._fill(tables[:, :, rows], named[:, rows], segment)
             first = rows.stop
-        order = np.argsort(time, kind='stable')
-        if (np.diff(order) != 1).any():
-            time, stamp, tables = time[order], stamp[order], tables[:, order]
-        return self._carry(time, stamp, tables)
+        if len(useful) > 1 and (np.diff(time) < 0).any():
+            order = np.argsort(time, kind='stable')
+            time, stamp = time[order], stamp[order]
+            tables, named = tables[:, :, order], named[:, order]
+        return self._carry(time, stamp, tables, named)
 
-    def _fill(self, tables: Floats, segment: JointStateColumns) -> None:
-        """Write a segment's positions, rates, efforts, and (last) 1 where a joint was named."""
+    def _fill(self, tables: Floats, named: NDArray[np.bool_], segment: JointStateColumns) -> None:
+        """Write a segment's positions, rates and efforts, and which joints it names."""
+        tables.fill(np.nan)
+        named.fill(False)
         for j, k in self.layout(segment.names):
-            joint, (lower, upper) = self.settings.joints[j], self._range[j]
-            q = joint.sign * segment.position[:, k] + joint.offset
-            with np.errstate(invalid='ignore'):
-                tables[0, :, j] = np.where((q >= lower) & (q <= upper), q, np.nan)
-            if segment.velocity.shape[1]:
-                tables[1, :, j] = joint.sign * segment.velocity[:, k]
-            if segment.effort.shape[1]:
-                tables[2, :, j] = joint.effort_sign * joint.effort_scale * segment.effort[:, k]
-            tables[3, :, j] = 1.0
+            joint = self.settings.joints[j]
+            with np.errstate(all='ignore'):
+                q = joint.sign * segment.position[:, k] + joint.offset
+                tables[0, j] = _within(q, self._range[j])
+                if segment.velocity.shape[1]:
+                    qd = joint.sign * segment.velocity[:, k]
+                    tables[1, j] = _within(qd, (-ABSURD, ABSURD))
+                if segment.effort.shape[1]:
+                    scale = joint.effort_sign * joint.effort_scale
+                    tables[2, j] = scale * segment.effort[:, k]
+            named[j] = True
 
-    def _carry(self, time: Times, stamp: Times, tables: Floats) -> JointRows:
+    def _carry(
+        self, time: Times, stamp: Times, tables: Floats, named: NDArray[np.bool_]
+    ) -> JointRows:
         """Let every joint keep its newest value until the next message that names it."""
-        named = tables[3] == 1.0
-        oldest = time.copy()
-        if not named.all():
-            for j in range(named.shape[1]):
-                self._carry_joint(j, time, tables, named[:, j], oldest)
+        oldest = time
+        whole = named.all(axis=1)
+        if not whole.all():
+            oldest = time.copy()
+            for j in np.flatnonzero(~whole).tolist():
+                self._carry_joint(j, time, tables, named[j], oldest)
         if len(time):
-            self.q, self.qd, self.effort = (tables[k, -1].tolist() for k in range(3))
-            last = time[len(time) - 1 - named[::-1].argmax(axis=0)]
-            pairs = zip(named.any(axis=0), last, self.seen, strict=True)
-            self.seen = [int(t) if any_ else before for any_, t, before in pairs]
-        unusable = (np.isnan(tables[0]) & (tables[3] == 1.0)).any(axis=1)
-        return JointRows(time, stamp, tables[0], tables[1], tables[2], oldest, unusable)
+            self.q, self.qd, self.effort = tables[:, :, -1].tolist()
+        for j in np.flatnonzero(named.any(axis=1)).tolist():
+            self.seen[j] = int(time[len(time) - 1 - named[j, ::-1].argmax()])
+        unusable = (np.isnan(tables[0]) & named).any(axis=0)
+        q, qd, effort = (table.T for table in tables)
+        return JointRows(time, stamp, q, qd, effort, oldest, unusable)
 
     def _carry_joint(
         self, j: int, time: Times, tables: Floats, named: NDArray[np.bool_], oldest: Times
@@ -147,11 +156,20 @@ class JointMerger:
         newest = np.maximum.accumulate(np.where(named, np.arange(len(time)), -1))
         known = newest >= 0
         before = (self.q[j], self.qd[j], self.effort[j])
-        for table, value in zip(tables[:3], before, strict=True):
-            table[:, j] = np.where(known, table[newest, j], value)
+        for table, value in zip(tables, before, strict=True):
+            table[j] = np.where(known, table[j, newest], value)
         seen = np.where(known, time[newest], self.seen[j])
         np.minimum(oldest, seen, out=oldest)
-        tables[3, :, j] = seen != NEVER
+        named[:] = seen != NEVER
+
+
+def _within(values: Floats, limits: tuple[float, float]) -> Floats:
+    """Return the values, NaN in place of those that cannot be believed."""
+    lower, upper = limits
+    outside = ~((values >= lower) & (values <= upper))
+    if outside.any():
+        values[outside] = np.nan
+    return values
 
 
 def _believable(joint: Joint) -> tuple[float, float]:

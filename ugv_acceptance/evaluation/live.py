@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from ugv_acceptance.evaluation.alerts import OK, STALE
 from ugv_acceptance.evaluation.freshness import Freshness
@@ -111,11 +112,11 @@ class LiveEvaluator:
     ) -> Margins | None:
         """Take an Imu message (sensor axes); return as `joint_state` does."""
         self._arrived(1, now, stamp, self.watch.imu)
-        gravity, _, strange = self._imu.step(
+        gravity, strange, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration
         )
         self.watch.strange.step(now, strange)
-        self.watch.imu.invalid.step(now, 0.0 if gravity[0] == gravity[0] else 1.0)
+        self.watch.imu.invalid.step(now, 1.0 if unusable else 0.0)
         self._gravity = gravity
         return self._evaluate(now, stamp)
 
@@ -135,7 +136,7 @@ class LiveEvaluator:
             self.payload = settings.robot.payload
         self.settings = self.watch.settings = self._imu.settings = settings
         for signal, other in zip(self.watch.signals(), Watch(settings).signals(), strict=True):
-            signal.rule = other.rule
+            signal.judge_by(other.rule)
         for fresh in self._fresh:
             fresh.delays = settings.delays
 
@@ -179,7 +180,7 @@ class LiveEvaluator:
             return None
         if not self._alive(now):
             return None
-        torque = torque_of(posture, gravity)
+        torque: Any = torque_of(posture, gravity)
         stability = stability_of(self._stance, gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)

@@ -1,20 +1,64 @@
-"""What is carried: a declared payload, where it can be believed."""
+"""What is carried: a declared payload, where it can be believed, and when which one was declared."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.model.robot import Payload, Robot
+
+Floats = NDArray[np.float64]
+Times = NDArray[np.int64]
+
+# More than any load or reach of a robot arm: the number is not a mass (kg), not a distance (m).
+ABSURD_MASS = 1e5
+ABSURD_DISTANCE = 1e3
+# Before any message.
+BEFORE = -(2**62)
 
 
 def payload_from(robot: Robot, mass: float, com: Sequence[float], frame: str) -> Payload | None:
     """Return the payload of a message, None where it cannot be used.
 
-    The mass (kg) must be finite and not negative, the centre of gravity finite, and given in the
-    axes of the robot's payload link (an empty frame is taken for that).
+    The mass (kg) must be a believable number and not negative, the centre of gravity (m) too, and
+    given in the axes of the robot's payload link (an empty frame is taken for that).
     """
     x, y, z = (float(c) for c in com)
-    numbers = (float(mass), x, y, z)
     known = robot.payload_link is not None and frame.lstrip('/') in ('', robot.payload_link)
-    if not known or mass < 0 or not all(map(math.isfinite, numbers)):
+    if not known or not 0.0 <= mass <= ABSURD_MASS:
+        return None
+    if not math.hypot(x, y, z) <= ABSURD_DISTANCE:
         return None
     return Payload(float(mass), (x, y, z))
+
+
+@dataclass(slots=True)
+class PayloadHistory:
+    """Which payload was in force when: since (ns) and the payload, oldest first."""
+
+    initial: Payload
+    _since: list[int] = field(init=False)
+    _declared: list[Payload] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._since, self._declared = [BEFORE], [self.initial]
+
+    def declare(self, when: int, payload: Payload) -> None:
+        """Take a payload that counts from the first joint state at or after `when` (ns) on."""
+        self._since.append(when)
+        self._declared.append(payload)
+
+    def at(self, times: Times) -> tuple[Floats | float, ...]:
+        """Return mass and centre of gravity (4) in force at `times` (n,): floats if all the same.
+
+        What was in force before the last of `times` is forgotten.
+        """
+        place = np.searchsorted(np.array(self._since), times, side='right') - 1
+        first, last = int(place[0]), int(place[-1])
+        table = [(p.mass, *p.cog) for p in self._declared[first : last + 1]]
+        del self._since[:last], self._declared[:last]
+        if len(table) == 1:
+            return table[0]
+        return tuple(np.array(table)[place - first].T)

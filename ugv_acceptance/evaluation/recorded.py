@@ -1,6 +1,6 @@
 """The evaluation of a recording: batches of columns in, blocks of margins out, same rules as live."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
@@ -11,48 +11,28 @@ from ugv_acceptance.evaluation.alerts import feed
 from ugv_acceptance.evaluation.freshness import Freshness
 from ugv_acceptance.evaluation.imu import ImuRows, ImuTracker
 from ugv_acceptance.evaluation.joints import JointMerger, JointRows
+from ugv_acceptance.evaluation.payload import PayloadHistory, payload_from
+from ugv_acceptance.evaluation.rows import Floats, MarginRows, Pairs, Times
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
-from ugv_acceptance.evaluation.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.watch import InputSignals, Watch
-from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of, take
-from ugv_acceptance.model.stability import NO_CONTACT, stability_of, stances_of, take_stance
-from ugv_acceptance.model.statics import torque_of
-
-Floats = NDArray[np.float64]
-Times = NDArray[np.int64]
+from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.rows import ALL, Rows, pick
+from ugv_acceptance.model.stability import (
+    NO_CONTACT,
+    UNKNOWN,
+    Stance,
+    stability_of,
+    stances_of,
+    take_stance,
+    tip_angles_of,
+)
 
 # A stretch of silence (ns): from when the input was stale to its next message.
 Gap = tuple[int, int]
 
-UNKNOWN = -1
-
-
-@dataclass(frozen=True, slots=True)
-class MarginRows:
-    """Margins of a stretch of a recording, one row a message of either input, in order of receipt.
-
-    `until` (ns) is how long a row holds: to the next message or until an input is stale; `known`
-    says which rows have margins, the others are NaN. `joints` and `imu` number the pair's messages
-    in the arrays of this stretch, whose row 0 is the newest message of the stretch before.
-    Torques (n, j) in N m (N), their levers' measured counterpart in `effort`; angles (n, 4) rad to
-    SIDES, moments N m, energies J, ZMP distance m.
-    """
-
-    time: Times
-    stamp: Times
-    until: Times
-    known: NDArray[np.bool_]
-    q: Floats
-    qd: Floats
-    effort: Floats
-    gravity: Floats
-    torque: Floats
-    angle: Floats
-    moment: Floats
-    energy: Floats
-    zmp: Floats
-    state: NDArray[np.int8]
+# A row that stands for "no message yet".
+NEVER = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +47,20 @@ class _Newest:
 
 @dataclass(slots=True)
 class RecordedEvaluator:
-    """Takes the batches of a recording in order; `watch.log` holds the alerts at the end."""
+    """Takes the batches of a recording in order; `watch.log` holds the alerts at the end.
+
+    Moments, energies and ZMP are computed only with `detail`.
+    """
 
     settings: Settings
+    detail: bool = False
     watch: Watch = field(init=False)
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
     fresh: tuple[Freshness, Freshness] = field(init=False)
     _carry: _Newest = field(init=False)
-    _payload: tuple[float, float, float, float] = field(init=False)
+    _payload: PayloadHistory = field(init=False)
     gaps: tuple[list[Gap], list[Gap]] = field(default_factory=lambda: ([], []))
 
     def __post_init__(self) -> None:
@@ -86,12 +70,12 @@ class RecordedEvaluator:
         self._joints = JointMerger(self.settings)
         self._imu = ImuTracker(self.settings, self.watch.disagreement)
         self.fresh = (Freshness(self.settings.delays), Freshness(self.settings.delays))
-        self._payload = (robot.payload.mass, *robot.payload.cog)
-        never = np.full(1, UNKNOWN, np.int64)
+        self._payload = PayloadHistory(robot.payload)
+        never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
         nothing = np.full(1, np.nan)
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
-        imu = ImuRows(never, never, np.full((1, 3), np.nan), nothing, nothing)
+        imu = ImuRows(never, never, np.full((1, 3), np.nan), nothing, nothing, never < 0)
         self._carry = _Newest(joints, never, imu, never)
 
     def start(self, now: int) -> None:
@@ -117,13 +101,14 @@ class RecordedEvaluator:
         joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
         self._watch_inputs(joints, joint_limits, imu)
+        self._take_payloads(batch.payload)
         newest = _Newest(
             _lead(self._carry.joints, joints),
             np.concatenate((self._carry.joints_until, joints.oldest + joint_limits)),
             _lead(self._carry.imu, imu),
             np.concatenate((self._carry.imu_until, imu.time + imu_limits)),
         )
-        rows = self._margins(newest, self._payload_of(newest.joints.time, batch.payload))
+        rows = self._margins(newest)
         self._watch_pairs(rows)
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
@@ -152,106 +137,121 @@ class RecordedEvaluator:
         late = (joints.time - joints.oldest > limits).astype(np.float64)
         feed(self.watch.missing, joints.time, late)
         for signal, rate in zip(self.watch.speed, joints.qd.T, strict=True):
-            feed(signal, joints.time, np.abs(rate))
+            if signal.on < np.inf:
+                feed(signal, joints.time, np.abs(rate))
         feed(self.watch.strange, imu.time, imu.strange)
-        invalid = np.isnan(imu.gravity[:, 0]).astype(np.float64)
-        feed(self.watch.imu.invalid, imu.time, invalid)
+        feed(self.watch.imu.invalid, imu.time, imu.unusable.astype(np.float64))
 
-    def _payload_of(self, times: Times, segments: Sequence[PayloadColumns]) -> list[Floats]:
-        """Return payload mass and centre of gravity (4 arrays) in force at each joint state."""
-        known = [self._payload]
-        since = [UNKNOWN - 1]
-        for segment in segments:
-            for k, when in enumerate(segment.log_time.tolist()):
-                payload = payload_from(
-                    self.settings.robot, segment.mass[k], segment.com[k], segment.frame_id
-                )
-                self.watch.payload.step(when, 0.0 if payload else 1.0)
-                if payload:
-                    known.append((payload.mass, *payload.cog))
-                    since.append(when)
-        self._payload = known[-1]
-        newest = np.searchsorted(np.array(since), times, side='right') - 1
-        return list(np.array(known)[newest].T)
+    def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
+        messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
+        for when, s, k in sorted(messages, key=lambda message: message[0]):
+            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
+            self.watch.payload.step(when, 0.0 if payload else 1.0)
+            if payload:
+                self._payload.declare(when, payload)
 
-    def _margins(self, newest: _Newest, payload: list[Floats]) -> MarginRows:
+    def _margins(self, newest: _Newest) -> MarginRows:
         """Return the margins of every message after the leading rows."""
         joints, imu = newest.joints, newest.imu
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
-        of_joints = order < len(joints.time) - 1
-        j, i = np.cumsum(of_joints), np.cumsum(~of_joints)
-        fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
+        from_joints = order < len(joints.time) - 1
         time = time[order]
-        gravity = imu.gravity[i]
-        whole = np.isfinite(joints.q).all(axis=1)
-        known = (time <= fresh_until) & whole[j] & np.isfinite(gravity[:, 0])
-        table = self._table(joints.q, whole, payload, j, gravity, known)
+        pairs = Pairs(joints, imu, np.cumsum(from_joints), np.cumsum(~from_joints))
+        j, i = pairs.of_joints, pairs.of_imu
+        fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
+        whole: NDArray[np.bool_] = np.isfinite(joints.q).all(axis=1)
+        known: NDArray[np.bool_] = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
+        table, state = self._table(pairs, whole, known)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
             time=time,
             stamp=np.concatenate((joints.stamp[1:], imu.stamp[1:]))[order],
             until=np.minimum(fresh_until, np.append(time[1:], fresh_until[-1:])),
             known=known,
-            q=joints.q[j],
-            qd=joints.qd[j],
-            effort=joints.effort[j],
-            gravity=gravity,
             torque=table[:n].T,
             angle=table[n : n + 4].T,
+            state=state,
             moment=table[n + 4 : n + 8].T,
             energy=table[n + 8 : n + 12].T,
-            zmp=table[n + 12],
-            state=table[n + 13].astype(np.int8),
+            zmp=table[n + 12 :].reshape(-1),
+            pairs=pairs,
         )
 
     def _table(
-        self,
-        q: Floats,
-        whole: NDArray[np.bool_],
-        payload: list[Floats],
-        j: NDArray[np.intp],
-        gravity: Floats,
-        known: NDArray[np.bool_],
-    ) -> Floats:
-        """Return torques, angles, moments, energies, ZMP and state (rows) of the known messages."""
+        self, pairs: Pairs, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+    ) -> tuple[Floats, NDArray[np.int8]]:
+        """Return torques, angles and what `detail` adds (lines of a table), and the states."""
+        q = pairs.joints.q
+        payload = self._payload.at(pairs.joints.time)
         n = q.shape[1]
-        table = np.full((n + 14, len(j)), np.nan)
-        table[n + 13] = UNKNOWN
-        rows = np.flatnonzero(known)
-        if not len(rows):
-            return table
-        columns = np.where(whole[:, None], q, 0.0).T
+        table = np.empty((n + (13 if self.detail else 4), len(known)))
+        state = np.full(len(known), UNKNOWN, np.int8)
+        rows: Rows = ALL
+        if not known.all():
+            table.fill(np.nan)
+            rows = np.flatnonzero(known)
+        j, i = pairs.of_joints[rows], pairs.of_imu[rows]
+        if not len(j):
+            return table, state
+        columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
         mass, x, y, z = payload
-        posture = posture_of(self._mechanics, list(columns), mass, (x, y, z))
-        g = tuple(gravity[rows].T)
-        torque = torque_of(take(posture, j[rows]), (g[0], g[1], g[2]))
-        for line, value in zip(table, torque, strict=False):
-            line[rows] = value
-        place = np.full(len(q), UNKNOWN)
-        for of, stance in stances_of(self._mechanics, posture, len(q)):
-            place[:] = UNKNOWN
+        posture = posture_of(self._mechanics, columns, mass, (x, y, z))
+        gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
+        with np.errstate(over='ignore', invalid='ignore'):
+            for line, lever in zip(table, posture.levers, strict=False):
+                line[rows] = _product(lever, j, gravity)
+        for some, stance in self._stances(posture, len(q), j):
+            found = self._stability(stance, pick(gravity, some))
+            place = some if isinstance(rows, slice) else rows[some]
+            for line, value in zip(table[n:], found, strict=False):
+                line[place] = value
+            state[place] = found[-1]
+        return table, state
+
+    def _stances(
+        self, posture: Posture, count: int, j: NDArray[np.intp]
+    ) -> Iterator[tuple[Rows, Stance]]:
+        """Yield the stances of the messages whose joint rows are `j`, each with its messages."""
+        place = np.empty(count, np.intp)
+        for of, stance in stances_of(self._mechanics, posture, count):
+            if of is ALL:
+                yield ALL, take_stance(stance, j)
+                return
+            place.fill(NEVER)
             place[of] = np.arange(len(place[of]))
-            at = place[j[rows]]
-            some = rows[at >= 0]
-            taken = take_stance(stance, at[at >= 0])
-            found = stability_of(taken, tuple(gravity[some].T))
-            values = (*found.angle, *found.moment, *found.energy, found.zmp, found.state)
-            for line, value in zip(table[n:], values, strict=True):
-                line[some] = value
-        return table
+            at = place[j]
+            some = np.flatnonzero(at >= 0)
+            if len(some):
+                yield some, take_stance(stance, at[some])
+
+    def _stability(self, stance: Stance, gravity: Any) -> tuple[Any, ...]:  # noqa: ANN401 - arrays
+        if not self.detail:
+            angle, state = tip_angles_of(stance, gravity)
+            return *angle, state
+        found = stability_of(stance, gravity)
+        return *found.angle, *found.moment, *found.energy, found.zmp, found.state
 
     def _watch_pairs(self, rows: MarginRows) -> None:
-        time = rows.time[rows.known]
-        for (warn, error), torque in zip(self.watch.torque, rows.torque.T, strict=True):
-            load = np.abs(torque[rows.known])
-            feed(warn, time, load)
-            feed(error, time, load)
-        for (warn, error), angle in zip(self.watch.tip, rows.angle.T, strict=True):
-            less = -angle[rows.known]
-            feed(warn, time, less)
-            feed(error, time, less)
-        feed(self.watch.support, time, (rows.state[rows.known] >= NO_CONTACT).astype(np.float64))
+        all_known = rows.known.all()
+        time = rows.time if all_known else rows.time[rows.known]
+        pairs = zip((*rows.torque.T, *rows.angle.T), (*self.watch.torque, *self.watch.tip), strict=True)
+        for k, (values, (warn, error)) in enumerate(pairs):
+            if warn.on == np.inf:
+                continue
+            some = values if all_known else values[rows.known]
+            worse = np.abs(some) if k < len(self.watch.torque) else -some
+            feed(warn, time, worse)
+            feed(error, time, worse)
+        state = rows.state if all_known else rows.state[rows.known]
+        feed(self.watch.support, time, (state >= NO_CONTACT).astype(np.float64))
+
+
+def _product(lever: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401
+    """Return lever . gravity where the lever's numbers are floats or arrays of joint rows."""
+    x, y, z = pick(lever, rows)
+    product: Floats = x * gravity[0] + y * gravity[1] + z * gravity[2]
+    return product
 
 
 def _lead(before: Any, rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
-from ugv_acceptance.evaluation.recorded import MarginRows
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.watch import FAILURES
 from ugv_acceptance.evaluation.wording import describe

@@ -1,0 +1,169 @@
+"""Decode differently, evaluate once: a live monitor and a recording come to the same."""
+
+import math
+from collections import Counter
+from random import Random
+from typing import Any
+
+import hypothesis
+import numpy as np
+import pytest
+from evaluation.streams import (
+    MS,
+    T0,
+    Carry,
+    Imu,
+    Joints,
+    Message,
+    S,
+    live,
+    recorded,
+    run_of,
+    settings,
+    split,
+    streams,
+)
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, Settings
+
+LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
+
+
+def facts(alerts: list[Alert]) -> Counter[tuple[Any, ...]]:
+    """Return what an alert says, as something to compare without its order."""
+    return Counter(
+        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}') for a in alerts
+    )
+
+
+def compare(
+    told: Settings, messages: list[Message], cuts: list[int], ticks: list[int], rest: int
+) -> None:
+    """Evaluate messages both ways and hold margins and alerts to each other."""
+    end = messages[-1].time + rest
+    seen, alerts = live(told, messages, end, ticks)
+    rows, evaluator = recorded(told, split(messages, cuts), end)
+    of_rows = {int(t): (part, k) for part in rows for k, t in enumerate(part.time)}
+    events = 0
+    for message, margins in seen:
+        if message.time not in of_rows:
+            continue
+        events += 1
+        part, k = of_rows[message.time]
+        assert bool(part.known[k]) == (margins is not None)
+        if margins is None:
+            continue
+        s = margins.stability
+        one = [*margins.q, *margins.gravity, *margins.torque, *s.angle, *s.moment, *s.energy, s.zmp]
+        many = [
+            *(part.q[k], part.gravity[k], part.torque[k]),
+            *(part.angle[k], part.moment[k], part.energy[k], part.zmp[k : k + 1]),
+        ]
+        np.testing.assert_allclose(np.array(one), np.concatenate(many), rtol=1e-12, atol=1e-12)
+        assert (margins.stamp, s.state) == (part.stamp[k], part.state[k])
+    assert events == len(of_rows)
+    assert facts(alerts) == facts(evaluator.watch.log)
+
+
+@hypothesis.settings(max_examples=200)
+@given(
+    streams(),
+    st.lists(st.integers(0, 120), max_size=5),
+    st.lists(st.integers(0, 3000), max_size=20),
+    st.integers(0, 3 * S),
+    st.sampled_from(LIVE_INPUTS),
+    st.booleans(),
+)
+def test_margins_and_alerts_are_equal(
+    messages: list[Message],
+    cuts: list[int],
+    ticks: list[int],
+    rest: int,
+    attitude: str,
+    specific_force: bool,  # noqa: FBT001 - drawn
+) -> None:
+    """Whatever comes, in whatever batches, whenever the clock ticks."""
+    imu = ImuInput(
+        attitude=attitude, specific_force=specific_force, position=(0.1, 0.0, 0.2),
+        agreement_delay=0.05,
+    )  # fmt: skip
+    delays = Delays(tip_on=0.02, torque_on=0.03, off=0.1)
+    compare(settings(imu, delays), messages, cuts, [T0 + t * MS for t in ticks], rest)
+
+
+@hypothesis.settings(max_examples=20)
+@given(st.lists(st.integers(0, 900), max_size=8), st.integers(0, 1000))
+def test_long_runs_are_equal_too(cuts: list[int], seed: int) -> None:
+    """Over enough messages that periods are learnt, with a gap and a payload in the middle."""
+    random = Random(seed)
+    run = [m for m in run_of(6.0) if not 3 * S < m.time - T0 < 3.5 * S or isinstance(m, Imu)]
+    messages = [
+        Joints(m.time, position=(random.uniform(-1.5, 0.5), 0.1)) if isinstance(m, Joints) else m
+        for m in run
+        if random.random() < 0.9
+    ]
+    middle = len(messages) // 2
+    messages.insert(middle, Carry(messages[middle - 1].time + 1, 3.0))
+    compare(settings(), messages, cuts, [], S)
+
+
+def test_a_payload_counts_from_the_next_joint_state_on() -> None:
+    """Also where the batch ends between the payload, the IMU and the joint state that follow."""
+    messages: list[Message] = [
+        Imu(T0 + MS),
+        Joints(T0 + 2 * MS),
+        Carry(T0 + 3 * MS, 5.0),
+        Imu(T0 + 4 * MS),
+        Joints(T0 + 5 * MS),
+    ]
+    for cut in range(6):
+        rows, _ = recorded(settings(), split(messages, [cut]), T0 + S)
+        torque = np.concatenate([part.torque[:, 0] for part in rows])
+        assert torque[1] == torque[2]
+        assert torque[3] > torque[1] + 30.0
+
+
+@pytest.mark.parametrize('absent', [Joints, Imu])
+def test_an_absent_input_is_never_ok(absent: type) -> None:
+    """Without joints or without IMU there are no margins, all of the time."""
+    messages = [m for m in run_of(3.0) if not isinstance(m, absent)]
+    seen, alerts = live(settings(), messages, T0 + 3 * S, [T0 + 600 * MS])
+    assert all(margins is None for _, margins in seen)
+    subject = 'joint_states' if absent is Joints else 'imu'
+    stale = [a for a in alerts if a.rule.code == 'INPUT_STALE']
+    assert [(a.rule.subject, a.start, a.end) for a in stale] == [(subject, T0 + 500 * MS, None)]
+    rows, _ = recorded(settings(), [messages], T0 + 3 * S)
+    assert not rows[0].known.any()
+
+
+@pytest.mark.parametrize('silent', [Joints, Imu])
+def test_an_input_that_falls_silent_makes_margins_unknown(silent: type) -> None:
+    """From its limit on, three periods but at least 0.1 s, every margin is unknown."""
+    messages = [m for m in run_of(6.0) if not (isinstance(m, silent) and m.time > T0 + 4 * S)]
+    last = max(m.time for m in messages if isinstance(m, silent))
+    seen, _ = live(settings(), messages, T0 + 6 * S)
+    late = [margins for m, margins in seen if m.time > last + 100 * MS]
+    assert len(late) > 90
+    assert set(late) == {None}
+
+
+def test_half_of_the_joints_gone_makes_margins_unknown() -> None:
+    """A joint that is no longer refreshed is missing, though its topic is alive."""
+    messages: list[Message] = [
+        Joints(m.time, ('lift',), (0.1,)) if isinstance(m, Joints) and m.time > T0 + 4 * S else m
+        for m in run_of(6.0)
+    ]
+    seen, alerts = live(settings(), messages, T0 + 6 * S)
+    assert seen[-1][1] is None
+    assert ('INPUT_INCOMPLETE', 'joint_states') in {(a.rule.code, a.rule.subject) for a in alerts}
+
+
+def test_a_position_that_is_not_a_number_makes_margins_unknown() -> None:
+    """Not the joint's last value, nor zero."""
+    messages = [*run_of(1.0), Joints(T0 + S, position=(math.nan, 0.0)), Imu(T0 + S + MS)]
+    seen, alerts = live(settings(), messages, T0 + S + MS)
+    assert [margins for _, margins in seen[-2:]] == [None, None]
+    assert ('INPUT_INVALID', 'joint_states') in {(a.rule.code, a.rule.subject) for a in alerts}
