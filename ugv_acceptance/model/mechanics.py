@@ -136,6 +136,17 @@ def posture_of(mechanics: Mechanics, q: Sequence[Number], mass: Number, cog: Tri
     return Posture(*mechanics.posture.run(*q, mass, *cog))
 
 
+def posture_once(
+    robot: Robot, q: Sequence[float], mass: float, cog: tuple[float, float, float]
+) -> Posture:
+    """Return the posture of a robot that is asked for once, such as one with a moved mass.
+
+    The same formula run with floats: nothing is compiled, which takes longer than one run.
+    """
+    formula = _posture_formula(robot, tree_of(robot))
+    return Posture(*formula(*q, mass, *cog))
+
+
 def take(posture: Posture, rows: Rows) -> Posture:
     """Return the rows of a posture of arrays; what is the same for all samples stays a float."""
     p = posture
