@@ -49,7 +49,7 @@ class Monitor(LifecycleNode):
         self.session: Session | None = None
         self.problem = ''
         self._settings: Settings | None = None
-        self._knobs: tuple[Knob, ...] = ()
+        self.knobs: tuple[Knob, ...] = ()
         self._inputs: Inputs | None = None
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
@@ -130,7 +130,7 @@ class Monitor(LifecycleNode):
             if not self.has_parameter(knob.name):
                 self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
         values = {knob.name: self._value(knob.name) for knob in knobs}
-        self._settings, self._knobs = changed(defaults, knobs, values), knobs
+        self._settings, self.knobs = changed(defaults, knobs, values), knobs
         self.output.hardware_id = self.config.serial or self.config.name
         self._margins = MarginOutput(self, self._settings)
 
@@ -162,11 +162,11 @@ class Monitor(LifecycleNode):
         self._inputs = self._tick = self.session = None
 
     def _clean_up(self) -> None:
-        for knob in self._knobs:
+        for knob in self.knobs:
             self.undeclare_parameter(knob.name)
         if self._margins is not None:
             self._margins.destroy()
-        self._knobs, self._margins = (), None
+        self.knobs, self._margins = (), None
         self.config = self._settings = None
 
     # Time
@@ -260,7 +260,7 @@ class Monitor(LifecycleNode):
             if fixed:
                 raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
             if self._settings is not None:
-                changed(self._settings, self._knobs, values)
+                changed(self._settings, self.knobs, values)
         except (BadConfig, TypeError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -268,7 +268,7 @@ class Monitor(LifecycleNode):
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         values = {parameter.name: parameter.value for parameter in parameters}
         if self._settings is not None:
-            self._settings = changed(self._settings, self._knobs, values)
+            self._settings = changed(self._settings, self.knobs, values)
             if self.session is not None:
                 self.session.adopt(self._settings)
         self._take_rates()

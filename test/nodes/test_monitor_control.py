@@ -1,0 +1,285 @@
+"""The monitor under control: lifecycle, services, parameters, its end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from live_case import ERROR, FOLDED, OK, STALE, WARN, Live, levels, session_of
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.nodes.outputs import LATCHED
+
+STRETCHED = (0.0, 0.0, 0.0, 2.0)
+
+
+def change(live: Live, transition: int) -> bool:
+    """Ask the monitor for a transition as a lifecycle manager does."""
+    request = ChangeState.Request(transition=Transition(id=transition))
+    return bool(live.call(ChangeState, '/acceptance_monitor/change_state', request).success)
+
+
+def state(live: Live) -> str:
+    """Return the monitor's state as it tells others."""
+    return str(live.call(GetState, '/acceptance_monitor/get_state').current_state.label)
+
+
+def put(monitor: Any, **values: Any) -> Any:
+    """Set parameters at once, as set_parameters_atomically does."""
+    parameters = [Parameter(k.replace('__', '.'), value=v) for k, v in values.items()]
+    return monitor.set_parameters_atomically(parameters)
+
+
+def test_a_manager_walks_it_through_its_states(live: Live) -> None:
+    """With autostart false a lifecycle manager configures, activates, deactivates, cleans up."""
+    monitor = live.monitor(autostart=False)
+    assert state(live) == 'unconfigured'
+    assert change(live, Transition.TRANSITION_CONFIGURE)
+    assert state(live) == 'inactive'
+    assert change(live, Transition.TRANSITION_ACTIVATE)
+    assert state(live) == 'active'
+    assert monitor.count_subscribers('/joint_states') == 1
+    assert change(live, Transition.TRANSITION_DEACTIVATE)
+    assert change(live, Transition.TRANSITION_CLEANUP)
+    assert state(live) == 'unconfigured'
+    assert not monitor.has_parameter('limits.tip_warn_deg')
+
+
+def test_a_deactivated_monitor_is_stale_and_not_silent(live: Live) -> None:
+    """Deactivated it hears nothing, and says STALE every second."""
+    monitor, driver = live.running()
+    assert change(live, Transition.TRANSITION_DEACTIVATE)
+    live.until(lambda: not driver.connected())
+    driver.verdicts.clear()
+    live.until(lambda: len(driver.verdicts) >= 2, driver.send)
+    assert set(levels(driver)) == {STALE}
+    assert monitor.session is None
+
+
+def test_it_can_be_activated_again(live: Live) -> None:
+    """A monitor that was deactivated gives margins again after activation."""
+    monitor, driver = live.running()
+    assert change(live, Transition.TRANSITION_DEACTIVATE)
+    assert change(live, Transition.TRANSITION_ACTIVATE)
+    live.until(lambda: session_of(monitor).evaluator.margins is not None, driver.send)
+
+
+def test_a_bad_configuration_is_refused_with_its_reason(live: Live) -> None:
+    """Configuring with a file that is not there fails; the verdict says which file."""
+    live.monitor(up=False, config='/nowhere/robot.yaml')
+    driver = live.driver()
+    assert not change(live, Transition.TRANSITION_CONFIGURE)
+    live.until(lambda: driver.verdicts and '/nowhere/robot.yaml' in driver.verdicts[-1].message)
+    assert state(live) == 'unconfigured'
+
+
+def test_autostart_with_a_bad_configuration_raises(live: Live) -> None:
+    """Brought up by itself it does not go on with a bad configuration."""
+    monitor = live.monitor(up=False, config='/nowhere/robot.yaml')
+    with pytest.raises(BadConfig, match='/nowhere/robot.yaml'):
+        monitor.bring_up()
+
+
+def test_the_verdict_is_latched(live: Live) -> None:
+    """Who subscribes late gets the last verdict at once."""
+    live.running()
+    late = live.add(__import__('rclpy').create_node('late'))
+    heard: list[Any] = []
+    late.create_subscription(
+        DiagnosticStatus, 'acceptance_monitor/verdict', heard.append, LATCHED
+    )
+    live.until(lambda: heard)
+
+
+def overload(live: Live) -> Any:
+    """Return a running monitor and its driver while the stretched arm is over its limit."""
+    monitor, driver = live.running()
+    live.until(
+        lambda: any(a.values[3].value == 'ERROR' for a in driver.alerts),
+        lambda: driver.send(STRETCHED),
+    )
+    return monitor, driver
+
+
+def test_a_stretched_arm_is_an_error_with_advice(live: Live) -> None:
+    """The paper's arm with 4 kg at full reach tips the robot, and needs 74.8 N m of 50."""
+    _, driver = overload(live)
+    live.until(
+        lambda: any('TORQUE_LIMIT shoulder_joint' in a.name for a in driver.alerts),
+        lambda: driver.send(STRETCHED),
+    )
+    live.until(lambda: driver.verdicts[-1].level[0] == ERROR, lambda: driver.send(STRETCHED))
+    assert 'lower the arm' in driver.verdicts[-1].message
+    torque = 9.81 * (2.5 * 0.55 / 2 + 2.5 * (0.55 + 0.64 / 2) + 4 * (0.55 + 0.64))
+    assert any(f'{torque:.1f} N m' in a.message for a in driver.alerts)
+
+
+def test_a_failure_that_is_over_stays_until_acknowledged(live: Live) -> None:
+    """After an ERROR the verdict is WARN, not OK, until somebody acknowledges it."""
+    _, driver = overload(live)
+    live.until(lambda: driver.verdicts[-1].message.startswith('over now'), driver.send)
+    assert driver.verdicts[-1].level[0] == WARN
+    answer = live.call(Trigger, '/acceptance_monitor/acknowledge')
+    assert answer.success
+    live.until(lambda: driver.verdicts[-1].level[0] == OK, driver.send)
+
+
+def test_acknowledging_does_not_clear(live: Live) -> None:
+    """An active alert that is acknowledged is still active."""
+    _, driver = overload(live)
+    live.call(Trigger, '/acceptance_monitor/acknowledge')
+    live.until(
+        lambda: any(a.values[0].value == 'acknowledged' for a in driver.alerts),
+        lambda: driver.send(STRETCHED),
+    )
+    driver.verdicts.clear()
+    live.until(lambda: driver.verdicts, lambda: driver.send(STRETCHED))
+    assert driver.verdicts[-1].level[0] == ERROR
+
+
+def test_reset_begins_a_new_evaluation(live: Live) -> None:
+    """After a reset nothing is latched and nothing known until messages come."""
+    monitor, driver = overload(live)
+    live.until(lambda: driver.verdicts[-1].message.startswith('over now'), driver.send)
+    assert live.call(Trigger, '/acceptance_monitor/reset').success
+    assert monitor.verdict().level == STALE
+    live.until(lambda: driver.verdicts[-1].level[0] == OK, driver.send)
+
+
+def test_limits_can_be_set_while_it_runs(live: Live) -> None:
+    """A lower torque limit raises an alert with the next message."""
+    monitor, driver = live.running()
+    assert put(monitor, joints__shoulder_joint__limit_nm=0.5).successful
+    live.until(lambda: any('TORQUE_LIMIT' in a.name for a in driver.alerts), driver.send)
+
+
+def test_a_heavier_payload_counts_at_once(live: Live) -> None:
+    """The payload's mass set while running changes the torque."""
+    monitor, driver = live.running()
+    before = session_of(monitor).evaluator.margins.torque[1]
+    assert put(monitor, payload__mass_kg=8.0).successful
+    evaluated = session_of(monitor).evaluator.evaluated
+    live.until(lambda: session_of(monitor).evaluator.evaluated > evaluated + 10, driver.send)
+    live.until(lambda: session_of(monitor).evaluator.margins is not None, driver.send)
+    assert session_of(monitor).evaluator.margins.torque[1] != before
+
+
+@pytest.mark.parametrize(
+    ('values', 'reason'),
+    [
+        ({'limits__torque_warn': 1.5}, 'torque_error'),
+        ({'limits__tip_warn_deg': 1.0}, 'tip_error_deg'),
+        ({'payload__mass_kg': -1.0}, ''),
+        ({'payload__cog_m': [0.0, 0.0]}, 'three'),
+        ({'imu__attitude': 'magnetometer'}, 'accelerometer'),
+        ({'delays__off_s': float('nan')}, ''),
+        ({'config': 'other.yaml'}, 'deactivate'),
+        ({'limits__tip_error_deg': 4.0, 'limits__torque_warn': 2.0}, 'torque_error'),
+    ],
+)
+def test_a_set_that_cannot_be_taken_changes_nothing(
+    live: Live, values: dict[str, Any], reason: str
+) -> None:
+    """It is refused as a whole, with the reason; also the good half of it is not taken."""
+    monitor = live.monitor()
+    before = session_of(monitor).settings
+    result = put(monitor, **values)
+    assert not result.successful
+    assert reason in result.reason
+    assert session_of(monitor).settings == before
+
+
+VALUES = {
+    'limits__torque_warn': st.floats(-1, 12),
+    'limits__torque_error': st.floats(-1, 12),
+    'limits__tip_warn_deg': st.floats(-100, 100),
+    'limits__tip_error_deg': st.floats(-100, 100),
+    'delays__off_s': st.floats(),
+    'payload__mass_kg': st.floats(),
+    'imu__specific_force': st.booleans(),
+}
+
+
+@given(data=st.data())
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_random_sets_are_wholly_taken_or_wholly_refused(live: Live, data: st.DataObject) -> None:
+    """What the parameters say after any set is what the running evaluation judges by."""
+    monitor = live.nodes[0] if live.nodes else live.monitor()
+    names = data.draw(st.sets(st.sampled_from(sorted(VALUES)), min_size=1))
+    values = {name: data.draw(VALUES[name]) for name in names}
+    before = {k.name: monitor.get_parameter(k.name).value for k in monitor.knobs}
+    taken = put(monitor, **values).successful
+    after = {k.name: monitor.get_parameter(k.name).value for k in monitor.knobs}
+    new = {name.replace('__', '.'): value for name, value in values.items()}
+    assert after == (before | new if taken else before)
+    used = session_of(monitor).settings
+    told = {k.name: k.get(used) for k in monitor.knobs}
+    assert {k: v for k, v in told.items() if v != pytest.approx(after[k])} == {}
+    assert used.limits.torque_warn <= used.limits.torque_error
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_cleanly_when_asked(number: signal.Signals) -> None:
+    """SIGINT, SIGTERM, and a second one meanwhile: exit code 0 and no traceback."""
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    code = 'from ugv_acceptance.nodes.monitor import main; print("up", flush=True); main()'
+    process = subprocess.Popen(
+        [sys.executable, '-c', code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout
+    process.stdout.readline()
+    time.sleep(2.0)
+    process.send_signal(number)
+    time.sleep(0.1)
+    if process.poll() is None:
+        process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert b'Traceback' not in errors
+
+
+def test_margins_are_published_for_every_message(live: Live) -> None:
+    """With publish_rate 0 a listener gets margins for each message, by name, in N m and rad."""
+    from sensor_msgs.msg import JointState
+
+    monitor, driver = live.running(publish_rate=0.0)
+    torque: list[Any] = []
+    tip: list[Any] = []
+    at = 'acceptance_monitor'
+    driver.create_subscription(JointState, f'{at}/static_torque', torque.append, 100)
+    driver.create_subscription(JointState, f'{at}/stability', tip.append, 100)
+    live.until(lambda: len(torque) > 20 and len(tip) > 20, driver.send)
+    margins = session_of(monitor).evaluator.margins
+    assert list(torque[-1].name) == list(session_of(monitor).settings.robot.joint_names)
+    assert list(torque[-1].position) == list(FOLDED)
+    assert list(torque[-1].effort) == list(margins.torque)
+    assert list(tip[-1].name) == ['front', 'left', 'rear', 'right']
+    assert list(tip[-1].position) == list(margins.stability.angle)
+    assert list(tip[-1].effort) == list(margins.stability.moment)
+
+
+def test_stale_inputs_silence_the_margin_topics(live: Live) -> None:
+    """No margins are published while an input is missing."""
+    from sensor_msgs.msg import JointState
+
+    monitor, driver = live.running(publish_rate=0.0)
+    heard: list[Any] = []
+    driver.create_subscription(JointState, 'acceptance_monitor/stability', heard.append, 100)
+    live.until(lambda: heard, driver.send)
+    live.until(lambda: session_of(monitor).level == STALE)
+    live.spin(0.2)
+    heard.clear()
+    from live_case import imu
+
+    live.spin(0.5, lambda: driver.imu.publish(imu()))
+    assert heard == []
