@@ -44,10 +44,13 @@ def file_from(document: Document) -> File:
     try:
         return File.model_validate(document.data)
     except ValidationError as error:
-        first, more = error.errors()[0], error.error_count() - 1
-        raise BadConfig(
-            _sentence(document, dict(first)) + (f' (and {more} more)' if more else '')
-        ) from None
+        raise BadConfig(sentence_of(document, error)) from None
+
+
+def sentence_of(document: Document, error: ValidationError) -> str:
+    """Return the first error as file, line, field, what was expected and what came."""
+    first, more = error.errors()[0], error.error_count() - 1
+    return _sentence(document, dict(first)) + (f' (and {more} more)' if more else '')
 
 
 def _sentence(document: Document, error: dict[str, Any]) -> str:
