@@ -147,16 +147,15 @@ def run(
     progress: Callable[[int], None] | None = None,
 ) -> Risk:
     """Return the risk from `samples` draws; `progress` is told how many are done."""
-    total, steps = Counts(), [10**k for k in range(3, 12) if 10**k < samples]
+    total, step = Counts(), CHUNK
     history: list[tuple[int, NDArray[np.int64]]] = []
     for counts in _chunks(study, samples, seed, workers):
         total.add(counts)
         if progress is not None:
             progress(total.samples)
-        if steps and total.samples >= steps[0]:
+        if total.samples in (step, samples):  # at every doubling
             history.append((total.samples, total.failures.copy()))
-            steps = [step for step in steps if step > total.samples]
-    history.append((total.samples, total.failures))
+            step *= 2
     return Risk(
         {event: estimate(int(total.failures[k]), samples) for k, event in enumerate(EVENTS)},
         {
