@@ -1,0 +1,73 @@
+"""`ugv-acceptance risk`: probability that a joint saturates or the robot tips, in a posture or a mission."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def risk(
+    config: Annotated[
+        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
+    ] = None,
+    posture: Annotated[
+        str, typer.Option(help='joint=30deg,...; left out: the arm anywhere in its range.')
+    ] = '',
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal); may be given again.'),
+    ] = None,
+    mission: Annotated[
+        Path | None, typer.Option(help='JSON with phases: name, posture, vary, times.')
+    ] = None,
+    samples: Annotated[float, typer.Option(min=100, max=1e11, help='Such as 1e6.')] = 1e6,
+    seed: Annotated[int, typer.Option(min=0, help='The same seed gives the same numbers.')] = 0,
+    workers: Annotated[int, typer.Option(min=1, help='Processes, from 4e6 samples on.')] = 2,
+    as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
+) -> None:
+    """Draw slope, heading, load, masses, posture and rates at random; count what saturates or tips.
+
+    Left out, slope is even from 0 to 30 deg, heading any, the payload from 0 to the configured one,
+    rates normal with 7.2 deg/s, masses and centres of gravity as the configuration's `uncertainty`
+    says. Names to vary: slope, heading, JOINT.position, JOINT.rate, JOINT.limit, JOINT.x,
+    LINK.mass, LINK.x, payload.mass, payload.x, and the like with y and z.
+
+    \b
+    Examples:
+      ugv-acceptance risk
+      ugv-acceptance risk --posture shoulder_joint=60deg,flipper_joint=180deg --vary slope=0deg..20deg
+      ugv-acceptance risk --vary payload.mass=4kg+-0.2kg --vary shoulder_joint.limit=50+-5 --samples 1e8
+      ugv-acceptance risk --mission mission.json --json
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    import json
+
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from ugv_acceptance.cli.risk_study import phases_from
+    from ugv_acceptance.cli.risk_tables import as_document, mission_lines, phase_lines
+    from ugv_acceptance.config import load
+    from ugv_acceptance.model.risk import run
+
+    phases = phases_from(load(config), posture, vary or [], mission)
+    count = int(samples)
+    columns = (TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn())
+    results = []
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        for phase in phases:
+            task = bar.add_task(phase.name, total=count)
+            found = run(
+                phase.study,
+                count,
+                seed,
+                workers,
+                lambda done, task=task: bar.update(task, completed=done),  # type: ignore[misc]
+            )
+            results.append(found)
+    if as_json:
+        typer.echo(json.dumps(as_document(phases, results), indent=2))
+        return
+    for phase, found in zip(phases, results, strict=True):
+        typer.echo('\n'.join(phase_lines(phase, found)))
+    if mission is not None:
+        typer.echo('\n'.join(mission_lines(phases, results)))
