@@ -74,7 +74,7 @@ setup(
     maintainer_email='maintainers@ugv-acceptance.invalid',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed'], f'{NAME}.report': ['templates/*']},
+    package_data={NAME: ['py.typed'], f'{NAME}.report': ['templates/*'], f'{NAME}.plan': ['templates/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (SHARE, ['package.xml']),
@@ -90,6 +90,7 @@ setup(
             'ugv-acceptance = ugv_acceptance.cli:main',
             'acceptance_monitor = ugv_acceptance.nodes.monitor:main',
             'bag_player = ugv_acceptance.nodes.player:main',
+            'packbot_simulator = ugv_acceptance.nodes.simulator:main',
         ],
     },
     zip_safe=True,

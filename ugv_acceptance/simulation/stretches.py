@@ -17,8 +17,12 @@ _ALL = 1.0 - 1e-9
 
 
 @dataclass(slots=True)
-class _Rows:
-    """Samples as they come; arrays when the stretch is over."""
+class Rows:
+    """Samples as they come, each led by its time (s); arrays when the stretch is over.
+
+    A joint sample goes on with position, rate, effort; one of the IMU with orientation, rate,
+    specific force; one of the base with position, z axis and the ground's tilt.
+    """
 
     joints: list[tuple[float, Floats, Floats, Floats]] = field(default_factory=list)
     imu: list[tuple[float, Floats, Floats, Floats]] = field(default_factory=list)
@@ -40,7 +44,7 @@ def stretches(
     loads: list[tuple[float, Payload]] = [(0.0, scenario.payload)]
     limit = np.array([robot.joint(name).effort for name in robot.joint_names])
     upright = simulation.base()[1]
-    rows, tick = _Rows(), 1.0 / scenario.imu_rate
+    rows, tick = Rows(), 1.0 / scenario.imu_rate
     last, block = round(scenario.duration * scenario.imu_rate), length * scenario.imu_rate
     for count in range(last + 1):
         if count:
@@ -57,13 +61,13 @@ def stretches(
             rows.base.append((*simulation.base(), simulation.slope()[0]))
         if count == last or len(rows.imu) >= block:
             yield _recording(scenario, sensors, rows, loads, (limit, upright))
-            rows, loads = _Rows(), [(now + tick, loads[-1][1])]
+            rows, loads = Rows(), [(now + tick, loads[-1][1])]
 
 
 def _recording(
     scenario: Scenario,
     sensors: 'Sensors',
-    rows: _Rows,
+    rows: Rows,
     loads: list[tuple[float, Payload]],
     known: tuple[Floats, Floats],
 ) -> Recording:
@@ -102,7 +106,7 @@ class Sensors:
     rng: np.random.Generator
     _bias: tuple[Floats, Floats] | None = None
 
-    def joints(self, rows: _Rows) -> JointLog:
+    def joints(self, rows: Rows) -> JointLog:
         """Return what the encoders and drives say."""
         stamp, position, velocity, effort = (np.array(c) for c in zip(*rows.joints, strict=True))
         noise = self.noise
@@ -113,7 +117,7 @@ class Sensors:
             self._read(effort, noise.effort, noise.effort_step),
         )
 
-    def imu(self, rows: _Rows) -> ImuLog:
+    def imu(self, rows: Rows) -> ImuLog:
         """Return what the IMU says."""
         stamp, orientation, rate, force = (np.array(c) for c in zip(*rows.imu, strict=True))
         noise = self.noise
