@@ -6,11 +6,17 @@ from typing import Any
 
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.evaluation.bounds import Bounds, margin_bounds
+from ugv_acceptance.evaluation.criteria import CriteriaSet, default_criteria
+from ugv_acceptance.evaluation.examination import Examination
+from ugv_acceptance.evaluation.outcomes import Findings
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.summary import Summary, result_of
+from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
+from ugv_acceptance.evaluation.uncertainty import Source
+from ugv_acceptance.evaluation.verdicts import judge_criteria
 
 # Version of the result's layout; changes where a reader of results must change.
 RESULT_VERSION = 1
@@ -22,12 +28,25 @@ Sink = Callable[[MarginRows], None]
 
 
 @dataclass(frozen=True, slots=True)
+class Terms:
+    """What a run is judged by: criteria (None: the limits of the configuration), what is uncertain.
+
+    With `detail` the sinks get moments, energies and ZMP too.
+    """
+
+    criteria: CriteriaSet | None = None
+    sources: tuple[Source, ...] = ()
+    detail: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Judgement:
     """The result, ready for JSON, and what it was made from."""
 
     result: dict[str, Any]
     evaluator: RecordedEvaluator
     facts: Facts
+    examination: Examination
 
 
 def judge(
@@ -36,34 +55,43 @@ def judge(
     settings: Settings,
     sinks: Sequence[Sink] = (),
     progress: Callable[[int], None] = lambda _: None,
-    *,
-    detail: bool = False,
+    terms: Terms = Terms(),
 ) -> Judgement:
     """Return the judgement of a recording.
 
-    Each sink takes every stretch of margins in order, with moments, energies and ZMP only where
-    `detail` is asked for; `progress` takes the log time (ns) reached.
+    Each sink takes every stretch of margins in order; `progress` takes the log time (ns) reached.
     """
-    evaluator, summary = RecordedEvaluator(settings, detail), Summary(settings)
+    span = bag.start_ns, bag.end_ns
+    limits = Examination(default_criteria(settings), settings, *span)
+    asked = Examination(terms.criteria, settings, *span) if terms.criteria else limits
+    evaluator, summary = (
+        RecordedEvaluator(settings, terms.detail or asked.detail),
+        Summary(settings),
+    )
+    examinations = [limits] if asked is limits else [limits, asked]
+    takers = [summary.add, *(e.add for e in examinations), *sinks]
     evaluator.start(bag.start_ns)
     reading = bag.batches(topics)
     for batch in _stretches(reading):
+        for examination in examinations:
+            examination.payloads.take(batch.payload)
         rows = evaluator.batch(batch)
-        summary.add(rows)
-        for sink in sinks:
-            sink(rows)
+        for take in takers:
+            take(rows)
         if len(rows.time):
             progress(int(rows.time[-1]))
     evaluator.finish(bag.end_ns)
-    summary.finish(bag.end_ns)
-    duration = bag.end_ns - bag.start_ns
-    result = {
-        'version': RESULT_VERSION,
-        **result_of(summary, evaluator.watch.log, bag.start_ns, duration),
+    for finish in (summary.finish, *(e.finish for e in examinations)):
+        finish(bag.end_ns)
+    data = {
+        **result_of(summary, evaluator.watch.log, bag.start_ns, bag.end_ns - bag.start_ns),
         'bag': _bag_result(bag, reading.facts),
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
     }
-    return Judgement(result, evaluator, reading.facts)
+    findings = Findings(asked, ordered(evaluator.watch.log), data, Bounds(settings, terms.sources))
+    margin_bounds(data, limits, findings.bounds)
+    result = {'version': RESULT_VERSION, **judge_criteria(findings), **data}
+    return Judgement(result, evaluator, reading.facts, asked)
 
 
 def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:

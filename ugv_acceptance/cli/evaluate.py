@@ -90,10 +90,11 @@ def judge_recording(
     paths: list[Path], config: 'Config', csv_file: Path | None = None, *, compare_effort: bool
 ) -> dict[str, Any]:
     """Judge one recording, print its summary, and return its result."""
-    from ugv_acceptance.bag.judge import judge
+    from ugv_acceptance.bag.judge import Terms, judge
     from ugv_acceptance.bag.reader import choose_topics, open_bag
     from ugv_acceptance.bag.result import CsvSink
     from ugv_acceptance.cli.summary import print_result, progress_of
+    from ugv_acceptance.config.uncertain import sources_from
     from ugv_acceptance.evaluation.effort import EffortComparison
 
     bag = open_bag(paths)
@@ -102,16 +103,12 @@ def judge_recording(
     topics = choose_topics(bag, *names)
     effort = EffortComparison(config.settings)
     sinks = [effort.add] if compare_effort else []
-    with CsvSink(csv_file, config.settings, bag.start_ns) as csv:
-        with progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress:
-            judged = judge(
-                bag,
-                topics,
-                config.settings,
-                [*sinks, *csv.sinks],
-                progress,
-                detail=csv_file is not None,
-            )
+    terms = Terms(sources=sources_from(config), detail=csv_file is not None)
+    with (
+        CsvSink(csv_file, config.settings, bag.start_ns) as csv,
+        progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress,
+    ):
+        judged = judge(bag, topics, config.settings, [*sinks, *csv.sinks], progress, terms)
     result = judged.result
     result['robot'] = {
         'name': config.name,

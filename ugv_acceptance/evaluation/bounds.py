@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.criteria import IGNORED, RSS
-from ugv_acceptance.evaluation.examination import Moment, ValueMeasure
+from ugv_acceptance.evaluation.criteria import IGNORED, RSS, Value
+from ugv_acceptance.evaluation.examination import Examination, Moment, ValueMeasure
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.signals import shown
 from ugv_acceptance.evaluation.uncertainty import Effects, Source, combined, effects_of
@@ -32,28 +32,25 @@ class Bounds:
     def worst(self, measure: ValueMeasure, method: str) -> dict[str, Any] | None:
         """Return the bound at the moment that has least left beyond it; None: no bound is known.
 
-        `excess` is the distance to the limit less the bound; unit as people see it.
+        `excess` is what is left to the limit less the bound; unit as people see it.
         """
         demand = measure.demand
-        found = [
-            one
-            for moment in measure.worst
-            if (one := self._one(demand.signal, moment, demand.limit, method)) is not None
-        ]
+        ones = [self._one(demand, moment, method) for moment in measure.worst]
+        found = [one for one in ones if one is not None]
         return min(found, key=lambda one: float(one['excess'])) if found else None
 
-    def _one(self, signal: str, moment: Moment, limit: float, method: str) -> dict[str, Any] | None:
-        effects = self.of(signal, moment)
+    def _one(self, demand: Value, moment: Moment, method: str) -> dict[str, Any] | None:
+        effects = self.of(demand.signal, moment)
         if effects is None or not np.isfinite(effects).all():
             return None
         used = RSS if method == IGNORED else method
-        scale, unit = shown(signal, moment.subject, self.settings)
+        scale, unit = shown(demand.signal, moment.subject, self.settings)
         bound = float(combined(effects, used)) * scale
         return {
             'bound': bound,
             'unit': unit,
             'method': used,
-            'excess': abs(limit - moment.value) * scale - bound,
+            'excess': demand.distance(moment.value) * scale - bound,
             'largest': self.largest(effects, scale),
         }
 
@@ -134,4 +131,28 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
         'roll_deg': math.degrees(math.atan2(-gy, -gz)),
         'pitch_deg': math.degrees(math.atan2(gx, math.hypot(gy, gz))),
         'payload_kg': moment.payload.mass,
+    }
+
+
+def margin_bounds(result: dict[str, Any], limits: Examination, bounds: Bounds) -> None:
+    """Add to every joint's and to the tip-over margin of a result the bound at its worst moment."""
+    for measure in limits.measures.values():
+        if not isinstance(measure, ValueMeasure):
+            continue
+        bound = bounds.worst(measure, RSS)
+        if measure.demand.signal == 'tip_angle':
+            result['stability']['uncertainty'] = bound
+        else:
+            joint = result['torque'][measure.demand.of]
+            joint['uncertainty'] = bound and _scaled(bound, joint['limit'], joint['unit'])
+
+
+def _scaled(bound: dict[str, Any], by: float, unit: str) -> dict[str, Any]:
+    """Return the bound of a utilisation as one of a torque."""
+    return {
+        **bound,
+        'bound': bound['bound'] * by,
+        'excess': bound['excess'] * by,
+        'unit': unit,
+        'largest': [{**one, 'effect': one['effect'] * by} for one in bound['largest']],
     }

@@ -51,6 +51,10 @@ class Value:
         )
         return all(x is None for x in allowances)
 
+    def distance(self, value: float) -> float:
+        """Return what is left to the limit, negative in violation; unit of the signal."""
+        return self.limit - value if self.below else value - self.limit
+
 
 @dataclass(frozen=True, slots=True)
 class AlertDemand:

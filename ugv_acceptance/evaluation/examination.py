@@ -289,7 +289,7 @@ class Examination:
         for measure in self.measures.values():
             measure.add(rows)
 
-    def finish(self) -> None:
-        """Say that the recording ended."""
+    def finish(self, now: int) -> None:
+        """Say when the recording ended (ns)."""
         for measure in self.measures.values():
-            measure.finish(self.end)
+            measure.finish(now)

@@ -1,4 +1,4 @@
-"""What a recording came to: worst margins, time in violation, coverage, alerts and the verdict."""
+"""What a recording came to: worst margins, time in violation, coverage and alerts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,13 +10,8 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.watch import FAILURES
 from ugv_acceptance.evaluation.wording import describe
 from ugv_acceptance.model.stability import SIDES, STATES
-
-PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
-# Less of the recording than this evaluated can never be a pass.
-LEAST_COVERAGE = 0.95
 
 
 @dataclass(slots=True)
@@ -101,46 +96,13 @@ class Summary:
         self._open = None
 
 
-def verdict(summary: Summary, alerts: Sequence[Alert], duration: int) -> tuple[str, list[str]]:
-    """Return PASS, FAIL or INCONCLUSIVE, and the reasons in plain words.
-
-    Any evaluated sample beyond an error limit fails; too little evaluated can never pass.
-    """
-    failures = [a for a in alerts if a.rule.code in FAILURES and LEVELS[a.rule.level] == 'ERROR']
-    names = summary.settings.robot.joint_names
-    reasons = [describe(a, summary.settings) for a in failures]
-    told = {a.rule.subject for a in failures if a.rule.code == 'TORQUE_LIMIT'}
-    for name, spent in zip(names, summary.load_violation, strict=True):
-        if spent and name not in told:
-            reasons.append(f'{name} was over its torque limit for {spent / 1e9:.3f} s')
-    if summary.tip_violation and not any(a.rule.code == 'TIP_OVER' for a in failures):
-        spent_s = summary.tip_violation / 1e9
-        reasons.append(f'the tilt left was under its limit for {spent_s:.3f} s')
-    if reasons:
-        return FAIL, reasons
-    share = summary.evaluated / duration if duration > 0 else 0.0
-    if share < LEAST_COVERAGE:
-        text = f'only {share:.1%} of the recording could be evaluated ({LEAST_COVERAGE:.0%} needed)'
-        return INCONCLUSIVE, [text, *missing_reasons(alerts, summary.settings)]
-    return PASS, [f'all margins kept, {share:.1%} of the recording evaluated']
-
-
-def missing_reasons(alerts: Sequence[Alert], settings: Settings) -> list[str]:
-    """Return why margins were missing: one sentence for each kind of input fault."""
-    kinds = {(a.rule.code, a.rule.subject): a for a in alerts if a.rule.code not in FAILURES}
-    return [describe(a, settings) for a in kinds.values() if LEVELS[a.rule.level] != 'WARN']
-
-
 def result_of(
     summary: Summary, alerts: Sequence[Alert], start: int, duration: int
 ) -> dict[str, Any]:
     """Return the part of a result that the margins and alerts decide, ready for JSON."""
     settings = summary.settings
-    word, reasons = verdict(summary, alerts, duration)
     seconds = duration / 1e9
     return {
-        'verdict': word,
-        'reasons': reasons,
         'coverage': {
             'evaluated_s': summary.evaluated / 1e9,
             'duration_s': seconds,

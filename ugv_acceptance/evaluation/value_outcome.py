@@ -67,7 +67,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
     worst = measure.worst[0] if measure.worst else None
     bound = findings.bounds.worst(measure, method)
     start, end = measure.span
-    distance = abs(demand.limit - worst.value) * scale if worst else None
+    distance = demand.distance(worst.value) * scale if worst else None
     return {
         'signal': demand.signal,
         'of': demand.of,
@@ -80,7 +80,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
         'distance': distance,
         'moment': moment_json(worst, findings.settings) if worst else None,
         'uncertainty': bound,
-        'inside_bound': bool(bound and bound['excess'] <= 0.0),
+        'inside_bound': bool(bound and distance and distance > 0.0 >= bound['excess']),
         'evaluated_s': measure.evaluated / 1e9,
         'evaluated_share': measure.evaluated / (end - start) if end > start else 0.0,
         'time_in_violation_s': violation.total / 1e9,
