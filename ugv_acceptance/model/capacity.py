@@ -106,7 +106,7 @@ def _weight(robot: Robot, load: Payload) -> float:
 
 def _rise(start: Floats, slope: Floats, end: ArrayLike) -> Floats:
     """Return the smallest f >= 0 at which start + slope f leaves |value| <= end."""
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         room = (end - np.sign(slope) * start) / np.abs(slope)
     room = np.where(slope == 0.0, np.inf, room)
     found: Floats = np.where(np.abs(start) > end, 0.0, np.maximum(room, 0.0))
@@ -171,7 +171,7 @@ def _edge_bound(
     holds, pulls = (
         (np.cross(force, point - start) * along).sum(axis=-1) for point, force in (weight, pull)
     )
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         room = np.where(pulls < 0.0, -holds / pulls, np.inf)
     found: Floats = np.where(holds <= 0.0, 0.0, room)
     return found
@@ -186,7 +186,7 @@ def _slip(weight: Floats, d: Floats, friction: float) -> Floats:
     b = weight[..., 0] * d[..., 0] + weight[..., 1] * d[..., 1] - mu * weight[..., 2] * d[..., 2]
     c = weight[..., 0] ** 2 + weight[..., 1] ** 2 - mu * weight[..., 2] ** 2
     root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         # Inside the cone c < 0: the positive root, written so that nothing cancels.
         force = np.where(root + b > 0.0, -c / (root + b), np.inf)
     inside = (c < 0.0) & (weight[..., 2] < 0.0)

@@ -133,7 +133,7 @@ def _outputs(
 ) -> tuple[list[Scalar], _Stand]:
     tree = _moved(tree, values)
     joints = [body.joint for body in tree.bodies[1:]]
-    place = {name: fixed[k] for k, name in enumerate(robot.joint_names)}
+    place = {name: float(fixed[k]) for k, name in enumerate(robot.joint_names)}
     q = [values.get(f'{name}.position', place[name]) for name in joints]
     rates = [values.get(f'{name}.rate', 0.0) for name in joints]
     pose = pose_of(tree, q)
