@@ -66,12 +66,12 @@ def test_no_disagreement_but_at_the_boundary(judged: list[Judged]) -> None:
     assert found.both_stand > 3
 
 
-def test_the_angle_is_the_tilt_that_is_left(judged: list[Judged]) -> None:
-    """The tilt at which the model says it tips is that of the simulation to half a degree."""
-    errors = np.degrees([j.error for j in judged])
-    errors = errors[~np.isnan(errors)]
-    assert len(errors) > CASES / 2
-    assert np.abs(errors).max() < 0.5
+def test_no_margin_is_left_when_it_tips(judged: list[Judged]) -> None:
+    """When the simulated robot tips, the force-angle is zero to half a degree."""
+    left = np.degrees([j.left for j in judged])
+    left = left[~np.isnan(left)]
+    assert len(left) > CASES / 2
+    assert np.abs(left).max() < 0.5
 
 
 @pytest.mark.parametrize('seed', range(12))
@@ -81,7 +81,7 @@ def test_random_robots_tip_where_the_model_says(seed: int) -> None:
     robot, q = _standing_robot(rng)
     case = TipCase(tuple(q), robot.payload, float(rng.uniform(-np.pi, np.pi)), 0.0)
     found = judge(robot, case)
-    assert abs(np.degrees(found.error)) < 0.5
+    assert abs(np.degrees(found.left)) < 0.5
 
 
 def _standing_robot(rng: np.random.Generator) -> tuple[Robot, list[float]]:
@@ -165,11 +165,11 @@ def test_confusion_counts_by_who_says_that_it_tips() -> None:
     case = TipCase((), Payload(), 0.0, tilt=0.5)
     early, late = Truth(0.3, over=True), Truth(0.7, over=True)
     told = [
-        Judged(case, 0.3, -0.2, early),
-        Judged(case, 0.7, 0.2, late),
-        Judged(case, 0.7, 0.2, early),
-        Judged(case, 0.499, -0.001, late),
-        Judged(case, float('nan'), float('nan'), late),
+        Judged(case, 0.3, -0.2, early, 0.0),
+        Judged(case, 0.7, 0.2, late, 0.0),
+        Judged(case, 0.7, 0.2, early, 0.4),
+        Judged(case, 0.499, -0.001, late, -0.2),
+        Judged(case, np.nan, np.nan, late, np.nan),
     ]
     found = confusion(told)
     counts = (found.both_tip, found.both_stand, found.only_truth, found.only_model)

@@ -24,8 +24,8 @@ RATES = (np.radians(12.0), np.radians(2.0), np.radians(0.2), np.radians(0.05))
 BACK = (np.radians(7.0), np.radians(2.0), np.radians(0.5))
 # Tilt (rad) at which a search ends.
 LAST = float(np.radians(75.0))
-# Time (s) to come to rest, on dampers (N s/m, N m s/rad) so that nothing bounces.
-SETTLE, DAMPER = 1.5, 60.0
+# Time (s) to come to rest on dampers (N s/m, N m s/rad), and then without them.
+CALM, SETTLE, DAMPER = 1.0, 1.5, 60.0
 # Time steps between two settings of gravity.
 STRIDE = 8
 BUILD = Build(motors=False, friction=20.0, timestep=0.00125, contact_time=0.0026, impratio=100.0)
@@ -71,7 +71,7 @@ def tip_truth(
     for rate, back in zip(RATES[1:], BACK, strict=True):
         if not np.isfinite(found.tilt):
             break
-        window = (max(found.tilt - back, 0.0), found.tilt + back, rate)
+        window = (max(found.tilt - back, 0.0), last, rate)
         found = _tilt(vehicle, data, heading, window)
     return found
 
@@ -84,6 +84,8 @@ def _tilt(
     model = vehicle.model
     data, rest = mujoco.MjData(model), attitude(vehicle, start)
     mujoco.mj_copyData(data, model, start)
+    model.opt.gravity[:] = gravity_on_slope(vehicle.robot.gravity, first, heading)
+    _calm(model, data)
     for tilt in np.arange(first, last, rate * STRIDE * model.opt.timestep):
         model.opt.gravity[:] = gravity_on_slope(vehicle.robot.gravity, tilt, heading)
         mujoco.mj_step(model, data, nstep=STRIDE)
@@ -115,11 +117,16 @@ def settled(vehicle: Vehicle, rest: Floats) -> mujoco.MjData:
     mujoco.mj_forward(model, data)
     spheres = [g for g in range(model.ngeom) if model.geom(g).name.startswith('contact:')]
     data.qpos[2] -= data.geom_xpos[spheres, 2].min() - model.geom_size[spheres[0], 0]
-    model.dof_damping[:6] = DAMPER
-    mujoco.mj_step(model, data, nstep=round(SETTLE / model.opt.timestep))
-    model.dof_damping[:6] = 0.0
+    _calm(model, data)
     mujoco.mj_step(model, data, nstep=round(SETTLE / model.opt.timestep))
     return data
+
+
+def _calm(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Let the robot come to rest on dampers, so that nothing bounces."""
+    model.dof_damping[:6] = DAMPER
+    mujoco.mj_step(model, data, nstep=round(CALM / model.opt.timestep))
+    model.dof_damping[:6] = 0.0
 
 
 def attitude(vehicle: Vehicle, data: mujoco.MjData) -> Floats:

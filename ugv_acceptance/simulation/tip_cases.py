@@ -36,17 +36,22 @@ class Judged:
     """A case with the tilt (rad) at which the model and the simulation say that it tips.
 
     0: it does not stand on the level; infinite: it stands at any tilt looked at; NaN: the model
-    gives no margin. `margin` (rad) is the model's margin on the slope of the case.
+    gives no margin. `margin` (rad) is the model's margin on the slope of the case; `left` (rad)
+    what it still was when the simulated robot tipped on a slope, else NaN.
     """
 
     case: TipCase
     model: float
     margin: float
     truth: Truth
+    left: float
 
     @property
     def error(self) -> float:
-        """Tilt of the model less that of the simulation (rad); NaN unless both tip on a slope."""
+        """Tilt of the model less that of the simulation (rad); NaN unless both tip on a slope.
+
+        Where the slope runs along the edge, a small error of the margin is a large one of the tilt.
+        """
         both = 0.0 < self.model < np.inf and 0.0 < self.truth.tilt < np.inf
         return self.model - self.truth.tilt if both else float('nan')
 
@@ -89,7 +94,11 @@ def judge(robot: Robot, case: TipCase) -> Judged:
     rest = expected_rest(robot, case)
     model, margin = model_tilt(robot, case, rest)
     truth = tip_truth(robot, case.q, case.payload, case.heading, rest)
-    return Judged(case, model, margin, truth)
+    left = float('nan')
+    if 0.0 < truth.tilt < np.inf:
+        down = gravity_on_slope(robot.gravity, truth.tilt, case.heading) @ rest
+        left = float(least_angle(robot, case.q, down, case.payload))
+    return Judged(case, model, margin, truth, left)
 
 
 def judge_all(robot: Robot, cases: Sequence[TipCase], workers: int = 2) -> list[Judged]:
