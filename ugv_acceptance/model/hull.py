@@ -153,15 +153,17 @@ def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64
     for number, (i, j, k) in enumerate(triples(len(points))):
         inside = left[j, k] & right[i, k] & left[i, j]
         inside = inside | (right[j, k] & left[i, k] & right[i, j])
-        if not inside.any():
+        rows = np.flatnonzero(np.broadcast_to(inside, count))
+        if not rows.size:
             continue
-        a, b, c = turn[j, k], turn[i, k], turn[i, j]
+        turns, heights = (turn[j, k], turn[i, k], turn[i, j]), [points[n][2] for n in (i, j, k)]
+        (a, b, c), (p, q, r) = pick((turns, tuple(heights)), rows)
         area = a - b + c
-        inside = inside & (abs(area) > THIN**2)
-        height = a * points[i][2] - b * points[j][2] + c * points[k][2]
-        height = np.divide(height, area, out=np.full(count, np.inf), where=inside)
-        best[height < lowest] = number
-        lowest = np.minimum(lowest, height)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            height = np.broadcast_to((a * p - b * q + c * r) / np.asarray(area), rows.shape)
+        better = (height < lowest[rows]) & (abs(area) > THIN**2)
+        best[rows[better]] = number
+        lowest[rows[better]] = height[better]
     return best
 
 

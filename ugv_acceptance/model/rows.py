@@ -12,6 +12,8 @@ Values: TypeAlias = Any
 
 # All rows: nothing is picked, nothing copied.
 ALL = slice(None)
+# Codes that spread no wider are counted, which is faster than sorting.
+_FEW = 4096
 
 
 def pick(values: Values, rows: Rows) -> Values:
@@ -35,12 +37,17 @@ def pick(values: Values, rows: Rows) -> Values:
     return take(values)
 
 
-def groups(codes: NDArray[Any]) -> Iterator[tuple[int, Rows, int]]:
+def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
     """Return each value of `codes` with its rows and their number."""
-    if codes.size and codes.min() == codes.max():
-        yield int(codes[0]), ALL, codes.size
+    if not codes.size:
         return
-    for code in np.unique(codes):
+    low, high = int(codes.min()), int(codes.max())
+    if low == high:
+        yield low, ALL, codes.size
+        return
+    few = high - low < _FEW
+    values = low + np.flatnonzero(np.bincount(codes - low)) if few else np.unique(codes)
+    for code in values:
         rows = np.flatnonzero(codes == code)
         yield int(code), rows, rows.size
 
