@@ -217,6 +217,21 @@ def test_many_postures_have_the_supports_of_each_alone(seed: int) -> None:
             assert support_of(robot, one.contacts, one.cog) == support  # type: ignore[arg-type]
 
 
+def test_samples_beside_the_limit_of_a_thin_polygon_come_to_an_end() -> None:
+    """Three points in one line but for a micrometre, which may or may not make a polygon."""
+    rng = np.random.default_rng(6)
+    points = np.zeros((3_000, 4, 3))
+    points[:, :, 0] = np.array([-0.3, -0.1, 0.1, 0.3]) + rng.uniform(-1e-3, 1e-3, (3_000, 4))
+    points[:, :, 1] = rng.uniform(-1e-6, 1e-6, (3_000, 4))
+    samples: list[Points] = [[(x, y, z) for x, y, z in p] for p in points.tolist()]
+    robot = standing_on(samples[0])
+    expected = [support_of(robot, p, COG) for p in samples]
+    assert many(robot, samples, [COG] * len(samples)) == expected
+    assert len(set(expected)) > 5
+    line: Points = [(-0.3, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.3, 0.0, 0.0)]
+    assert len(supports_of(standing_on(line), line, COG, 1_000_000)) == 1
+
+
 def test_contact_points_and_cog_follow_the_joints() -> None:
     """They are where 4 x 4 matrices put them."""
     rng = np.random.default_rng(5)

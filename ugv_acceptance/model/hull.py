@@ -7,7 +7,7 @@ one sample is taken by all others it fits.
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache, reduce
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,8 @@ THIN = 1e-6
 _SLACK = 1e-12
 # A place outside the hull is drawn to it, and this part of the way further, to be inside.
 _INWARD = 1e-9
+# So many hulls are tried on all samples, before samples beside a limit are taken one by one.
+_TRIES = 50
 
 
 def pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
@@ -52,21 +54,18 @@ def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
         if hull:
             hull.pop()
     corners = [points[k] for k in hull]
-    if len(hull) < 3 or _area(corners) < THIN * max(_lengths(corners)) ** 0.5:
+    if len(hull) < 3 or _is_thin(corners):
         return ()
     cycle = tuple(numbers[k] for k in hull)
     start = cycle.index(min(cycle))
     return cycle[start:] + cycle[:start]
 
 
-def _area(corners: Sequence[Any]) -> Values:
-    """Return twice the area of a convex polygon, counter-clockwise."""
-    return sum(_turn(corners[0], a, b) for a, b in pairwise(corners[1:]))
-
-
-def _lengths(points: Sequence[Any]) -> list[Any]:
-    """Return the squares of the distances between all points, seen from above."""
-    return [(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)]
+def _is_thin(points: Sequence[Any]) -> Values:
+    """Return whether no triangle of the points is wider than THIN across their longest distance."""
+    thickest = reduce(np.maximum, [abs(_turn(*three)) for three in combinations(points, 3)])
+    squares = [(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)]
+    return thickest <= THIN * np.sqrt(reduce(np.maximum, squares))
 
 
 def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cycle, Rows]]:
@@ -74,31 +73,38 @@ def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cy
 
     The hull of the first sample is taken by all samples it fits; so on until none is left.
     """
+    if not any(isinstance(x, np.ndarray) for k in active for x in points[k]):
+        yield hull(tuple(points[k] for k in active), active), ALL
+        return
     left: Rows = ALL
-    while count:
+    for _ in range(_TRIES):
         some = pick(tuple(points), left)
-        first: Any = tuple(tuple(float(np.ravel(x)[0]) for x in some[k]) for k in active)
-        cycle = hull(first, active)
+        cycle = hull(tuple(_sample(some[k], 0) for k in active), active)
         same = np.array(np.broadcast_to(_is_hull(some, cycle, active), count))
         same[0] = True
-        if same.all():
-            yield cycle, left
-            return
-        yield cycle, inner(left, np.flatnonzero(same))
+        yield cycle, inner(left, ALL if same.all() else np.flatnonzero(same))
         left = inner(left, np.flatnonzero(~same))
         count -= int(same.sum())
+        if not count:
+            return
+    some = pick(tuple(points), left)
+    alone = [hull(tuple(_sample(some[k], row) for k in active), active) for row in range(count)]
+    for cycle in set(alone):
+        yield cycle, inner(left, np.flatnonzero([x == cycle for x in alone]))
+
+
+def _sample(point: Sequence[Any], row: int) -> Point:
+    x, y, z = (float(x[row]) if isinstance(x, np.ndarray) else x for x in point)
+    return x, y, z
 
 
 def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
-    """Return where `cycle` is the hull of the active points, by the rules of `_hull`."""
+    """Return where `cycle` is the hull of the active points, by the rules of `hull`."""
     if len(active) < 3:
         return True
-    corners = [points[k] for k in cycle or active]
-    thin = THIN * np.sqrt(reduce(np.maximum, _lengths(corners)))
-    if not cycle:  # no triangle of many is thick: then neither is their hull
-        turns = [abs(_turn(*triple)) for triple in combinations(corners, 3)]
-        return reduce(np.maximum, turns) < thin / len(active)
-    good = _area(corners) >= thin
+    if not cycle:
+        return _is_thin([points[k] for k in active])
+    good = np.logical_not(_is_thin([points[k] for k in cycle]))
     for i, j in pairs(cycle):
         for k in active:
             if k not in {i, j}:
