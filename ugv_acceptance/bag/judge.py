@@ -7,6 +7,7 @@ from typing import Any
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.evaluation.bounds import Bounds, margin_bounds
+from ugv_acceptance.evaluation.comparison import ModelCheck
 from ugv_acceptance.evaluation.criteria import CriteriaSet, default_criteria
 from ugv_acceptance.evaluation.examination import Examination
 from ugv_acceptance.evaluation.outcomes import Findings
@@ -69,7 +70,8 @@ def judge(
         Summary(settings),
     )
     examinations = [limits] if asked is limits else [limits, asked]
-    takers = [summary.add, *(e.add for e in examinations), *sinks]
+    check = ModelCheck(settings)
+    takers = [summary.add, check.add, *(e.add for e in examinations), *sinks]
     evaluator.start(bag.start_ns)
     reading = bag.batches(topics)
     for batch in _stretches(reading):
@@ -87,6 +89,7 @@ def judge(
         **result_of(summary, evaluator.watch.log, bag.start_ns, bag.end_ns - bag.start_ns),
         'bag': _bag_result(bag, reading.facts),
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
+        'model_check': check.result(),
     }
     findings = Findings(asked, ordered(evaluator.watch.log), data, Bounds(settings, terms.sources))
     margin_bounds(data, limits, findings.bounds)

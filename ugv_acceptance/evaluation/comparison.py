@@ -1,0 +1,231 @@
+"""The model held against the run: measured efforts beside static torque, at rest and in motion.
+
+At rest: bias, scale and sign of each joint's effort, and the payload that would explain the
+difference. In motion: friction, and the paper's F test of the run against its own slow part.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtri
+
+from ugv_acceptance.evaluation.regression import Fit, independent_samples, least_squares
+from ugv_acceptance.evaluation.rows import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.statics import static_torque
+
+Floats = NDArray[np.float64]
+Json = dict[str, Any]
+
+# Slower than this (rad/s or m/s) is at rest, faster than MOVING is in motion.
+REST, MOVING = 0.02, 0.05
+# Samples are taken this far apart (ns); of more than MOST every second one is dropped.
+SPACING = 100_000_000
+MOST = 100_000
+# Fewer samples tell nothing.
+LEAST = 30
+# A scale needs torques that differ (standard deviation, N m or N), a payload a lever (N m a kg).
+SPREAD, LEVER = 0.5, 0.5
+ALPHA = 0.05
+# An effort from this share of the joint's limit on is clipped: it does not tell the load.
+CLIPPED = 0.99
+
+
+@dataclass(slots=True)
+class ModelCheck:
+    """Gathers samples of a run (at most ten a second) and compares them with the model."""
+
+    settings: Settings
+    _parts: list[NDArray[np.float32]] = field(default_factory=list)
+    _count: int = 0
+    _spacing: int = SPACING
+    _slot: int = -1
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        if not len(rows.time):
+            return
+        slots = rows.time // self._spacing
+        picked = np.flatnonzero(np.diff(slots, prepend=self._slot))
+        self._slot = int(slots[-1])
+        picked = picked[rows.known[picked]]
+        if not len(picked):
+            return
+        joints, of = rows.pairs.joints, rows.pairs.of_joints[picked]
+        gravity = rows.pairs.imu.gravity[rows.pairs.of_imu[picked]]
+        lever = self._lever(joints.q[of], gravity)
+        parts = (joints.effort[of], rows.torque[picked], lever, joints.qd[of])
+        self._parts.append(np.hstack(parts).astype(np.float32))
+        self._count += len(picked)
+        if self._count > MOST:
+            self._thin()
+
+    def _lever(self, q: Floats, gravity: Floats) -> Floats:
+        robot = self.settings.robot
+        one, none = (Payload(mass, robot.payload.cog) for mass in (1.0, 0.0))
+        lever: Floats = static_torque(robot, q, gravity, one) - static_torque(
+            robot, q, gravity, none
+        )
+        return lever
+
+    def _thin(self) -> None:
+        table = np.concatenate(self._parts)[::2]
+        self._parts, self._count, self._spacing = [table], len(table), 2 * self._spacing
+        self._slot //= 2
+
+    def result(self) -> Json:
+        """Return the comparison for JSON: each joint's, the payload of all, the speed's share."""
+        n = len(self.settings.joints)
+        table = np.concatenate(self._parts or [np.empty((0, 4 * n), np.float32)])
+        effort, torque, lever, rate = np.hsplit(table.astype(np.float64), 4)
+        names = self.settings.robot.joint_names
+        slow = np.abs(np.nan_to_num(rate)).max(axis=1, initial=0.0) <= REST
+        clipped = np.abs(effort) >= CLIPPED * np.array(self.settings.limits.torque)
+        effort = np.where(clipped, np.nan, effort)
+        columns = zip(effort.T, torque.T, lever.T, rate.T, clipped.T, strict=True)
+        samples = [_Samples(*column, slow) for column in columns]
+        return {
+            'samples': len(table),
+            'spacing_s': self._spacing / 1e9,
+            'speed_validity': self._speed_validity(rate),
+            'payload': _pooled_payload(samples),
+            'joints': {name: _joint(s) for name, s in zip(names, samples, strict=True)},
+        }
+
+    def _speed_validity(self, rate: Floats) -> Json:
+        """Return the share of samples in which every joint was slow enough for the static model."""
+        speeds = self.settings.limits.speed or (np.inf,) * rate.shape[1]
+        bounds = np.array(speeds)
+        judged = np.isfinite(bounds) & np.isfinite(rate).any(axis=0)
+        if not judged.any():
+            return {'share': None, 'joints': []}
+        slow = (np.nan_to_num(np.abs(rate[:, judged])) <= bounds[judged]).all(axis=1)
+        names = np.array(self.settings.robot.joint_names)[judged]
+        return {'share': float(slow.mean()), 'joints': names.tolist()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """One joint's samples (n,): effort, torque, lever of a kg of payload, rate; slow: all rest."""
+
+    effort: Floats
+    torque: Floats
+    lever: Floats
+    rate: Floats
+    clipped: NDArray[np.bool_]
+    slow: NDArray[np.bool_]
+
+    @property
+    def difference(self) -> Floats:
+        """Measured effort less static torque."""
+        return self.effort - self.torque
+
+    def rest(self) -> NDArray[np.bool_]:
+        """Which samples tell of the robot at rest."""
+        return self.slow & np.isfinite(self.effort)
+
+    def motion(self) -> NDArray[np.bool_]:
+        """Which samples tell of this joint in motion."""
+        return (np.abs(np.nan_to_num(self.rate)) > MOVING) & np.isfinite(self.effort)
+
+
+def _joint(s: _Samples) -> Json:
+    told = np.isfinite(s.effort)
+    if told.sum() < LEAST:
+        return {'effort': 'not recorded' if not told.any() else 'too few samples'}
+    if np.ptp(s.effort[told]) == 0.0:
+        return {'effort': f'constant at {s.effort[told][0]:g}'}
+    return {
+        'effort': 'recorded',
+        'clipped_samples': int(s.clipped.sum()),
+        'rest_samples': int(s.rest().sum()),
+        'motion_samples': int(s.motion().sum()),
+        **_rest(s),
+        'friction': _friction(s),
+        'f_test': _f_test(s),
+    }
+
+
+def _rest(s: _Samples) -> Json:
+    rest = s.rest()
+    if rest.sum() < LEAST:
+        return {'bias': None, 'scale': None, 'sign': 'unknown', 'payload_kg': None}
+    difference, torque, lever = s.difference[rest], s.torque[rest], s.lever[rest]
+    ones = np.ones((len(difference), 1))
+    scale = None
+    if torque.std() > SPREAD:
+        scale = least_squares(np.column_stack((torque, ones)), s.effort[rest])
+    payload = None
+    if np.sqrt((lever**2).mean()) > LEVER:
+        payload = least_squares(lever[:, None], difference)
+    return {
+        'bias': _interval(least_squares(ones, difference)),
+        'rms': float(np.sqrt((difference**2).mean())),
+        'scale': _interval(scale),
+        'sign': _sign(scale),
+        'payload_kg': _interval(payload),
+    }
+
+
+def _sign(scale: Fit | None) -> str:
+    if scale is None or abs(scale.value[0]) <= scale.half_width[0]:
+        return 'unknown'
+    return 'same' if scale.value[0] > 0.0 else 'opposite'
+
+
+def _interval(fit: Fit | None, k: int = 0) -> Json | None:
+    """Return a coefficient with its 95 % interval."""
+    if fit is None or not np.isfinite([fit.value[k], fit.half_width[k]]).all():
+        return None
+    value, half = float(fit.value[k]), float(fit.half_width[k])
+    return {'value': value, 'low': value - half, 'high': value + half}
+
+
+def _friction(s: _Samples) -> Json | None:
+    """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate."""
+    motion = s.motion()
+    rate = s.rate[motion]
+    if len(rate) < LEAST or not (rate > 0.0).any() or not (rate < 0.0).any():
+        return None
+    columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
+    fit = least_squares(columns, s.difference[motion])
+    return None if fit is None else {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
+
+
+def _f_test(s: _Samples) -> Json | None:
+    """Return F of the motion's mean square error against that at rest (equations 9 and 10)."""
+    rest, motion = s.difference[s.rest()], s.difference[s.motion()]
+    if min(len(rest), len(motion)) < LEAST or not (rest**2).sum() > 0.0:
+        return None
+    mean_squares = [float((x**2).sum()) / (len(x) - 1) for x in (motion, rest)]
+    freedom = [max(independent_samples(x) - 1.0, 1.0) for x in (motion, rest)]
+    f = mean_squares[0] / mean_squares[1]
+    critical = float(fdtri(freedom[0], freedom[1], 1.0 - ALPHA))
+    return {
+        'f': f,
+        'critical': critical,
+        'alpha': ALPHA,
+        'freedom': freedom,
+        'rms_motion': float(np.sqrt(mean_squares[0])),
+        'rms_rest': float(np.sqrt(mean_squares[1])),
+        'static_model_holds': f < critical,
+    }
+
+
+def _pooled_payload(samples: list[_Samples]) -> Json | None:
+    """Return the payload beside the declared one that explains all joints at rest best (kg)."""
+    columns, y = [], []
+    for s in samples:
+        rest = s.rest()
+        if rest.sum() < LEAST or np.sqrt((s.lever[rest] ** 2).mean()) <= LEVER:
+            continue
+        spread = float(np.std(s.difference[rest])) or 1e-6
+        columns.append(s.lever[rest] / spread)
+        y.append(s.difference[rest] / spread)
+    if not columns:
+        return None
+    fit = least_squares(np.concatenate(columns)[:, None], np.concatenate(y))
+    return _interval(fit)

@@ -1,0 +1,54 @@
+"""Least squares with intervals that allow for samples of one run resembling their neighbours."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+Floats = NDArray[np.float64]
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Coefficients (k,), half the width of each one's 95 % interval, and what samples count for.
+
+    `independent` is the number of independent samples that n samples of one run are worth.
+    """
+
+    value: Floats
+    half_width: Floats
+    independent: float
+
+
+def independent_samples(residual: Floats) -> float:
+    """Return n (1 - r) / (1 + r) for the correlation r of neighbours (not below 0)."""
+    n = len(residual)
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if n < 3 or power == 0.0:
+        return float(n)
+    r = min(max(float(centred[1:] @ centred[:-1]) / power, 0.0), 0.999)
+    return n * (1.0 - r) / (1.0 + r)
+
+
+def least_squares(columns: Floats, y: Floats) -> Fit | None:
+    """Return the fit of y (n,) by columns (n, k); None where it is not determined."""
+    n, k = columns.shape
+    scale = np.sqrt((columns**2).sum(axis=0))
+    if n <= k or not (scale > 0.0).all():
+        return None
+    scaled = columns / scale
+    _, _, rank, singular = np.linalg.lstsq(scaled, y, rcond=None)
+    if rank < k or singular[-1] < 1e-6 * singular[0]:
+        return None
+    inverse = np.linalg.inv(scaled.T @ scaled)
+    value = inverse @ (scaled.T @ y)
+    residual = y - scaled @ value
+    worth = independent_samples(residual)
+    freedom = max(worth - k, 1.0)
+    variance = float(residual @ residual) / max(n - k, 1) * (n / max(worth, 1.0))
+    deviation = np.sqrt(variance * np.diag(inverse))
+    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    return Fit(value / scale, quantile * deviation / scale, worth)
