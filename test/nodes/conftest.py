@@ -1,13 +1,10 @@
 """rclpy once a test process, and a fresh set of nodes a test."""
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from live_case import Live, live_nodes, ros_context
+from nodes.live_case import Live, live_nodes, ros_context
 
 
 @pytest.fixture(scope='session', autouse=True)

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from live_case import ERROR, FOLDED, OK, STALE, WARN, Live, levels, session_of
+from nodes.live_case import ERROR, FOLDED, OK, STALE, WARN, Live, levels, session_of
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -279,7 +279,7 @@ def test_stale_inputs_silence_the_margin_topics(live: Live) -> None:
     live.until(lambda: session_of(monitor).level == STALE)
     live.spin(0.2)
     heard.clear()
-    from live_case import imu
+    from nodes.live_case import imu
 
     live.spin(0.5, lambda: driver.imu.publish(imu()))
     assert heard == []

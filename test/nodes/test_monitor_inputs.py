@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from live_case import ERROR, FOLDED, OK, STALE, Live, imu, joints, levels, session_of
+from nodes.live_case import ERROR, FOLDED, OK, STALE, Live, imu, joints, levels, session_of
 from rosgraph_msgs.msg import Clock
 
 from ugv_acceptance.bag.encode import joint_state_cdr
@@ -56,7 +56,7 @@ PUBLISHER = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
 import rclpy
-from live_case import Driver
+from nodes.live_case import Driver
 rclpy.init()
 driver = Driver('stoppable')
 while True:
@@ -70,7 +70,7 @@ def test_a_publisher_that_stops_makes_the_verdict_stale(live: Live, end: signal.
     """After SIGSTOP or SIGKILL of the driver the input is STALE when its own limit is over."""
     monitor = live.monitor()
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    here = str(Path(__file__).parent)
+    here = str(Path(__file__).parents[1])
     process = subprocess.Popen([sys.executable, '-c', PUBLISHER, here], env=environment)
     try:
         live.until(lambda: session_of(monitor).counts['imu'].taken > 100)

@@ -25,7 +25,9 @@ from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import BAD_INPUT, Stop, ros
 
 # Seconds to wait for subscribers at the start: discovery takes one or two.
-DISCOVERY = 1.5
+DISCOVERY = 3.0
+# Seconds until a subscriber that we know of knows of us too: before that it hears nothing.
+SETTLING = 0.7
 _NS = 1_000_000_000
 # Seconds between two messages on /clock.
 _CLOCK_STEP = 0.01
@@ -84,8 +86,9 @@ class Player:
         end = time.monotonic() + seconds
         while time.monotonic() < end and not stop.asked:
             if all(p.get_subscription_count() for p in self.publishers.values()):
-                return
+                break
             time.sleep(0.05)
+        time.sleep(SETTLING)
 
     def run(self, stop: Stop, progress: Callable[[float], None] = lambda _: None) -> None:
         """Play until the end, or for ever with `loop`; `progress` takes seconds of the recording."""
