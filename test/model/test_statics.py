@@ -214,6 +214,9 @@ def test_an_unknown_joint_makes_its_torques_unknown(bad: float) -> None:
     posture = posture_of(mechanics_of(robot), q, 4.0, robot.payload.cog)
     np.testing.assert_array_equal(np.isnan(np.array(torque_of(posture, DOWN))), np.isnan(torque))
     assert np.isnan(payload_capacity(robot, q, DOWN, LIMITS))
+    rest = [0.0] * 4
+    moving = inverse_dynamics(robot, [q], rest, rest, DOWN)[0]
+    np.testing.assert_array_equal(np.isnan(moving), np.isnan(torque))
 
 
 def test_a_robot_without_mass_is_refused() -> None:

@@ -5,7 +5,7 @@ one sample is taken by all others it fits.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import combinations
 from typing import Any
@@ -54,18 +54,22 @@ def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
         if hull:
             hull.pop()
     corners = [points[k] for k in hull]
-    if len(hull) < 3 or _is_thin(corners):
+    if len(hull) < 3 or _is_thin(corners, max):
         return ()
     cycle = tuple(numbers[k] for k in hull)
     start = cycle.index(min(cycle))
     return cycle[start:] + cycle[:start]
 
 
-def _is_thin(points: Sequence[Any]) -> Values:
+def _is_thin(points: Sequence[Any], largest: Callable[[list[Any]], Any]) -> Values:
     """Return whether no triangle of the points is wider than THIN across their longest distance."""
-    thickest = reduce(np.maximum, [abs(_turn(*three)) for three in combinations(points, 3)])
-    squares = [(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)]
-    return thickest <= THIN * np.sqrt(reduce(np.maximum, squares))
+    thickest = largest([abs(_turn(*three)) for three in combinations(points, 3)])
+    square = largest([(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)])
+    return thickest * thickest <= THIN * THIN * square
+
+
+def _largest(values: list[Any]) -> Values:
+    return reduce(np.maximum, values)
 
 
 def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cycle, Rows]]:
@@ -103,8 +107,8 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
     if len(active) < 3:
         return True
     if not cycle:
-        return _is_thin([points[k] for k in active])
-    good = np.logical_not(_is_thin([points[k] for k in cycle]))
+        return _is_thin([points[k] for k in active], _largest)
+    good = np.logical_not(_is_thin([points[k] for k in cycle], _largest))
     for i, j in pairs(cycle):
         for k in active:
             if k not in {i, j}:

@@ -58,7 +58,7 @@ def inverse_dynamics(
     mechanics, load = mechanics_of(robot), payload or robot.payload
 
     def torques(*columns: Number) -> tuple[Number, ...]:
-        return mechanics.forces.many(*columns, load.mass, *load.cog)
+        return mechanics.forces.run(*columns, load.mass, *load.cog)
 
     return in_blocks(torques, len(robot.joint_names), q, qd, qdd, gravity, workers=workers)
 
