@@ -51,7 +51,10 @@ class ModelCheck:
         slots = rows.time // self._spacing
         picked = np.flatnonzero(np.diff(slots, prepend=self._slot))
         self._slot = int(slots[-1])
-        picked = picked[rows.known[picked]]
+        # A robot that has tipped rests on its arm.
+        with np.errstate(invalid='ignore'):
+            stands = ~(rows.angle[picked].min(axis=1) <= 0.0)
+        picked = picked[rows.known[picked] & stands]
         if not len(picked):
             return
         joints, of = rows.pairs.joints, rows.pairs.of_joints[picked]
