@@ -299,7 +299,7 @@ def imu_messages(draw: st.DrawFn) -> Imu:
         st.one_of(
             st.just(upright(orientation)),
             st.sampled_from([REST, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, -9.81)]),
-            st.tuples(*[mostly(st.floats(-12, 12))] * 3),
+            st.tuples(*[mostly(st.integers(-12000, 12000).map(lambda k: k / 1000))] * 3),
         )
     )
     omega = draw(st.one_of(st.just(STILL), st.tuples(*[mostly(st.floats(-0.2, 0.2))] * 3)))

@@ -57,11 +57,14 @@ def compare(
         if margins is None:
             continue
         s = margins.stability
-        one = [*margins.q, *margins.gravity, *margins.torque, *s.angle, *s.moment, *s.energy, s.zmp]
+        one = [*margins.q, *margins.gravity, *margins.torque, *s.angle, *s.moment, *s.energy]
         many = [
             *(part.q[k], part.gravity[k], part.torque[k]),
-            *(part.angle[k], part.moment[k], part.energy[k], part.zmp[k : k + 1]),
+            *(part.angle[k], part.moment[k], part.energy[k]),
         ]
+        # The ZMP runs away to infinity as gravity turns parallel to the ground.
+        if margins.gravity[2] < -1.0:
+            one, many = [*one, s.zmp], [*many, part.zmp[k : k + 1]]
         np.testing.assert_allclose(np.array(one), np.concatenate(many), rtol=1e-12, atol=1e-12)
         assert (margins.stamp, s.state) == (part.stamp[k], part.state[k])
     assert events == len(of_rows)

@@ -16,7 +16,7 @@ LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """When a value is bad: from `value >= on` until `value < off` (the deadband), each held a while.
+    """When a value is bad: from `value >= on` until `value < off` (a deadband), each held a while.
 
     The alert is raised when the value has been bad for `on_delay` and cleared when it has been good
     for `off_delay` (ns). A NaN value changes nothing. `source` names the values' rows: pair, joints
@@ -120,7 +120,9 @@ class Signal:
             self.alert.peak = peak
 
 
-def runs(rule: Rule, values: NDArray[np.float64], raw: bool) -> Iterator[tuple[int, int, bool]]:
+def runs(
+    rule: Rule, values: NDArray[np.float64], *, raw: bool
+) -> Iterator[tuple[int, int, bool]]:
     """Yield (first row, row after the last, bad) for every run of `values` on one side.
 
     `raw` is the side before the first row; rows inside the deadband, and NaN, prolong a run.
@@ -143,7 +145,7 @@ def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[np.float64]) 
         return
     if signal.quiet and not np.fmax.reduce(values) >= signal.on:
         return
-    for first, last, bad in runs(signal.rule, values, signal.raw):
+    for first, last, bad in runs(signal.rule, values, raw=signal.raw):
         if bad:
             signal.set(int(times[first]), float(np.fmax.reduce(values[first:last])))
         else:

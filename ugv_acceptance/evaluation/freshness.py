@@ -18,9 +18,9 @@ CLOCK_SLACK = 1_000_000_000
 
 @dataclass(slots=True)
 class Freshness:
-    """Learns an input's period (median of every WINDOW intervals) and how long it may be silent.
+    """Learns an input's period (median of each WINDOW intervals) and how long it may be silent.
 
-    `started` is when listening began (ns), `last` the receipt time of the newest message (None: none
+    `started` is when listening began (ns), `last` when the newest message was received (None: none
     yet), `limit` the silence (ns) after which the input is stale.
     """
 

@@ -8,6 +8,7 @@ written for one message and for columns; a property test holds that both give th
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,7 +44,7 @@ class ImuRows:
     """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
 
     `disagreement` (n,) is the angle (rad) between orientation and accelerometer, NaN while moving;
-    `strange` (n,) the share of g by which the acceleration differs from g at rest, NaN while moving;
+    `strange` (n,) the share of g by which acceleration differs from g at rest, NaN while moving;
     `unusable` (n,) says that gravity cannot be told or that a number cannot be believed.
     """
 
@@ -189,16 +190,15 @@ class ImuTracker:
         edges = np.append(np.flatnonzero(starts), len(stamp))
         y = np.empty_like(x)
         last = np.array(self.smooth)
-        for first, end in zip(edges[:-1], edges[1:], strict=True):
-            part = x[:, first:end]
-            if not carried[first] or not np.isfinite(last).all():
-                last = part[:, 0]
-                keep = np.exp(-(elapsed[first:end] - elapsed[first]))
-                gain = np.concatenate(([0.0], -np.expm1(-decay[first + 1 : end])))
-            else:
-                keep = np.exp(-(elapsed[first:end] - elapsed[first] + decay[first]))
-                gain = -np.expm1(-decay[first:end])
-            y[:, first:end] = keep * (last[:, None] + np.cumsum(gain * part / keep, axis=1))
+        for first, end in pairwise(edges.tolist()):
+            part, w = x[:, first:end], y[:, first:end]
+            # What the output lacks of the input decays, and grows by each step of the input.
+            fresh = not carried[first] or not np.isfinite(last).all()
+            since = elapsed[first] if fresh else elapsed[first] - decay[first]
+            keep = np.exp(since - elapsed[first:end])
+            w[:, 0] = 0.0 if fresh else last - part[:, 0]
+            w[:, 1:] = (part[:, :-1] - part[:, 1:]) / keep[:-1]
+            y[:, first:end] = part + keep * np.cumsum(w, axis=1)
             last = y[:, end - 1]
         self.smooth = (float(last[0]), float(last[1]), float(last[2]))
         return y
@@ -227,7 +227,7 @@ def _norms(v: Floats) -> Floats:
 
 
 def _force(smooth: Any, omega: Any, imu: ImuInput) -> Any:  # noqa: ANN401 - floats or arrays
-    """Return minus the specific force at base_link's origin, in base axes (centripetal part undone)."""
+    """Return minus the specific force at base_link's origin (m/s2, base axes)."""
     force = rotate(imu.mounting, smooth)
     spin = rotate(imu.mounting, omega)
     arm = scale(imu.position, -1.0)

@@ -1,4 +1,4 @@
-"""Joint states to the robot's joints: names matched, signs and offsets undone, partial ones merged."""
+"""Joint states to the robot's joints: names matched, signs undone, partial messages merged."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,8 @@ class JointRows:
     """Merged joint states, one row a message that names one of the robot's joints.
 
     `q` (n, j) is NaN where a joint is unknown or its value cannot be used; `qd` and `effort` NaN
-    where not reported or beyond belief; `oldest` (n,) is the receipt time of the oldest position in the row.
+    where not reported or beyond belief; `oldest` (n,) is the receipt time of the oldest position in
+    the row.
     """
 
     time: Times
@@ -118,7 +119,7 @@ class JointMerger:
     def _fill(self, tables: Floats, named: NDArray[np.bool_], segment: JointStateColumns) -> None:
         """Write a segment's positions, rates and efforts, and which joints it names."""
         tables.fill(np.nan)
-        named.fill(False)
+        named[:] = False
         for j, k in self.layout(segment.names):
             joint = self.settings.joints[j]
             with np.errstate(all='ignore'):
@@ -136,31 +137,28 @@ class JointMerger:
         self, time: Times, stamp: Times, tables: Floats, named: NDArray[np.bool_]
     ) -> JointRows:
         """Let every joint keep its newest value until the next message that names it."""
-        oldest = time
-        whole = named.all(axis=1)
-        if not whole.all():
-            oldest = time.copy()
-            for j in np.flatnonzero(~whole).tolist():
-                self._carry_joint(j, time, tables, named[j], oldest)
+        oldest, unusable = time, np.isnan(tables[0]).any(axis=0)
+        if not named.all():
+            oldest, unusable = time.copy(), np.zeros(len(time), np.bool_)
+            for j in range(len(named)):
+                seen = self._carry_joint(j, time, tables[:, j], named[j])
+                np.minimum(oldest, seen, out=oldest)
+                unusable |= np.isnan(tables[0, j]) & (seen != NEVER)
         if len(time):
             self.q, self.qd, self.effort = tables[:, :, -1].tolist()
         for j in np.flatnonzero(named.any(axis=1)).tolist():
             self.seen[j] = int(time[len(time) - 1 - named[j, ::-1].argmax()])
-        unusable = (np.isnan(tables[0]) & named).any(axis=0)
         q, qd, effort = (table.T for table in tables)
         return JointRows(time, stamp, q, qd, effort, oldest, unusable)
 
-    def _carry_joint(
-        self, j: int, time: Times, tables: Floats, named: NDArray[np.bool_], oldest: Times
-    ) -> None:
+    def _carry_joint(self, j: int, time: Times, tables: Floats, named: NDArray[np.bool_]) -> Times:
+        """Fill the rows that do not name joint number j; return when its value was received."""
         newest = np.maximum.accumulate(np.where(named, np.arange(len(time)), -1))
         known = newest >= 0
         before = (self.q[j], self.qd[j], self.effort[j])
         for table, value in zip(tables, before, strict=True):
-            table[j] = np.where(known, table[j, newest], value)
-        seen = np.where(known, time[newest], self.seen[j])
-        np.minimum(oldest, seen, out=oldest)
-        named[:] = seen != NEVER
+            table[:] = np.where(known, table[newest], value)
+        return np.where(known, time[newest], self.seen[j])
 
 
 def _within(values: Floats, limits: tuple[float, float]) -> Floats:

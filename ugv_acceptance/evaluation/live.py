@@ -87,7 +87,7 @@ class LiveEvaluator:
         known = all(map(math.isfinite, joints.q))
         seen = min(joints.seen)
         unusable = not known and any(
-            t != NEVER and q != q for q, t in zip(joints.q, joints.seen, strict=True)
+            t != NEVER and math.isnan(q) for q, t in zip(joints.q, joints.seen, strict=True)
         )
         watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
         watch.missing.step(now, 1.0 if now - seen > self._fresh[0].limit else 0.0)
@@ -190,13 +190,14 @@ class LiveEvaluator:
 
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:
         watch = self.watch
+        angles: Any = stability.angle
         for (warn, error), tau in zip(watch.torque, torque, strict=True):
             value = abs(tau)
             # A quiet signal has nothing to do with a small value: most calls are saved.
             if value >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, value)
                 error.step(now, value)
-        for (warn, error), angle in zip(watch.tip, stability.angle, strict=True):
+        for (warn, error), angle in zip(watch.tip, angles, strict=True):
             if -angle >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, -angle)
                 error.step(now, -angle)

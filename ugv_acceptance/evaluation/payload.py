@@ -1,4 +1,4 @@
-"""What is carried: a declared payload, where it can be believed, and when which one was declared."""
+"""What is carried: a declared payload where it can be believed, and which was declared when."""
 
 import math
 from collections.abc import Sequence

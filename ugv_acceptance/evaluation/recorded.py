@@ -1,4 +1,4 @@
-"""The evaluation of a recording: batches of columns in, blocks of margins out, same rules as live."""
+"""The evaluation of a recording: batches of columns in, margins out, by the same rules as live."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
@@ -160,8 +160,8 @@ class RecordedEvaluator:
         pairs = Pairs(joints, imu, np.cumsum(from_joints), np.cumsum(~from_joints))
         j, i = pairs.of_joints, pairs.of_imu
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
-        whole: NDArray[np.bool_] = np.isfinite(joints.q).all(axis=1)
-        known: NDArray[np.bool_] = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
+        whole = np.asarray(np.isfinite(joints.q).all(axis=1))
+        known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
         table, state = self._table(pairs, whole, known)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
@@ -235,8 +235,9 @@ class RecordedEvaluator:
     def _watch_pairs(self, rows: MarginRows) -> None:
         all_known = rows.known.all()
         time = rows.time if all_known else rows.time[rows.known]
-        pairs = zip((*rows.torque.T, *rows.angle.T), (*self.watch.torque, *self.watch.tip), strict=True)
-        for k, (values, (warn, error)) in enumerate(pairs):
+        values_of = (*rows.torque.T, *rows.angle.T)
+        signals = (*self.watch.torque, *self.watch.tip)
+        for k, (values, (warn, error)) in enumerate(zip(values_of, signals, strict=True)):
             if warn.on == np.inf:
                 continue
             some = values if all_known else values[rows.known]

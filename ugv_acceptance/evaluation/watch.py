@@ -35,6 +35,7 @@ class Watch:
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
         speeds = limits.speed or (float('inf'),) * len(names)
+        delay = self.settings.delays.tip_on
         self.torque = [
             (
                 self._torque(name, WARN, limits.torque_warn * limit),
@@ -43,7 +44,7 @@ class Watch:
             for name, limit in zip(names, limits.torque, strict=True)
         ]
         self.speed = [
-            self._signal('STATIC_MODEL', name, WARN, (speed, 0.9 * speed), self.settings.delays.tip_on)
+            self._signal('STATIC_MODEL', name, WARN, (speed, 0.9 * speed), delay)
             for name, speed in zip(names, speeds, strict=True)
         ]
         self.tip = [
