@@ -22,7 +22,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A URDF joint: `xyz` (m) and `rotation` place its frame in the parent link, `axis` is a unit vector.
+    """A URDF joint: `xyz` (m) and `rotation` place it in the parent link, `axis` is a unit vector.
 
     `kind` is revolute, continuous, prismatic or fixed. `effort` (N m, or N where prismatic),
     `velocity` (rad/s or m/s) and the position limits are infinite where the URDF gives none.
@@ -52,7 +52,7 @@ class Contact:
 
 @dataclass(frozen=True, slots=True)
 class Payload:
-    """A load carried by the robot's payload link: mass (kg) and centre of gravity in its axes (m)."""
+    """A load carried by the payload link: mass (kg) and centre of gravity in its axes (m)."""
 
     mass: float = 0.0
     cog: Vector = ZERO
@@ -63,7 +63,8 @@ class Robot:
     """The physical model; the root link's frame is `base_link`.
 
     `joint_names` are the joints whose positions are given, in the order of every `q[..., j]`;
-    movable joints that are not among them are held at the value `held` pairs with their name, else at 0.
+    movable joints that are not among them are held at the value `held` pairs with their name, else
+    at 0.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground.
     """
