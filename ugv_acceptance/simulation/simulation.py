@@ -5,6 +5,7 @@ attitude a gravity-aligned world would see is the ground's own times the robot's
 tilts slowly: what its turning adds to accelerations is left out.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -25,6 +26,7 @@ from ugv_acceptance.simulation.vehicle import (
 BUILD = Build(wheels=True, bulk=True, armature=0.01, timestep=0.00125, contact_time=0.005)
 # Steps between two looks at commands and targets.
 STEPS = 2
+SENSORS = ('orientation', 'gyro', 'accelerometer')
 # Time (s) to come to rest before the run begins.
 SETTLE = 1.0
 
@@ -36,17 +38,19 @@ class _Move:
     start: float
     change: float = 0.0
     begin: float = 0.0
-    length: float = 1.0
+    length: float = 0.0
 
     def at(self, time: float) -> tuple[float, float]:
         """Return value and rate: a cosine ramp, whose peak rate is pi / 2 of the mean."""
-        phase = np.pi * min(max((time - self.begin) / self.length, 0.0), 1.0)
-        rate = self.change * np.pi / (2.0 * self.length) * np.sin(phase)
-        return self.start + self.change * (1.0 - np.cos(phase)) / 2.0, float(rate)
+        if time >= self.begin + self.length:
+            return self.start + self.change, 0.0
+        phase = math.pi * max((time - self.begin) / self.length, 0.0)
+        rate = self.change * math.pi / (2.0 * self.length) * math.sin(phase)
+        return self.start + self.change * (1.0 - math.cos(phase)) / 2.0, rate
 
 
 def _move(start: float, target: float, speed: float, time: float) -> _Move:
-    length = max(abs(target - start) * np.pi / (2.0 * speed), 1e-9)
+    length = max(abs(target - start) * math.pi / (2.0 * speed), 1e-9)
     return _Move(start, target - start, time, length)
 
 
@@ -74,8 +78,10 @@ class Simulation:
         first = dict(start)
         _check_joints(robot, first)
         self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
-        self._tilt, self._heading = _Move(slope[0]), slope[1]
+        self._slope = [_Move(part) for part in _parts(*slope)]
         self._drive = (0.0, 0.0)
+        self._steered = False
+        self._sensors = [self.data.sensor(name).data for name in SENSORS]
         self._settle()
 
     def _settle(self) -> None:
@@ -98,6 +104,7 @@ class Simulation:
         """Take a command now. Raises BadConfig where it names a joint the robot does not move."""
         targets = dict(command.joints)
         _check_joints(self.robot, targets)
+        self._steered = False
         now = self.time
         for k, name in enumerate(self.robot.joint_names):
             if name in targets:
@@ -106,8 +113,8 @@ class Simulation:
         if command.drive is not None:
             self._drive = command.drive
         if command.slope is not None:
-            tilt, self._heading = command.slope
-            self._tilt = _move(self._tilt.at(now)[0], tilt, command.slope_rate, now)
+            parts = zip(self._slope, _parts(*command.slope), strict=True)
+            self._slope = [_move(m.at(now)[0], to, command.slope_rate, now) for m, to in parts]
         if command.payload is not None:
             set_payload(self.vehicle, command.payload)
 
@@ -122,7 +129,10 @@ class Simulation:
             left -= steps
 
     def _steer(self, time: float) -> None:
-        """Set the servos' targets and gravity for `time`."""
+        """Set the servos' targets and gravity for `time`, unless they have come to their ends."""
+        if self._steered:
+            return
+        self._steered = all(m.begin + m.length <= time for m in (*self._moves, *self._slope))
         control, vehicle = self.data.ctrl, self.vehicle
         for motor, move in zip(vehicle.motor, self._moves, strict=True):
             target, rate = move.at(time)
@@ -131,12 +141,16 @@ class Simulation:
         forward, yaw = self._drive
         for wheel, y in vehicle.wheels:
             control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
-        tilt = self._tilt.at(time)[0]
-        vehicle.model.opt.gravity[:] = gravity_on_slope(self.robot.gravity, tilt, self._heading)
+        gravity = gravity_on_slope(self.robot.gravity, *self._slope_at(time))
+        vehicle.model.opt.gravity[:] = gravity
 
     def slope(self) -> tuple[float, float]:
         """Return tilt and heading (rad) of the ground."""
-        return self._tilt.at(self.time)[0], self._heading
+        return self._slope_at(self.time)
+
+    def _slope_at(self, time: float) -> tuple[float, float]:
+        x, y = (move.at(time)[0] for move in self._slope)
+        return math.hypot(x, y), math.atan2(y, x)
 
     def joints(self) -> tuple[Floats, Floats, Floats]:
         """Return position, rate and motor force (j,) of the joints: rad, rad/s, N m (m, m/s, N)."""
@@ -149,19 +163,25 @@ class Simulation:
 
     def imu(self) -> tuple[Floats, Floats, Floats]:
         """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2."""
-        data = self.data
+        orientation, gyro, acceleration = self._sensors
         tilt, heading = self.slope()
-        s = np.sin(tilt / 2.0)
-        ground = np.array([np.cos(tilt / 2.0), -s * np.sin(heading), s * np.cos(heading), 0.0])
+        s = math.sin(tilt / 2.0)
+        ground = np.array(
+            [math.cos(tilt / 2.0), -s * math.sin(heading), s * math.cos(heading), 0.0]
+        )
         world = np.empty(4)
-        mujoco.mju_mulQuat(world, ground, data.sensor('orientation').data)
-        gyro, acceleration = data.sensor('gyro').data, data.sensor('accelerometer').data
+        mujoco.mju_mulQuat(world, ground, orientation)
         return world[[1, 2, 3, 0]], gyro.copy(), acceleration.copy()
 
     def base(self) -> tuple[Floats, Floats]:
         """Return position (3,) m of `base_link` on the ground, and its z axis there (3,)."""
         root = self.vehicle.root
         return self.data.xpos[root].copy(), self.data.xmat[root].reshape(3, 3)[:, 2].copy()
+
+
+def _parts(tilt: float, heading: float) -> tuple[float, float]:
+    """Return a slope as a tilt along x and one along y (rad): it can turn without a jump."""
+    return tilt * math.cos(heading), tilt * math.sin(heading)
 
 
 def _check_joints(robot: Robot, targets: dict[str, float]) -> None:

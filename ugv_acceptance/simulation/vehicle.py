@@ -5,6 +5,7 @@ MuJoCo checks those. Every link is a body with the link's own axes; a point-like
 inertia MuJoCo takes. Ground slopes come from the direction of gravity: see `gravity_on_slope`.
 """
 
+import math
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
@@ -243,5 +244,5 @@ def gravity_on_slope(gravity: float, tilt: float, heading: float) -> Floats:
 
     `heading` (rad) counts from x (forward) to y (left): right tilt is -pi/2.
     """
-    s, c = np.sin(tilt), np.cos(tilt)
-    return gravity * np.array([s * np.cos(heading), s * np.sin(heading), -c])
+    s, c = math.sin(tilt), math.cos(tilt)
+    return gravity * np.array([s * math.cos(heading), s * math.sin(heading), -c])
