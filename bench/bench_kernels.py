@@ -1,4 +1,4 @@
-"""A million random PackBot postures: all torques and all tip edges, beside Pinocchio and MuJoCo loops.
+"""A million PackBot postures: all torques and tip edges, beside Pinocchio and MuJoCo loops.
 
 Ours gives more than the loops do (four edges' angles, moments and energies, and the ZMP); the loops
 give torques and the centre of mass alone. CPU seconds, best of rounds in turn; ratios count.
@@ -104,14 +104,16 @@ def main(count: int = 1_000_000) -> None:
         'MuJoCo mj_inverse loop': (LOOPS, mujoco_loop(path, q, g)),
         'closed two-link dynamics': (count, lambda: planar_dynamics(PAPER, *arm)),
     }
-    best = {name: (math.inf, math.inf) for name in ways}
+    best = dict.fromkeys(ways, (math.inf, math.inf))
     for _ in range(ROUNDS):
         for name, (n, run) in ways.items():
             cpu, wall = seconds(run)
             best[name] = min(best[name][0], cpu / n), min(best[name][1], wall / n)
     loop = best['Pinocchio loop, torques + CoM']
     print(f'{count} postures; loops timed on {LOOPS}')
-    print(f'{"way":36}{"cpu ns":>9}{"wall ns":>9}{"cpu x":>8}{"wall x":>8}   (x: against Pinocchio)')
+    print(
+        f'{"way":36}{"cpu ns":>9}{"wall ns":>9}{"cpu x":>8}{"wall x":>8}   (x: against Pinocchio)'
+    )
     for name, (cpu, wall) in best.items():
         ratios = f'{loop[0] / cpu:8.2f}{loop[1] / wall:8.2f}'
         print(f'{name:36}{cpu * 1e9:9.0f}{wall * 1e9:9.0f}{ratios}')

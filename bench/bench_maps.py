@@ -1,4 +1,4 @@
-"""Maps of 2001 x 2001 cells: torque of the paper's arm against plain NumPy, rollover of the PackBot.
+"""Maps of 2001 x 2001 cells: torque of the paper's arm, rollover of the PackBot.
 
 Each way a few times, all ways in turn, medians; the torque maps must be the same booleans.
 
@@ -16,7 +16,6 @@ import numpy as np
 from ugv_acceptance.config import load
 from ugv_acceptance.model.bilinear import grid_of
 from ugv_acceptance.model.maps import (
-    Mask,
     rollover_map,
     stands,
     tip_forms,
@@ -25,6 +24,7 @@ from ugv_acceptance.model.maps import (
 )
 from ugv_acceptance.model.planar import PAPER, arm_robot
 from ugv_acceptance.model.stability import stability
+from ugv_acceptance.model.windows import Mask
 
 LIMIT = 50.0
 ROUNDS = 5
@@ -85,7 +85,7 @@ def rollover(n: int) -> None:
             raise SystemExit('expected one support polygon with stowed flippers, found several')
         return stands(robot, grid, forms)
 
-    general = np.min(stability(robot, coarse.postures(), gravity).angle, axis=0)
+    general = np.min(np.array(stability(robot, coarse.postures(), gravity).angle), axis=0)
     apart = np.abs(general - rollover_map(robot, coarse, gravity).angle).max()
     found = medians(
         {

@@ -1,6 +1,6 @@
-"""Risk: Monte Carlo against the cost of its random numbers, memory, and quadrature on the two-link arm.
+"""Risk: Monte Carlo against the cost of its random numbers, memory, quadrature.
 
-    python bench/bench_risk.py [samples]
+python bench/bench_risk.py [samples]
 """
 
 import math
@@ -33,7 +33,7 @@ def two_link() -> Study:
 
 
 def packbot() -> Study:
-    """Return the PackBot on random slopes: posture, rates, load, masses and their centres uncertain."""
+    """Return the PackBot on random slopes: posture, rates, load and masses uncertain."""
     settings = load().settings
     turn = uniform(-math.pi, math.pi)
     spreads: dict[str, Spread] = {
@@ -105,7 +105,8 @@ def main(samples: int = 4_000_000) -> None:
         needed = (spread / error) ** 2
         print(
             f'  {nodes!s:14} P {found:.8f} error {error:.1e}{best * 1e3:8.2f} ms'
-            f'   {needed:.1e} samples would take {needed * each:.1e} s: {needed * each / best:.0f} x'
+            f'   {needed:.1e} samples would take {needed * each:.1e} s:'
+            f' {needed * each / best:.0f} x'
         )
 
 

@@ -1,4 +1,4 @@
-"""Random trees, postures, motions and tilts: the same numbers as Pinocchio, built from the same robot."""
+"""Random trees, postures, motions and tilts: the same numbers as Pinocchio's."""
 
 import numpy as np
 import pinocchio as pin

@@ -72,7 +72,9 @@ def test_a_pull_that_saturates_is_the_torque_of_a_sideways_load(
 def test_a_hitch_pull_tips_about_the_rear_edge() -> None:
     """By hand: weight times its distance from the rear edge over the hitch's height."""
     q = (0.0, math.pi / 2.0, 0.0, math.pi)  # the arm upright
-    found = pull_capacity(ROBOT, q, DOWN, (-1.0, 0.0, 0.0), LIMITS, hitch=(-0.3, 0.0, 0.5), payload=EMPTY)
+    found = pull_capacity(
+        ROBOT, q, DOWN, (-1.0, 0.0, 0.0), LIMITS, hitch=(-0.3, 0.0, 0.5), payload=EMPTY
+    )
     mass = sum(link.mass for link in ROBOT.links)
     moments = [(24.0, 0.02), (1.5, 0.0), (2.5, 0.0), (2.5, 0.0), (2.0, 0.239 - 0.1)]
     centre = sum(m * x for m, x in moments) / mass
@@ -98,18 +100,25 @@ def test_at_slip_the_force_lies_on_the_friction_cone(slope: float, mu: float, li
     found = pull_capacity(ROBOT, q, g, d, LIMITS, mu, (0.0, 0.0, 0.02), EMPTY)
     force = float(found.bounds[SLIP])
     mass = sum(link.mass for link in ROBOT.links)
-    if abs(math.tan(slope)) >= mu:
-        assert force == 0.0
-        return
-    assume(np.isfinite(force))
+    assume(abs(math.tan(slope)) < mu and math.isfinite(force))
     total = mass * g + force * d
     assert math.hypot(total[0], total[1]) == pytest.approx(mu * -total[2], abs=1e-6)
 
 
-def test_an_upward_pull_along_no_lever_has_no_end() -> None:
-    """A force that presses the robot down through its middle never tips it, nor do its joints care."""
+def test_a_robot_that_slides_already_pulls_nothing() -> None:
+    """On a slope steeper than the friction allows, no pull is left."""
+    g = 9.81 * np.array([math.sin(0.5), 0.0, -math.cos(0.5)])
     q = (0.0, math.pi / 2.0, 0.0, math.pi)
-    found = pull_capacity(ROBOT, q, DOWN, (0.0, 0.0, -1.0), LIMITS, hitch=(0.0, 0.0, 0.2), payload=EMPTY)
+    found = pull_capacity(ROBOT, q, g, (1.0, 0.0, 0.0), LIMITS, 0.3, (0.0, 0.0, 0.02), EMPTY)
+    assert found.bounds[SLIP] == 0.0
+
+
+def test_an_upward_pull_along_no_lever_has_no_end() -> None:
+    """A force that presses the robot down through its middle never tips it."""
+    q = (0.0, math.pi / 2.0, 0.0, math.pi)
+    found = pull_capacity(
+        ROBOT, q, DOWN, (0.0, 0.0, -1.0), LIMITS, hitch=(0.0, 0.0, 0.2), payload=EMPTY
+    )
     assert found.cause == NOTHING
     assert found.force == np.inf
 
@@ -118,7 +127,9 @@ def test_a_robot_that_tips_already_pulls_nothing() -> None:
     """Past the tipping slope every pull is zero, because of tipping."""
     g = 9.81 * np.array([0.0, -math.sin(1.2), -math.cos(1.2)])
     q = (0.0, math.pi / 2.0, 0.0, math.pi)
-    found = pull_capacity(ROBOT, q, g, (1.0, 0.0, 0.0), LIMITS, hitch=(0.0, 0.0, 0.1), payload=EMPTY)
+    found = pull_capacity(
+        ROBOT, q, g, (1.0, 0.0, 0.0), LIMITS, hitch=(0.0, 0.0, 0.1), payload=EMPTY
+    )
     assert found.bounds[TIP] == 0.0
 
 

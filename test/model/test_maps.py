@@ -45,7 +45,11 @@ def tracked_grid(flippers: float, turret: float = 0.4) -> tuple[Robot, Grid]:
 
 def tilted(roll: float, pitch: float) -> tuple[float, float, float]:
     """Return a gravity that is not level."""
-    return (9.81 * math.sin(pitch), -9.81 * math.sin(roll), -9.81 * math.cos(roll) * math.cos(pitch))
+    return (
+        9.81 * math.sin(pitch),
+        -9.81 * math.sin(roll),
+        -9.81 * math.cos(roll) * math.cos(pitch),
+    )
 
 
 @given(seed=st.integers(0, 10_000))
@@ -88,7 +92,7 @@ def test_a_form_is_exact_on_any_tree(seed: int) -> None:
 
 @pytest.mark.parametrize('turret', [0.0, 0.7])
 def test_limits_on_a_tilted_base(turret: float) -> None:
-    """A turret and a tilt load out of the plane: the map still judges as the general function does."""
+    """A turret and a tilt load out of the plane: the map judges as the general function."""
     robot, grid = tracked_grid(math.pi, turret)
     gravity, limits = tilted(0.3, -0.2), np.array([30.0, 45.0, 25.0, np.inf])
     forms = torque_forms(robot, grid, gravity)

@@ -50,7 +50,9 @@ def test_the_recursion_gives_the_two_link_dynamics(arm: PlanarArm, seed: int) ->
     """Inverse dynamics of the tree are the textbook closed form of two links."""
     q, qd, qdd = np.random.default_rng(seed).uniform(-3.0, 3.0, (3, 8, 2))
     ours = inverse_dynamics(arm_robot(arm), q, qd, qdd, DOWN)
-    assert np.allclose(ours, np.stack(planar_dynamics(arm, q, qd, qdd), axis=-1), rtol=0, atol=1e-11)
+    assert np.allclose(
+        ours, np.stack(planar_dynamics(arm, q, qd, qdd), axis=-1), rtol=0, atol=1e-11
+    )
 
 
 def test_offsets_move_the_centres_of_gravity_outwards() -> None:

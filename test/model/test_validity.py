@@ -106,7 +106,7 @@ def test_at_the_limit_the_worst_joint_has_the_critical_f() -> None:
 
 
 def test_no_offset_is_needed_for_a_speed_limit() -> None:
-    """The paper's arm, static error 1 N m: the elbow may move at 35.9 deg/s over the paper's sweep."""
+    """The paper's arm and sweep, static error 1 N m: the elbow may move at 35.9 deg/s."""
     limits = speed_limit(paper_arm(), paper_sweep(THETA1), reference=1.0)
     assert math.degrees(limits[1]) == pytest.approx(35.88, abs=0.01)
 

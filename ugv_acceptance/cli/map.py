@@ -1,4 +1,4 @@
-"""`ugv-acceptance map`: where two joints saturate, tip, carry or pull, as a picture or as numbers."""
+"""`ugv-acceptance map`: torque, tilt left, payload or pull over two joints."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ugv_acceptance.report.map_data import Scene
 
 
-def map(  # noqa: A001 - the verb's name
+def map(  # noqa: A001, PLR0917 - the verb's name; one parameter an option
     kind: Annotated[str, typer.Argument(help='torque, rollover, payload or drag.')],
     out: Annotated[
         list[Path] | None,
@@ -28,7 +28,9 @@ def map(  # noqa: A001 - the verb's name
     ] = 'level',
     slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',
     payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
-    limit: Annotated[str, typer.Option(help='joint="50 N m",... in place of configured limits.')] = '',
+    limit: Annotated[
+        str, typer.Option(help='joint="50 N m",... in place of configured limits.')
+    ] = '',
     caution: Annotated[
         float | None, typer.Option(help="Caution from here on, in the map's unit.")
     ] = None,

@@ -39,7 +39,9 @@ def scene_from(loaded: Config, wanted: Wanted) -> Scene:
     first, x = _axis(robot, '--x', wanted.x, wanted.steps, (0.0, math.pi))
     second, y = _axis(robot, '--y', wanted.y, wanted.steps, (0.0, 2.0 * math.pi))
     if first == second:
-        raise BadConfig(f'--y: expected another joint than --x, got {robot.joint_names[first]} twice')
+        raise BadConfig(
+            f'--y: expected another joint than --x, got {robot.joint_names[first]} twice'
+        )
     if wanted.orientation not in ORIENTATIONS:
         known = ', '.join(ORIENTATIONS)
         raise BadConfig(f'--orientation: expected one of {known}, got {wanted.orientation}')
@@ -81,7 +83,9 @@ def _axis(
         kind = 'length' if slides else 'angle'
         low, high = (quantity(part, kind, f'{option}: {name}') for part in (start, end))
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise BadConfig(f'{option}: expected {name}=FROM:TO with FROM below TO, got {low:g}:{high:g}')
+        raise BadConfig(
+            f'{option}: expected {name}=FROM:TO with FROM below TO, got {low:g}:{high:g}'
+        )
     return robot.joint_names.index(name), np.linspace(low, high, steps)
 
 

@@ -1,17 +1,22 @@
 """`ugv-acceptance paper`: every number, table and figure of the paper, computed again."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ugv_acceptance.config import Config
+    from ugv_acceptance.report.page import Section
     from ugv_acceptance.report.paper import Subject
 
 
 def paper(
-    out: Annotated[Path, typer.Option(help='Folder for paper.html and paper.json.')] = Path('paper'),
+    out: Annotated[Path, typer.Option(help='Folder for paper.html and paper.json.')] = Path(
+        'paper'
+    ),
     config: Annotated[
         Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
     ] = None,
@@ -42,7 +47,8 @@ def paper(
     loaded = load(config)
     console = Console(stderr=True)
     subject = _subject(loaded, simulate, truth, console)
-    sections, extra = [], {}
+    sections: list[Section] = []
+    extra: dict[str, Any] = {}
     for build in track(SECTIONS.values(), 'Computing', console=console):
         section, more = build(subject)
         sections.append(section)
@@ -64,7 +70,7 @@ def paper(
     typer.echo(f'Wrote {out / "paper.html"} and {out / "paper.json"}.')
 
 
-def _subject(loaded: 'Config', simulate: bool, truth: int, console: object) -> 'Subject':
+def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -> 'Subject':
     import numpy as np
 
     from ugv_acceptance.report.paper import Subject

@@ -1,9 +1,9 @@
 """What the paper used ADAMS for: the arm's sweep and the tipping robot, by MuJoCo."""
 
 import math
-from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
@@ -28,7 +28,7 @@ def simulated_arm() -> tuple[Simulated, Floats]:
     return Simulated(paper_sweep(math.pi / 6.0)[:, 1], runs[7.2]), squares / squares[0]
 
 
-def simulated_truth(robot: Robot, count: int, console: Any) -> list[list[str]]:
+def simulated_truth(robot: Robot, count: int, console: Console) -> list[list[str]]:
     """Return the confusion matrix of the rollover map against simulated tipping, as a table."""
     from ugv_acceptance.simulation.tip_cases import judge_all, random_cases
 

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +71,11 @@ def _entries(mission: Path) -> list[dict[str, Any]]:
     except ValueError as error:
         raise BadConfig(f'{mission}: expected JSON, got: {error}') from None
     entries = document.get('phases') if isinstance(document, dict) else None
-    if not isinstance(entries, list) or not entries or not all(isinstance(e, dict) for e in entries):
+    if (
+        not isinstance(entries, list)
+        or not entries
+        or not all(isinstance(e, dict) for e in entries)
+    ):
         raise BadConfig(f'{mission}: expected {{"phases": [{{...}}, ...]}}, got something else')
     return entries
 
@@ -92,7 +96,9 @@ def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: 
         key, spread = spread_from(robot, text)
         spreads[key] = spread
     fixed = tuple(posture_from(robot, posture))
-    return Phase(name, Study(robot, dict(sorted(spreads.items())), fixed, limits), times, tuple(left))
+    return Phase(
+        name, Study(robot, dict(sorted(spreads.items())), fixed, limits), times, tuple(left)
+    )
 
 
 def _uncertain(config: Config) -> tuple[dict[str, Spread], list[str]]:

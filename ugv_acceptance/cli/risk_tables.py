@@ -18,13 +18,13 @@ def phase_lines(phase: Phase, risk: Risk) -> list[str]:
     """Return what a person reads of one phase."""
     first = risk.estimates['either']
     lines = [f'{phase.name}: {first.samples:,} samples, seed {risk.seed}, 95 % intervals']
-    for event, found in risk.estimates.items():
-        lines.append(f'  {event:12}{found.probability:12.6f}   [{found.low:.6f}, {found.high:.6f}]')
+    lines += [
+        f'  {event:12}{found.probability:12.6f}   [{found.low:.6f}, {found.high:.6f}]'
+        for event, found in risk.estimates.items()
+    ]
     lines.append('  convergence of "either"')
-    for found in risk.history['either']:
-        lines.append(
-            f'  {found.samples:>14,}{found.probability:12.6f}   +/- {(found.high - found.low) / 2:.6f}'
-        )
+    for e in risk.history['either']:
+        lines.append(f'  {e.samples:>14,}{e.probability:12.6f}   +/- {(e.high - e.low) / 2:.6f}')
     lines += ['  what matters most (share of the variance explained alone)']
     lines.append(f'    {"input":28}{"saturation":>12}{"rollover":>12}   drawn')
     ranked = sorted(risk.sensitivity, key=lambda name: -max(risk.sensitivity[name].values()))

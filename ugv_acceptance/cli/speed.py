@@ -1,4 +1,4 @@
-"""`ugv-acceptance speed`: up to which joint speed the static model may stand in for the dynamic one."""
+"""`ugv-acceptance speed`: joint speeds up to which the static model holds."""
 
 from pathlib import Path
 from typing import Annotated
@@ -66,7 +66,9 @@ def speed(
         found = dict(zip(robot.joint_names, degrees, strict=True))
         typer.echo(json.dumps({'critical_value': bound, 'speed_deg_s': found}, indent=2))
         return
-    typer.echo(f'{robot.name}, {mass:g} kg, error of the static model {reference:g} N m, F < {bound:.4f}')
+    typer.echo(
+        f'{robot.name}, {mass:g} kg, error of the static model {reference:g} N m, F < {bound:.4f}'
+    )
     for name, limit in zip(robot.joint_names, limits, strict=True):
         slides = robot.joint(name).kind == 'prismatic'
         text = f'{limit:8.3f} m/s' if slides else f'{math.degrees(limit):8.1f} deg/s'

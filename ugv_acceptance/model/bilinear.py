@@ -1,4 +1,4 @@
-"""A quantity over two joints as a 3 x 3 form: exact, and the reason why a map costs next to nothing.
+"""A quantity over two joints as a 3 x 3 form: exact, and why a map costs next to nothing.
 
 Every link's position is linear in (1, cos q, sin q) of each joint angle and in (1, x) of each
 prismatic joint; so are the centre of gravity, the potential energy and, as its derivative, each
@@ -21,7 +21,7 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Two joints' positions `x` (n,) and `y` (m,), all others as in `q` (j,); rad, m where prismatic.
+    """Two joints' positions `x` (n,), `y` (m,), all others as in `q` (j,); rad, m where prismatic.
 
     `first` and `second` are numbers in `robot.joint_names`. A field over the grid is (n, m).
     """
@@ -43,7 +43,7 @@ class Grid:
 def grid_of(
     robot: Robot, axes: tuple[str, str], ranges: ArrayLike, counts: tuple[int, int], q: ArrayLike
 ) -> Grid:
-    """Return the grid over the joints named in `axes`, `ranges` (2, 2) from and to, both counted."""
+    """Return the grid over the joints named in `axes`; `ranges` (2, 2): from, to, both counted."""
     first, second = (robot.joint_names.index(name) for name in axes)
     (x0, x1), (y0, y1) = np.asarray(ranges, dtype=np.float64)
     return Grid(
@@ -97,7 +97,7 @@ def evaluate(robot: Robot, grid: Grid, form: Floats, rows: slice = slice(None)) 
 
 
 def along_rows(robot: Robot, grid: Grid, form: Floats) -> Floats:
-    """Return, for one form (3, 3), its coefficients of (1, cos, sin) of the second joint, (n, 3)."""
+    """Return one form's coefficients of (1, cos, sin) of the second joint, shape (n, 3)."""
     coefficients: Floats = basis(robot, grid.first, grid.x) @ form
     return coefficients
 
@@ -111,7 +111,7 @@ def is_sum_form(form: Floats, slack: float = 1e-12) -> bool:
 
 
 def level_curves(robot: Robot, grid: Grid, form: Floats, level: float) -> Floats:
-    """Return where one form (3, 3) equals `level`, closed form: (2, n) positions of the second joint.
+    """Return where one form (3, 3) equals `level`: (2, n) positions of the second joint.
 
     For each position of the first joint the two roots of c0 + R cos(b - phase) = level, moved by
     whole turns into the grid's range; NaN where there is none. The second joint must turn.

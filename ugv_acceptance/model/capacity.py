@@ -4,15 +4,17 @@ Torque and tipping moments are linear in the force, friction is a quadratic; so 
 A lift is a pull along gravity at the gripper.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ugv_acceptance.model.blocks import Floats, in_blocks
+from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
+from ugv_acceptance.model.rows import Rows
 from ugv_acceptance.model.statics import centre_of_gravity, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
 
@@ -55,7 +57,7 @@ def gripper_point(robot: Robot, q: ArrayLike) -> Floats:
     return point
 
 
-def pull_capacity(
+def pull_capacity(  # noqa: PLR0913, PLR0917 - two optional places of the pull
     robot: Robot,
     q: ArrayLike,
     gravity: ArrayLike,
@@ -65,9 +67,9 @@ def pull_capacity(
     hitch: Vector | None = None,
     payload: Payload | None = None,
 ) -> Capacity:
-    """Return the largest force along the unit vector `direction` that the load may put on the robot.
+    """Return the largest force along the unit vector `direction` that may act on the robot.
 
-    `q` (..., j), `gravity` (..., 3) in m/s2 and `direction` (..., 3) in `base_link`; `limits` (j,) in
+    `q` (..., j), `gravity` (..., 3) in m/s2, `direction` (..., 3) in `base_link`, `limits` (j,) in
     N m. The force acts at the gripper and loads the arm, or at `hitch` (m, `base_link`), a point of
     the chassis. `friction` is that of tracks on a ground parallel to the tracks' plane.
     """
@@ -104,7 +106,7 @@ def _weight(robot: Robot, load: Payload) -> float:
     return sum(link.mass for link in robot.links) + load.mass
 
 
-def _rise(start: Floats, slope: Floats, end: ArrayLike) -> Floats:
+def _rise(start: Floats, slope: Floats, end: Floats) -> Floats:
     """Return the smallest f >= 0 at which start + slope f leaves |value| <= end."""
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         room = (end - np.sign(slope) * start) / np.abs(slope)
@@ -128,10 +130,10 @@ def _saturation(
 
 
 def _tip(robot: Robot, q: Floats, g: Floats, d: Floats, point: Floats, load: Payload) -> Floats:
-    """Return the force at which the robot tips about the first edge (...); 0 where it tips already."""
+    """Return the force at which the robot tips about the first edge (...); 0: it tips already."""
     mechanics, n = mechanics_of(robot), len(robot.joint_names)
 
-    def bound(*columns: Any) -> tuple[Floats]:
+    def bound(*columns: Floats) -> tuple[Floats]:
         count = len(columns[0])
         posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
         weight = [posture.mass * x for x in columns[n : n + 3]]
@@ -155,7 +157,7 @@ def _tip(robot: Robot, q: Floats, g: Floats, d: Floats, point: Floats, load: Pay
     return found
 
 
-def _rows(vector: Any, rows: Any) -> Floats:
+def _rows(vector: Sequence[Number], rows: Rows) -> Floats:
     """Return the rows of a vector of columns, shape (n, 3)."""
     parts = np.broadcast_arrays(*vector)
     stacked: Floats = np.stack(parts, axis=-1)

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import trapezoid
 
-from ugv_acceptance.model.bilinear import Grid, along_rows, basis, evaluate, form_of, is_sum_form
+from ugv_acceptance.model.bilinear import Grid, along_rows, evaluate, form_of, is_sum_form
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.stability import SIDES, stability
+from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import centre_of_gravity, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
 from ugv_acceptance.model.windows import Mask, window_between
@@ -29,7 +30,7 @@ _ROWS = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipMap:
-    """`angle` (n, m) is the tilt left (rad), NaN where there is no margin; `side` a number in SIDES."""
+    """`angle` (n, m): tilt left (rad), NaN where there is no margin; `side`: number in SIDES."""
 
     angle: Floats
     side: NDArray[np.int8]
@@ -37,7 +38,7 @@ class TipMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipForms:
-    """Each tip edge's force angle as atan2(sine, cosine): forms (edges, 3, 3), and its side (edges,)."""
+    """Each tip edge's angle as atan2(sine, cosine), forms (edges, 3, 3), and its side (edges,)."""
 
     sine: Floats
     cosine: Floats
@@ -83,7 +84,7 @@ def within_limits(
 
 @dataclass(slots=True, eq=False)
 class _Window:
-    """Bounds (n,) on g(a + b) = wave[0] cos + wave[1] sin, one row a position of the first joint."""
+    """Bounds on g(a + b) = wave[0] cos + wave[1] sin, one (n,) a position of the first joint."""
 
     wave: Floats
     lower: Floats
@@ -91,7 +92,7 @@ class _Window:
 
 
 def _add_window(windows: list[_Window], of_row: Floats, wave: Floats, bound: float) -> None:
-    """Add |of_row + g| <= bound; joints that share g, such as shoulder and elbow, share a window."""
+    """Add |of_row + g| <= bound; joints that share g (shoulder and elbow) share a window."""
     for known in windows:
         if np.abs(known.wave - wave).max() <= 1e-14 * np.abs(wave).max():
             np.maximum(known.lower, -bound - of_row, out=known.lower)
@@ -244,27 +245,6 @@ def stands(robot: Robot, grid: Grid, forms: TipForms, angle: float = 0.0) -> Mas
 
 def area_fraction(mask: Mask, grid: Grid) -> float:
     """Return the fraction of the map's area where `mask` (n, m) holds: the trapezoidal rule."""
-    of_row = np.trapezoid if hasattr(np, 'trapezoid') else np.trapz
-    rows = of_row(mask.astype(np.float64), grid.y, axis=1)
+    rows = trapezoid(mask.astype(np.float64), grid.y, axis=1)
     area = (grid.x[-1] - grid.x[0]) * (grid.y[-1] - grid.y[0])
-    return float(of_row(rows, grid.x) / area)
-
-
-__all__ = [
-    'CAUTION',
-    'CLASSES',
-    'FAILURE',
-    'SAFE',
-    'SIDES',
-    'TipForms',
-    'TipMap',
-    'area_fraction',
-    'basis',
-    'classes',
-    'rollover_map',
-    'stands',
-    'tip_forms',
-    'torque_forms',
-    'utilisation_map',
-    'within_limits',
-]
+    return float(trapezoid(rows, grid.x) / area)

@@ -67,7 +67,7 @@ def matches(found: Floats) -> Floats:
 
 
 def offset_family(offset2: Floats, arm: PlanarArm = PAPER) -> Family:
-    """Return the offsets of link 1 that give all cells, for those of `offset2` (m) that allow any."""
+    """Return the offsets of link 1 that give all cells, for each of `offset2` (m) with any."""
     rows = [(d2, *ends) for d2 in offset2 if (ends := _ends(float(d2), arm)) is not None]
     table = np.array(rows).reshape(-1, 5)
     return Family(table[:, 0], table[:, 1:3], table[:, 3:5])

@@ -12,7 +12,7 @@ from ugv_acceptance.model.robot import Robot, Vector
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """A tilt: `heading` (rad) is the side that is low, 0 the front, pi/2 the left; `words` names it."""
+    """A tilt: `heading` (rad) is the low side, 0 the front, pi/2 the left; `words` names it."""
 
     words: str
     heading: float | None
@@ -42,7 +42,7 @@ def gravity_of(orientation: str, tilt: float, size: float = 9.81) -> Vector:
 
 
 def grounding_angle(robot: Robot, joint: str) -> float:
-    """Return the angle (rad, nearest 0) at which contacts that `joint` moves reach the tracks' ground.
+    """Return the angle (rad, nearest 0) at which contacts on `joint` reach the tracks' ground.
 
     This is how flippers are put forward on the ground. Raises BadConfig where none does.
     """
@@ -65,5 +65,7 @@ def grounding_angle(robot: Robot, joint: str) -> float:
     roots = (roots + math.pi) % (2.0 * math.pi) - math.pi
     roots = roots[np.isfinite(roots)]
     if roots.size == 0:
-        raise BadConfig(f'joint {joint}: expected it to bring a contact to the ground, none reaches it')
+        raise BadConfig(
+            f'joint {joint}: expected it to bring a contact to the ground, none reaches it'
+        )
     return float(roots[np.abs(roots).argmin()])

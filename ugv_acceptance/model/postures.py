@@ -10,7 +10,7 @@ from ugv_acceptance.model.robot import Robot
 
 
 def joint_range(robot: Robot, name: str) -> tuple[float, float]:
-    """Return a joint's range (rad, m): its limits, a full turn where it has none, 0 where it slides."""
+    """Return a joint's range (rad, m): its limits; without any a full turn, 0 where it slides."""
     joint = robot.joint(name)
     widest = 0.0 if joint.kind == 'prismatic' else math.pi
     low = joint.lower if math.isfinite(joint.lower) else -widest
@@ -27,7 +27,7 @@ def random_postures(robot: Robot, count: int, seed: int) -> Floats:
 
 
 def sweeps(robot: Robot, q: Sequence[float], count: int) -> list[Floats]:
-    """Return, for each joint, the postures (count, j) of its sweep over its range from posture `q`."""
+    """Return each joint's sweep over its range from posture `q`, shape (count, j)."""
     found = []
     for k, name in enumerate(robot.joint_names):
         low, high = joint_range(robot, name)

@@ -1,8 +1,8 @@
 """Probability of torque saturation of the planar arm without random numbers.
 
-Where the integrand is smooth, a few thousand nodes replace a hundred million samples: Gauss-Legendre
-over theta_1, the trapezoidal rule over a full turn of theta_2, Gauss-Hermite over the load, and the
-normal distribution function for the two torque limits.
+Where the integrand is smooth, a few thousand nodes replace a hundred million samples:
+Gauss-Legendre over theta_1, the trapezoidal rule over a full turn of theta_2, Gauss-Hermite over
+the load, and the normal distribution function for the two torque limits.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Probability of torque saturation and of rollover when environment, load and robot are uncertain.
 
-Plain Monte Carlo in blocks: exact binomial intervals, memory that does not grow, and the same counts
-for a seed whatever the number of processes.
+Plain Monte Carlo in blocks: exact binomial intervals, memory that does not grow, and the same
+counts for a seed whatever the number of processes.
 """
 
 import math
@@ -20,6 +20,8 @@ from ugv_acceptance.model.risk_kernel import risk_kernel
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.spread import Spread, clopper_pearson, generators
 from ugv_acceptance.model.stability import stability_of, stances_of
+
+Columns = tuple[Floats, Floats, Floats]
 
 EVENTS = ('saturation', 'rollover', 'either')
 BINS = 20
@@ -110,8 +112,8 @@ def failures_of(study: Study, columns: Mapping[str, Floats], count: int) -> NDAr
             found[1] |= ~(moment > 0.0)
     elif robot.contacts:
         posture = Posture((), out[n], tuple(out[n + 1 : n + 4]), _triples(out[n + 7 :]))
-        gravity = tuple(np.broadcast_to(x, count) for x in out[n + 4 : n + 7])
-        found[1] = _tipped(robot, posture, gravity, count)
+        gx, gy, gz = (np.broadcast_to(x, count) for x in out[n + 4 : n + 7])
+        found[1] = _tipped(robot, posture, (gx, gy, gz), count)
     found[2] = found[0] | found[1]
     return found
 
@@ -127,11 +129,12 @@ def _triples(values: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(values[k : k + 3] for k in range(0, len(values), 3))
 
 
-def _tipped(robot: Robot, posture: Posture, gravity: Any, count: int) -> NDArray[np.bool_]:
+def _tipped(robot: Robot, posture: Posture, gravity: Columns, count: int) -> NDArray[np.bool_]:
     """Return where no positive moment holds the robot down; no margin at all counts as tipped."""
     tipped = np.ones(count, dtype=np.bool_)
     for rows, stance in stances_of(mechanics_of(robot), posture, count):
-        found = stability_of(stance, tuple(g[rows] for g in gravity))
+        gx, gy, gz = (g[rows] for g in gravity)
+        found = stability_of(stance, (gx, gy, gz))
         least = found.moment[0]
         for moment in found.moment[1:]:
             least = np.minimum(least, moment)
@@ -168,11 +171,13 @@ def run(
 
 
 def _chunks(study: Study, samples: int, seed: int, workers: int) -> Iterator[Counts]:
-    """Yield the counts of each chunk, in order. A block is too small for threads to share a core."""
+    """Yield the counts of each chunk, in order. Blocks are too small for threads."""
     sizes = [CHUNK] * (samples // CHUNK) + [samples % CHUNK] * (samples % CHUNK > 0)
     looked = range(-(-LOOKED_AT // CHUNK))
     rngs = generators(seed, len(sizes))
-    tasks = [(study, rng, n, k in looked) for k, (rng, n) in enumerate(zip(rngs, sizes, strict=True))]
+    tasks = [
+        (study, rng, n, k in looked) for k, (rng, n) in enumerate(zip(rngs, sizes, strict=True))
+    ]
     if workers < 2 or samples < WORTH_A_PROCESS:
         yield from map(_chunk, tasks)
         return

@@ -39,9 +39,9 @@ AXES = ('x', 'y', 'z')
 class RiskKernel:
     """Compiled for one robot and one set of names, which are the kernel's inputs, in their order.
 
-    Outputs: the torque of each joint judged; then, where the support polygon cannot change (`edges` > 0), the
-    moment (N m) that holds the robot down about each edge, else the mass, the centre of gravity (3),
-    gravity (3) and the contacts (3 each).
+    Outputs: the torque of each joint judged; then, where the support polygon cannot change
+    (`edges` > 0), the moment (N m) that holds the robot down about each edge, else the mass, the
+    centre of gravity (3), gravity (3) and the contacts (3 each).
     """
 
     names: tuple[str, ...]
@@ -52,9 +52,9 @@ class RiskKernel:
 def known_names(robot: Robot) -> tuple[str, ...]:
     """Return the names of all numbers that may vary.
 
-    `slope` (rad) and `heading` (rad, of the uphill direction in `base_link`); JOINT.position, .rate,
-    .x, .y, .z (where the joint sits in its parent) and .limit; LINK.mass and its centre of gravity
-    .x, .y, .z; payload.mass, .x, .y, .z.
+    `slope` (rad) and `heading` (rad, of the uphill direction in `base_link`); JOINT.position,
+    .rate, .x, .y, .z (where the joint sits in its parent) and .limit; LINK.mass and its centre of
+    gravity .x, .y, .z; payload.mass, .x, .y, .z.
     """
     joints = [f'{j}.{part}' for j in robot.joint_names for part in ('position', 'rate', *AXES)]
     limits = [f'{j}.limit' for j in robot.joint_names]
@@ -75,7 +75,7 @@ def risk_kernel(
     if unknown:
         raise BadConfig(
             f'{unknown[0]}: expected slope, heading, payload.mass, a joint ({robot.joint_names[0]}'
-            f'.position, .rate, .limit, .x) or a link ({robot.links[0].name}.mass, .x), got no such name'
+            f'.position, .rate, .limit, .x) or a link ({robot.links[0].name}.mass, .x)'
         )
     tree = _without(robot, names)
     edges = 0
@@ -86,7 +86,12 @@ def risk_kernel(
         torques, stand = _outputs(robot, tree, fixed, values, judged)
         moments = _fixed_edges(robot, fixed, stand)
         edges = len(moments)
-        rest = moments or [stand.mass, *stand.cog, *stand.gravity, *(x for p in stand.contacts for x in p)]
+        rest = moments or [
+            stand.mass,
+            *stand.cog,
+            *stand.gravity,
+            *(x for p in stand.contacts for x in p),
+        ]
         return [*torques, *rest]
 
     kernel = compile_kernel(formula, list(names))
@@ -104,7 +109,7 @@ class _Stand:
 
 
 def _fixed_edges(robot: Robot, fixed: Sequence[float], stand: _Stand) -> list[Scalar]:
-    """Return the moment about each tip edge; none where a contact moves or the polygon depends on it."""
+    """Return the moment about each tip edge; none where the polygon can change."""
     if not stand.contacts or not all(isinstance(x, float) for p in stand.contacts for x in p):
         return []
     cog = centre_of_gravity(robot, fixed)
@@ -112,7 +117,9 @@ def _fixed_edges(robot: Robot, fixed: Sequence[float], stand: _Stand) -> list[Sc
     if support.raised or not support.polygon:
         return []
     return [
-        moment_about(stand.contacts[i], stand.contacts[j], stand.cog, scale(stand.gravity, stand.mass))
+        moment_about(
+            stand.contacts[i], stand.contacts[j], stand.cog, scale(stand.gravity, stand.mass)
+        )
         for i, j in pairs(support.polygon)
     ]
 
@@ -150,8 +157,7 @@ def _outputs(
 def _gravity(size: float, values: Mapping[str, Scalar]) -> Vec:
     """Return gravity on a slope: `heading` is the uphill direction, 0 the robot's front."""
     slope, heading = values.get('slope', 0.0), values.get('heading', 0.0)
-    down = scale((sin(slope) * cos(heading), sin(slope) * sin(heading), cos(slope)), -size)
-    return down
+    return scale((sin(slope) * cos(heading), sin(slope) * sin(heading), cos(slope)), -size)
 
 
 def _moved(tree: Tree, values: Mapping[str, Scalar]) -> Tree:
@@ -191,7 +197,7 @@ def _varies(link: Link, names: Container[str]) -> bool:
 
 
 def _without(robot: Robot, names: Container[str]) -> Tree:
-    """Return the tree without the masses of the links that vary: those come back as point masses."""
+    """Return the tree without the masses of links that vary: those come as point masses."""
     links = tuple(replace(k, mass=0.0) if _varies(k, names) else k for k in robot.links)
     tree = tree_of(replace(robot, links=links))
     bodies = list(tree.bodies)

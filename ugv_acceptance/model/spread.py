@@ -80,7 +80,7 @@ _RANK: dict[str, Callable[[Spread, Floats], Floats]] = {
 
 
 def generators(seed: int, count: int) -> list[np.random.Generator]:
-    """Return independent generators, one a block: the draws do not depend on who runs which block."""
+    """Return independent generators, one a chunk: draws do not depend on who runs which."""
     return [
         np.random.Generator(np.random.SFC64(child))
         for child in np.random.SeedSequence(seed).spawn(count)

@@ -41,13 +41,13 @@ class SpeedError:
         return result
 
     def f_value(self, speed: ArrayLike, reference: float = REFERENCE_SPEED) -> Floats:
-        """Return F of equation (10), shape (..., j); NaN where the reference has no error at all."""
+        """Return F of equation (10), shape (..., j); NaN where the reference has no error."""
         with np.errstate(divide='ignore', invalid='ignore'):
             ratio: Floats = self.mean_square(speed) / self.mean_square(reference)
         return ratio
 
     def speed_at(self, critical: float, reference: float = REFERENCE_SPEED) -> Floats:
-        """Return the speed (j,) in rad/s at which F reaches `critical`; infinite where it never does."""
+        """Return the speed (j,) in rad/s at which F is `critical`; infinite where it never is."""
         excess = critical * self.mean_square(reference) - self.rest
         with np.errstate(divide='ignore', invalid='ignore'):
             root = np.sqrt(self.mixed**2 + self.moving * excess)

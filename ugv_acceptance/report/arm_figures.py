@@ -4,16 +4,20 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MultipleLocator
 
 from ugv_acceptance.model.bilinear import Grid, form_of, level_curves
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.intervals import length
-from ugv_acceptance.model.maps import Mask, torque_forms, within_limits
+from ugv_acceptance.model.maps import torque_forms, within_limits
 from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.model.planar import PAPER, arm_robot, paper_arm, planar_torque, safe_theta2
 from ugv_acceptance.model.statics import inverse_dynamics, static_torque
 from ugv_acceptance.model.validity import paper_sweep
+from ugv_acceptance.model.windows import Mask
 from ugv_acceptance.report.regions import degree_axes, figure
 
 THRESHOLDS = (30.0, 50.0, 70.0)
@@ -23,7 +27,7 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """What a multi-body simulation gave over the sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
+    """What a simulation gave over the sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
 
     theta2: Floats
     torque: Floats
@@ -39,9 +43,13 @@ def figure_4(simulated: Simulated | None = None) -> Figure:
     axes = made.subplots()
     theta2 = np.degrees(q[:, 1])
     axes.axhspan(50.0, 90.0, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', linewidth=0.0)
-    axes.axhspan(-90.0, -50.0, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', linewidth=0.0)
+    axes.axhspan(
+        -90.0, -50.0, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', linewidth=0.0
+    )
     for joint, (dash, shade) in enumerate((('-', 'black'), ('--', '#1f5f8b'))):
-        axes.plot(theta2, static[:, joint], dash, color=shade, lw=1.6, label=f'joint {joint + 1}, static')
+        axes.plot(
+            theta2, static[:, joint], dash, color=shade, lw=1.6, label=f'joint {joint + 1}, static'
+        )
         axes.plot(
             theta2[::8],
             moving[::8, joint],
@@ -61,20 +69,16 @@ def figure_4(simulated: Simulated | None = None) -> Figure:
                 label=f'joint {joint + 1}, MuJoCo',
             )
     axes.text(180.0, 54.0, '+50 N m: saturation above', ha='center', backgroundcolor='white')
-    axes.text(180.0, -57.0, '−50 N m: saturation below', ha='center', va='top', backgroundcolor='white')
+    axes.text(
+        180.0, -57.0, '-50 N m: saturation below', ha='center', va='top', backgroundcolor='white'
+    )
     degree_axes(axes, 'second joint θ₂', '')
     axes.yaxis.set_major_formatter('{x:.0f}')
-    axes.yaxis.set_major_locator(_every(25.0))
+    axes.yaxis.set_major_locator(MultipleLocator(25.0))
     axes.set(xlim=(0.0, 360.0), ylim=(-80.0, 80.0), ylabel='joint torque, N m')
     axes.set_title('Figure 4: planar arm, θ₁ = 30°, 4 kg load, θ₂ moving through a turn in 50 s')
     axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.16), ncols=3)
     return made
-
-
-def _every(step: float) -> object:
-    from matplotlib.ticker import MultipleLocator  # noqa: PLC0415 - one small name
-
-    return MultipleLocator(step)
 
 
 def paper_grid(steps: int = 401) -> Grid:
@@ -92,7 +96,7 @@ def safe_masks(grid: Grid) -> dict[float, Mask]:
 
 
 def safe_fractions(grid: Grid) -> dict[float, tuple[float, float]]:
-    """Return the safe fraction of the map for each threshold: from closed-form intervals, from cells."""
+    """Return the safe fraction for each threshold: from closed-form intervals, from cells."""
     fractions = {}
     for limit, mask in safe_masks(grid).items():
         exact = [length(safe_theta2(PAPER, float(t), limit, limit)) / TURN for t in grid.x]
@@ -125,7 +129,7 @@ def disagreement(grid: Grid) -> dict[float, int]:
 
 
 def figure_5() -> Figure:
-    """Return the failure and safe regions for 30, 50 and 70 N m with their closed-form boundaries."""
+    """Return the regions of failure for 30, 50 and 70 N m with their closed-form boundaries."""
     grid = paper_grid()
     theta1, theta2 = np.meshgrid(grid.x, grid.y, indexing='ij')
     worst = np.max(np.abs(planar_torque(PAPER, theta1, theta2)), axis=0)
@@ -143,7 +147,7 @@ def figure_5() -> Figure:
     words = ('safe at 30 N m', 'fails 30, safe at 50', 'fails 50, safe at 70', 'fails 70 N m')
     _key(axes, words)
     degree_axes(axes, 'first joint θ₁ (0°: forward, 180°: backward)', 'second joint θ₂', 30.0)
-    axes.yaxis.set_major_locator(_every(60.0))  # type: ignore[arg-type]  # a locator
+    axes.yaxis.set_major_locator(MultipleLocator(60.0))
     axes.set(xlim=(0.0, 180.0), ylim=(0.0, 360.0))
     axes.set_title(
         'Figure 5: planar arm, 4 kg, level ground, at rest: |τ₁| and |τ₂| against 30, 50, 70 N m\n'
@@ -152,7 +156,7 @@ def figure_5() -> Figure:
     return made
 
 
-def _boundaries(axes: object, grid: Grid) -> None:
+def _boundaries(axes: Axes, grid: Grid) -> None:
     robot = arm_robot(PAPER)
     forms = form_of(robot, grid, lambda q: static_torque(robot, q, DOWN))
     for limit in THRESHOLDS:
@@ -162,14 +166,14 @@ def _boundaries(axes: object, grid: Grid) -> None:
                     _plot(axes, grid.x, curve, dash, f'{limit:.0f}' if joint == 0 else '')
 
 
-def _plot(axes: object, x: Floats, curve: Floats, dash: str, label: str) -> None:
+def _plot(axes: Axes, x: Floats, curve: Floats, dash: str, label: str) -> None:
     jump = np.abs(np.diff(curve, prepend=curve[0])) > 1.0
     curve = np.where(jump, np.nan, curve)
-    axes.plot(np.degrees(x), np.degrees(curve), dash, color='black', lw=1.3)  # type: ignore[attr-defined]
+    axes.plot(np.degrees(x), np.degrees(curve), dash, color='black', lw=1.3)
     known = np.flatnonzero(np.isfinite(curve))
     if label and len(known) > 20:
         k = known[len(known) // 2]
-        axes.text(  # type: ignore[attr-defined]
+        axes.text(
             np.degrees(x[k]),
             np.degrees(curve[k]),
             f'{label} N m',
@@ -180,11 +184,9 @@ def _plot(axes: object, x: Floats, curve: Floats, dash: str, label: str) -> None
         )
 
 
-def _key(axes: object, words: tuple[str, ...]) -> None:
-    from matplotlib.patches import Patch  # noqa: PLC0415 - one small name
-
+def _key(axes: Axes, words: tuple[str, ...]) -> None:
     looks = zip(
         ('#ffffff', '#fff0c2', '#f3cdb2', '#e0948a'), ('', '..', '//', 'xxxx'), words, strict=True
     )
     handles = [Patch(facecolor=c, hatch=h, edgecolor='#666666', label=w) for c, h, w in looks]
-    axes.legend(handles=handles, loc='upper center', bbox_to_anchor=(0.5, -0.1), ncols=4)  # type: ignore[attr-defined]
+    axes.legend(handles=handles, loc='upper center', bbox_to_anchor=(0.5, -0.1), ncols=4)

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.capacity import (
@@ -22,6 +23,8 @@ from ugv_acceptance.model.orientations import grounding_angle
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.report.regions import degree_axes, figure
 from ugv_acceptance.report.rollover_figures import PARTS, STOWED, arm_grid, posture
+
+Causes = NDArray[np.int8]
 
 # Tracks on dry, firm ground: assumed.
 FRICTION = 0.7
@@ -49,7 +52,7 @@ def flipper_ways(robot: Robot) -> dict[str, float]:
 
 
 def drag_table(robot: Robot, limits: Floats, friction: float = FRICTION) -> list[Capability]:
-    """Return the largest horizontal pull (N) from the hitch and at the gripper, level ground, no load."""
+    """Return the largest horizontal pull (N) from hitch and gripper, level ground, no load."""
     empty = Payload(0.0, robot.payload.cog)
     down = np.array([0.0, 0.0, -robot.gravity])
     rows = []
@@ -65,7 +68,9 @@ def drag_table(robot: Robot, limits: Floats, friction: float = FRICTION) -> list
         pull = pull_capacity(
             robot, grid.postures(), down, (1.0, 0.0, 0.0), limits, friction, payload=empty
         )
-        rows.append(_best('pull at the gripper', name, 'N', (grid.x, grid.y), pull.force, pull.cause))
+        rows.append(
+            _best('pull at the gripper', name, 'N', (grid.x, grid.y), pull.force, pull.cause)
+        )
     return rows
 
 
@@ -98,7 +103,7 @@ def lift_table(robot: Robot, limits: Floats) -> list[Capability]:
 
 
 def _best(
-    what: str, flippers: str, unit: str, axes: tuple[Floats, Floats], value: Floats, cause: Any
+    what: str, flippers: str, unit: str, axes: tuple[Floats, Floats], value: Floats, cause: Causes
 ) -> Capability:
     k, m = np.unravel_index(int(np.argmax(np.where(np.isfinite(value), value, -1.0))), value.shape)
     at = (math.degrees(axes[0][k]), math.degrees(axes[1][m]))
@@ -106,7 +111,7 @@ def _best(
 
 
 def draw_capacity(
-    axes: Any, x: Floats, y: Floats, value: Floats, cause: Any, levels: list[float], unit: str
+    axes: Axes, x: Floats, y: Floats, value: Floats, cause: Causes, levels: list[float], unit: str
 ) -> None:
     """Draw lines of equal capacity over areas hatched by what ends it (n, m)."""
     shown = np.where(cause == NOTHING, SLIP, cause)
@@ -124,7 +129,7 @@ def draw_capacity(
 
 
 def drag_figure(robot: Robot, limits: Floats, friction: float = FRICTION) -> Figure:
-    """Return the largest horizontal pull at the gripper over the arm's range, both flipper angles."""
+    """Return the largest horizontal pull at the gripper over the arm's range."""
     made = figure(9.0, 4.9)
     empty = Payload(0.0, robot.payload.cog)
     pairs = zip(made.subplots(1, 2, sharey=True), flipper_ways(robot).items(), strict=True)
@@ -155,7 +160,7 @@ def drag_figure(robot: Robot, limits: Floats, friction: float = FRICTION) -> Fig
 
 
 def lift_figure(robot: Robot, limits: Floats) -> Figure:
-    """Return the largest payload over the arm's range: with and without torque limits, both flippers."""
+    """Return the largest payload over the arm's range, with and without torque limits."""
     made = figure(9.0, 9.0)
     cells = made.subplots(2, 2, sharex=True, sharey=True)
     strong = np.full(len(robot.joint_names), np.inf)
@@ -167,9 +172,7 @@ def lift_figure(robot: Robot, limits: Floats) -> Figure:
             down = (0.0, 0.0, -robot.gravity)
             mass, cause = lift_capacity(robot, grid.postures(), down, bounds)
             levels = [2.0, 4.0, 6.0, 8.0, 12.0]
-            draw_capacity(
-                axes, np.degrees(grid.x), np.degrees(grid.y), mass, cause, levels, 'kg'
-            )
+            draw_capacity(axes, np.degrees(grid.x), np.degrees(grid.y), mass, cause, levels, 'kg')
             axes.set_title(f'flippers {name}, {words}')
             degree_axes(axes, '', '', 60.0)
     for axes in cells[-1]:
@@ -177,7 +180,9 @@ def lift_figure(robot: Robot, limits: Floats) -> Figure:
     for axes in cells[:, 0]:
         axes.set_ylabel('elbow θ₂')
     _cause_key(made, ('a joint saturates first', 'the robot tips first', 'nothing ends it'))
-    made.suptitle(f'{robot.name}: largest payload at the gripper, level ground, at rest', fontsize=10)
+    made.suptitle(
+        f'{robot.name}: largest payload at the gripper, level ground, at rest', fontsize=10
+    )
     return made
 
 
@@ -188,12 +193,8 @@ def _limits(limits: Floats) -> str:
 
 def _cause_key(made: Figure, words: tuple[str, ...] = WORDS) -> None:
 
-
     handles = [
         Patch(facecolor=colour, hatch=hatch, edgecolor='#666666', label=word)
         for (colour, hatch), word in zip(_SHADES.values(), words, strict=True)
     ]
     made.legend(handles=handles, loc='outside lower center', ncols=3)
-
-
-

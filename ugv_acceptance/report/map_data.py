@@ -19,7 +19,7 @@ from ugv_acceptance.report.regions import Levels
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a map assumes: gravity (m/s2) in `base_link`, payload, limits, friction, pull direction."""
+    """What a map assumes; `gravity` (m/s2) and `direction` of the pull in `base_link`."""
 
     robot: Robot
     grid: Grid
@@ -60,7 +60,14 @@ def _torque(scene: Scene) -> MapData:
     forms = torque_forms(scene.robot, scene.grid, scene.gravity, scene.payload)
     used = utilisation_map(scene.robot, scene.grid, forms, limits)
     levels = Levels(-100.0 * scene.limits.torque_warn, -100.0 * scene.limits.torque_error)
-    return MapData('torque', 'static torque of the most loaded joint, % of its limit', '%', 100.0 * used, levels, -1.0)
+    return MapData(
+        'torque',
+        'static torque of the most loaded joint, % of its limit',
+        '%',
+        100.0 * used,
+        levels,
+        -1.0,
+    )
 
 
 def _rollover(scene: Scene) -> MapData:

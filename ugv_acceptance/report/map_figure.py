@@ -23,7 +23,7 @@ WORDS = {
     'payload': ('carries the load', 'caution: little reserve', 'cannot carry it'),
     'drag': ('pulls over a fifth of its weight', 'over a tenth', 'less'),
 }
-# A step (degrees) that a joint takes in no message interval: it left one edge of the map for the other.
+# No joint moves so far (degrees) between messages: it went over the map's edge.
 _WRAPPED = 180.0
 # Lines of equal value beside the two boundaries.
 _LINES = {'payload': (1.0, 2.0, 3.0, 6.0, 8.0, 12.0), 'drag': (25.0, 100.0, 150.0, 200.0)}
@@ -45,7 +45,9 @@ def assumptions(scene: Scene) -> str:
     ground = 'level ground'
     if abs(roll) > 1e-9 or abs(pitch) > 1e-9:
         parts = {'roll': math.degrees(roll), 'pitch': math.degrees(pitch)}
-        ground = ', '.join(f'{name} {angle:.0f}°' for name, angle in parts.items() if abs(angle) > 0.05)
+        ground = ', '.join(
+            f'{name} {angle:.0f}°' for name, angle in parts.items() if abs(angle) > 0.05
+        )
     others = []
     for k, name in enumerate(scene.robot.joint_names):
         if k not in (scene.grid.first, scene.grid.second):
@@ -53,7 +55,9 @@ def assumptions(scene: Scene) -> str:
             value = float(shown(scene.robot, k, np.array(scene.grid.q[k])))
             others.append(f'{name} {value:.0f}{unit}' if unit == '°' else f'{name} {value:.2f} m')
     load = '' if scene.robot.payload_link is None else f'payload {scene.payload.mass:g} kg'
-    return '; '.join(part for part in (ground, load, ', '.join(others), _limits(scene), 'at rest') if part)
+    return '; '.join(
+        part for part in (ground, load, ', '.join(others), _limits(scene), 'at rest') if part
+    )
 
 
 def _limits(scene: Scene) -> str:
@@ -66,13 +70,15 @@ def _limits(scene: Scene) -> str:
 
 
 def draw_map(scene: Scene, data: MapData, track: Floats | None = None) -> Figure:
-    """Return the map as a figure; `track` (n, 2) are positions (rad, m) that a recorded run took."""
+    """Return the map as a figure; `track` (n, 2): positions (rad, m) of a recorded run."""
     robot, grid = scene.robot, scene.grid
     made = figure(7.4, 6.2)
     axes = made.subplots()
     x, y = shown(robot, grid.first, grid.x), shown(robot, grid.second, grid.y)
     draw_regions(axes, x, y, data.margin, data.levels, _label(data))
-    lines = [v for v in _LINES.get(data.kind, ()) if v not in (data.levels.caution, data.levels.failure)]
+    lines = [
+        v for v in _LINES.get(data.kind, ()) if v not in (data.levels.caution, data.levels.failure)
+    ]
     if lines:
         found = axes.contour(
             x, y, np.minimum(data.value, 1e4).T, levels=lines, colors='#444444', linewidths=0.6
@@ -156,7 +162,9 @@ def _write_csv(path: Path, scene: Scene, data: MapData, _: Floats | None) -> Non
     names = [robot.joint_names[grid.first], robot.joint_names[grid.second]]
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
-        writer.writerow([*names, f'{data.kind}_{_ENDINGS.get(data.unit, data.unit)}', 'class', 'cause'])
+        writer.writerow(
+            [*names, f'{data.kind}_{_ENDINGS.get(data.unit, data.unit)}', 'class', 'cause']
+        )
         for i, x in enumerate(grid.x):
             for j, y in enumerate(grid.y):
                 cause = '' if data.cause is None else data.causes[int(data.cause[i, j])]
@@ -166,7 +174,7 @@ def _write_csv(path: Path, scene: Scene, data: MapData, _: Floats | None) -> Non
 
 def _write_npz(path: Path, scene: Scene, data: MapData, track: Floats | None) -> None:
     grid = scene.grid
-    arrays = {
+    arrays: dict[str, np.ndarray] = {
         'x': grid.x,
         'y': grid.y,
         'value': data.value,
@@ -179,7 +187,7 @@ def _write_npz(path: Path, scene: Scene, data: MapData, track: Floats | None) ->
         arrays |= {'cause': data.cause, 'causes': np.array(data.causes)}
     if track is not None:
         arrays['track'] = track
-    np.savez_compressed(path, allow_pickle=False, **arrays)
+    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # its own flag is no array
 
 
 # Units as column names have them.

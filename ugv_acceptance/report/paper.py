@@ -9,6 +9,7 @@ import numpy as np
 
 from ugv_acceptance.evaluation.taxonomy import HUMAN, Source
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.arm_figures import (
     Simulated,
@@ -33,6 +34,13 @@ from ugv_acceptance.report.paper_numbers import (
     table_1_rows,
     table_2_rows,
     torque_rows,
+)
+from ugv_acceptance.report.paper_prose import (
+    CAPABILITY,
+    FIGURE_4,
+    ROLLOVER,
+    STATISTICS,
+    WORST_CASE,
 )
 from ugv_acceptance.report.rollover_figures import check_parts, figure_6, figure_7, level_figure
 from ugv_acceptance.report.safe_range import one_sided_table
@@ -62,26 +70,21 @@ def taxonomy(_: Subject) -> Built:
     """Return Figure 1."""
     physical = [s.value for s in Source if s not in HUMAN]
     human = [s.value for s in Source if s in HUMAN]
-    table = [['source', 'categories'], ['physical', ', '.join(physical)], ['human', ', '.join(human)]]
+    table = [
+        ['source', 'categories'],
+        ['physical', ', '.join(physical)],
+        ['human', ', '.join(human)],
+    ]
     text = 'Every alert and every record of a campaign is filed under one of these.'
     return Section('Figure 1: where failures come from', [text], tables=[table]), {}
 
 
 def worst_case(_: Subject) -> Built:
     """Return Table 1 and the ranges of equations (4) to (8)."""
-    text = (
-        'Equation (3): the extrema of both torques lie at sin(θ₁ + θ₂) = 0. Link 2 then points to the '
-        'side to which link 1 leans; upright, to either side. For any other robot the same question is '
-        'answered by the three numbers c₀ + R cos(q − φ) that describe a torque over one joint.'
-    )
-    sides = (
-        'Equations (5) to (8) bound only +T. A motor fails at −T as well. The table gives the safe θ₂ at '
-        'T₁ = T₂ = 30 N m in both readings; they differ wherever the torque reaches −30 N m.'
-    )
     return (
         Section(
             'Equations (1) to (8) and Table 1: worst cases and safe ranges',
-            [text, sides],
+            WORST_CASE,
             [*table_1_rows(), *torque_rows()],
             [one_sided_table(30.0)],
         ),
@@ -91,11 +94,7 @@ def worst_case(_: Subject) -> Built:
 
 def dynamic(subject: Subject) -> Built:
     """Return Figure 4."""
-    caption = (
-        'Static torque by equations (1) and (2); dynamic torque by the recursive Newton-Euler algorithm '
-        'with the centres of gravity that give Table 2. At 7.2°/s the motion itself adds 0.02 N m; what '
-        'is seen between line and marks is the offset of the centres of gravity.'
-    )
+    caption = FIGURE_4
     if subject.simulated is not None:
         caption += ' Crosses: the same arm in MuJoCo.'
     picture = Picture('figure_4', figure_4(subject.simulated), caption)
@@ -104,26 +103,7 @@ def dynamic(subject: Subject) -> Built:
 
 def statistics(subject: Subject) -> Built:
     """Return Table 2, the critical value and the speed."""
-    fits = family()
-    span = [fits.offset2[0] * 1e3, fits.offset2[-1] * 1e3]
-    first = [fits.positive.min() * 1e3, fits.positive.max() * 1e3]
-    mirror = [fits.negative.min() * 1e3, fits.negative.max() * 1e3]
-    text = [
-        'All 16 cells follow from rigid-body dynamics once the links’ centres of gravity are not at '
-        'mid-link. The offsets that give every cell form two narrow bands: link 2 by '
-        f'{span[0]:.2f} to {span[1]:.2f} mm, and link 1 by {first[0]:.2f} to {first[1]:.2f} mm or by '
-        f'{mirror[1]:.2f} to {mirror[0]:.2f} mm; across a band link 1 may vary by no more than 0.015 mm. '
-        f'The page uses +{47.28} and {-2.28} mm.',
-        'What this means: the paper’s ADAMS model “accounts for all center of gravity locations”; its '
-        'static model puts them at mid-link. The reference error at 1°/s is therefore a difference at '
-        'rest, 1.0 N m at joint 1 (47 mm × 2.5 kg × g × cos 30°) and 0.04 N m at joint 2. Joint 2 feels '
-        'nothing of a constant rate of its own, so its F is 1.0 at every speed. The offsets are a fit: '
-        'any error at rest of that size and shape gives the same table.',
-        'A flaw of the statistic: with both centres of gravity at mid-link the reference error is nearly '
-        'zero and F = (speed / 1°/s)⁴ without bound. F compares the motion with whatever else is wrong '
-        'with the static model: the worse the model, the faster the robot may move. The verb speed '
-        'therefore asks for the static model’s own error in N m.',
-    ]
+    text = [part.format(**_spans()) for part in STATISTICS]
     tables = []
     if subject.simulated_f is not None:
         tables.append(_simulated_table(subject.simulated_f))
@@ -131,10 +111,26 @@ def statistics(subject: Subject) -> Built:
     return Section('Table 2: up to which speed the static model holds', text, rows, tables), {}
 
 
+def _spans() -> dict[str, float]:
+    """Return the ends of the bands of offsets (mm), and the pair the page uses."""
+    fits = family()
+    return {
+        'second_low': fits.offset2[0] * 1e3,
+        'second_high': fits.offset2[-1] * 1e3,
+        'low': fits.positive.min() * 1e3,
+        'high': fits.positive.max() * 1e3,
+        'mirror_low': fits.negative.max() * 1e3,
+        'mirror_high': fits.negative.min() * 1e3,
+        'first': OFFSET1 * 1e3,
+        'second': OFFSET2 * 1e3,
+    }
+
+
 def _simulated_table(found: Floats) -> list[list[str]]:
     head = ['F from MuJoCo torques', '1°/s', '5', '7.2', '36', '72', '108', '144', '180']
     return [head] + [
-        [f'joint {k + 1}', *(f'{value:.1f}' for value in found[:, k])] for k in range(found.shape[1])
+        [f'joint {k + 1}', *(f'{value:.1f}' for value in found[:, k])]
+        for k in range(found.shape[1])
     ]
 
 
@@ -167,13 +163,8 @@ def rollover(subject: Subject) -> Built:
     check_parts(subject.robot)
     seven, table = figure_7(subject.robot)
     level, left = level_figure(subject.robot)
-    text = [
-        'The paper omits the platform; its numbers here come from public sources and carry their '
-        'uncertainty in the URDF. The shoulder’s place on the deck is assumed.',
-        f'On level ground at full forward reach with {subject.robot.payload.mass:g} kg the robot has '
-        f'{left["stowed"]:.1f}° of tilt left with stowed flippers, and {left["forward"]:.1f}° with '
-        'flippers forward: negative means that it tips on the level.',
-    ]
+    load = subject.robot.payload.mass
+    text = [part.format(load=load, **left) for part in ROLLOVER]
     pictures = [
         Picture('figure_7', seven, 'Tilt left before the robot tips about the nearest edge.'),
         Picture('level_ground', level, 'The same on level ground.'),
@@ -185,18 +176,21 @@ def rollover(subject: Subject) -> Built:
 
 def capability(subject: Subject) -> Built:
     """Return dragging and lifting capability."""
-    drag, lift = drag_table(subject.robot, subject.limits), lift_table(subject.robot, subject.limits)
-    text = [
-        'The further tests that the paper names. Each bound is exact: torques and tipping moments are '
-        'linear in the force, friction is a quadratic. The load hangs at the gripper; friction 0.7 and '
-        'the hitch (at the rear, 0.095 m high) are assumed.',
-    ]
+    drag, lift = (
+        drag_table(subject.robot, subject.limits),
+        lift_table(subject.robot, subject.limits),
+    )
     pictures = [
         Picture('drag', drag_figure(subject.robot, subject.limits), 'Dragging with the arm.'),
-        Picture('lift', lift_figure(subject.robot, subject.limits), 'Lifting with and without flippers.'),
+        Picture(
+            'lift', lift_figure(subject.robot, subject.limits), 'Lifting with and without flippers.'
+        ),
     ]
     section = Section(
-        'Dragging and lifting capability', text, tables=[_table(drag), _table(lift)], pictures=pictures
+        'Dragging and lifting capability',
+        CAPABILITY,
+        tables=[_table(drag), _table(lift)],
+        pictures=pictures,
     )
     return section, {'drag': [_line(c) for c in drag], 'lift': [_line(c) for c in lift]}
 

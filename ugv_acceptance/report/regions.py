@@ -34,7 +34,7 @@ STYLE: Any = {
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Where a margin turns: below `failure` it fails, below `caution` it warns; larger is better."""
+    """Where a margin turns: from `failure` down it fails, from `caution` down it warns."""
 
     caution: float
     failure: float

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
@@ -48,7 +49,9 @@ class Panel:
         flippers = 'forward' if self.forward else 'stowed'
         turret = 'ahead' if self.turret == 0.0 else 'to the low side'
         load = f'{self.load:g} kg' if self.load else 'no load'
-        return f'right tilt {math.degrees(self.tilt):.0f}°, flippers {flippers}\narm {turret}, {load}'
+        return (
+            f'right tilt {math.degrees(self.tilt):.0f}°, flippers {flippers}\narm {turret}, {load}'
+        )
 
 
 def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
@@ -62,7 +65,7 @@ def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
 
 
 def posture(robot: Robot, parts: Parts = PARTS, **angles: float) -> np.ndarray:
-    """Return the posture (j,) with the parts at `angles` (rad); flippers are stowed unless given."""
+    """Return the posture (j,) with the parts at `angles` (rad); flippers stowed unless given."""
     q = np.zeros(len(robot.joint_names))
     for part, angle in {'flipper': STOWED, **angles}.items():
         q[robot.joint_names.index(getattr(parts, part))] = angle
@@ -185,7 +188,7 @@ def figure_6(tilt: float = math.radians(30.0)) -> Figure:
     return made
 
 
-def _view(axes: Any, x: float, roll: float, width: float, words: str) -> None:
+def _view(axes: Axes, x: float, roll: float, width: float, words: str) -> None:
     """Draw the chassis on its slope, turned by `roll` (rad, counter-clockwise in the picture)."""
     c, s = math.cos(roll), math.sin(roll)
 
