@@ -1,8 +1,9 @@
-"""What an evaluation writes: the result as JSON, the margins over time as CSV. Whole or not at all."""
+"""What an evaluation writes, whole or not at all: the result as JSON, the margins as CSV."""
 
 import json
 import os
 from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -20,9 +21,26 @@ def write_json(path: Path, result: object) -> None:
     part = path.with_name(path.name + '.part')
     try:
         part.write_text(json.dumps(result, indent=2, allow_nan=False, default=str) + '\n', 'utf-8')
-        os.replace(part, path)
+        part.replace(path)
     except OSError as error:
-        raise AcceptanceError(f'{path}: cannot be written: {error.strerror}') from None
+        raise unwritable(path, error.strerror) from None
+
+
+def unwritable(path: Path, why: str | None) -> AcceptanceError:
+    """Return the error of a file that cannot be written."""
+    return AcceptanceError(f'{path}: cannot be written: {why or "unknown reason"}')
+
+
+def check_writable(path: Path | None) -> None:
+    """Raise AcceptanceError where a result could not be written: better before than after."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise unwritable(path, 'expected a file, it is a folder')
+    if not path.parent.is_dir():
+        raise unwritable(path, f'there is no folder {path.parent}')
+    if not os.access(path.parent, os.W_OK):
+        raise unwritable(path, f'no permission in {path.parent}')
 
 
 class CsvSink:
@@ -37,15 +55,13 @@ class CsvSink:
         self._start = start
         self._file: TextIO | None = None
 
-    def __enter__(self) -> 'CsvSink':
+    def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
         """Open the file under a name that says it is not whole."""
         if self._path is not None:
             try:
                 self._file = self._path.with_name(self._path.name + '.part').open('w')
             except OSError as error:
-                raise AcceptanceError(
-                    f'{self._path}: cannot be written: {error.strerror}'
-                ) from None
+                raise unwritable(self._path, error.strerror) from None
             self._file.write(','.join(self._header()) + '\n')
         return self
 
@@ -60,7 +76,7 @@ class CsvSink:
             return
         self._file.close()
         if kind is None:
-            os.replace(self._file.name, self._path)
+            Path(self._file.name).replace(self._path)
 
     @property
     def sinks(self) -> list[Callable[[MarginRows], None]]:
@@ -96,7 +112,7 @@ class CsvSink:
             )
         )
         times = (rows.time - self._start) / 1e9
-        states = ['unknown' if not k else STATES[s] for k, s in zip(rows.known, rows.state)]  # noqa: B905 - same rows
+        states = [STATES[s] for s in rows.state.tolist()]
         lines = zip(times.tolist(), rows.stamp.tolist(), states, table.tolist(), strict=True)
         if self._file is not None:
             self._file.writelines(
@@ -106,4 +122,4 @@ class CsvSink:
 
 
 def _cell(number: Any) -> str:  # noqa: ANN401 - a float
-    return repr(number) if np.isfinite(number) else ''
+    return repr(number) if isfinite(number) else ''

@@ -49,13 +49,18 @@ def evaluate(
       ugv-acceptance evaluate run_0.mcap run_1.mcap --json result.json --csv margins.csv
       ugv-acceptance evaluate run --config my_robot.yaml --urdf my_robot.urdf --compare-effort
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.bag.result import write_json
+    from ugv_acceptance.bag.result import check_writable, write_json
     from ugv_acceptance.config import load
 
     loaded = load(config, urdf=urdf)
+    groups = recordings(bags)
+    check_writable(json_file)
+    check_writable(csv_file)
+    if csv_file is not None and len(groups) > 1:
+        raise AcceptanceError(f'--csv takes the margins of one recording, got {len(groups)}')
     results: list[dict[str, Any]] = []
     codes: list[int] = []
-    for paths in recordings(bags):
+    for paths in groups:
         try:
             result = judge_recording(paths, loaded, csv_file, compare_effort=compare_effort)
         except AcceptanceError as error:

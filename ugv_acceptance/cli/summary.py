@@ -12,6 +12,11 @@ from rich.table import Table
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
+_MOST_EFFORTS = 11
+# Less payload (kg) than minus this is none: the arm is held up by something.
+_LIGHT = 0.1
+# What robot failures and lost data come to, the least first.
+_SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
 
 @contextmanager
@@ -40,7 +45,7 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     paths = result['bag']['path']
     console.print(f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}')
     for reason in result['reasons'][:5]:
-        console.print(f'    {escape(reason)}')
+        console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
     console.print(_margins(result))
@@ -87,7 +92,8 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
         f'({coverage["fraction"]:.1%}); '
         + {'all': 'every chunk has a checksum', 'part': 'some chunks have no checksum'}.get(
             bag['protected'], 'unprotected: no checksum would show a changed byte'
-        )
+        ),
+        soft_wrap=True,
     )
     for key in ('joint_states', 'imu'):
         source = result['inputs'][key]
@@ -96,13 +102,21 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
         console.print(
             f'  {escape(str(source["topic"]))}: {source["messages"]} messages'
             + (f' at {rate:.0f} Hz' if rate else '')
-            + (f', {source["gaps"]} gaps up to {source["longest_gap_s"]:.2f} s' * bool(source['gaps']))
-            + (f'; {escape(faults)}' if faults else '')
+            + _gaps(source)
+            + (f'; {escape(faults)}' if faults else ''),
+            soft_wrap=True,
         )
     if bag['salvaged']:
-        console.print(f'  salvaged: {escape(bag["salvaged"])}')
+        console.print(f'  salvaged: {escape(bag["salvaged"])}', soft_wrap=True)
     for finding in bag['findings'][:5]:
-        console.print(f'  {escape(finding)}')
+        console.print(f'  {escape(finding)}', soft_wrap=True)
+
+
+def _gaps(source: dict[str, Any]) -> str:
+    count = source['gaps']
+    if not count:
+        return ''
+    return f', {count} gap{"s" * (count > 1)} of up to {source["longest_gap_s"]:.2f} s'
 
 
 def _malformed(source: dict[str, Any]) -> list[str]:
@@ -115,28 +129,55 @@ def _print_alerts(result: dict[str, Any], console: Console) -> None:
     if not alerts:
         console.print('no alerts')
         return
-    console.print(f'{len(alerts)} alerts:')
+    console.print(f'{len(alerts)} alert{"s" * (len(alerts) > 1)}:')
     for alert in alerts[:_MOST_ALERTS]:
-        end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f}'
+        end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f} s'
         console.print(
-            f'  {alert["start_s"]:8.2f} to {end:>8} s  {alert["level"]:5}  {alert["code"]:16}  '
+            f'  {alert["start_s"]:8.2f} to {end:>9}  {alert["level"]:5}  {alert["code"]:16}  '
             f'{escape(alert["message"])}',
             soft_wrap=True,
         )
     if len(alerts) > _MOST_ALERTS:
         console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE has all)')
+    most = max(_SEVERITY.index(alert['level']) for alert in alerts)
+    worst = {a['code']: a['advice'] for a in alerts if _SEVERITY.index(a['level']) == most}
+    for code, advice in list(worst.items())[:3]:
+        console.print(f'  {code}: {escape(advice)}', soft_wrap=True)
 
 
 def _print_effort(result: dict[str, Any], console: Console) -> None:
-    console.print('measured effort beside static torque, at rest:')
-    for name, plateaus in result['effort'].items():
-        unit = result['torque'].get(name, {}).get('unit', '')
-        for p in plateaus:
-            payload = p['payload_kg_that_explains_it']
-            explained = '' if payload is None else f' = {payload:.2f} kg of payload'
-            console.print(
-                f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  '
-                f'measured {p["measured"]:.1f}, model {p["model"]:.1f}, '
-                f'difference {p["difference"]:+.1f} {unit}{explained}',
-                soft_wrap=True,
-            )
+    """Print plateaus of effort, those of joints that feel a payload most first."""
+    joints = [(name, plateaus) for name, plateaus in result['effort'].items() if plateaus]
+    if not joints:
+        console.print('no measured effort at rest to compare')
+        return
+    console.print(
+        'measured effort beside static torque, at rest; a payload that is not declared appears as '
+        'their difference:',
+        soft_wrap=True,
+    )
+    joints.sort(key=lambda joint: -max(abs(p['effort_per_kg']) for p in joint[1]))
+    lines = [
+        _plateau_line(name, p)
+        for name, plateaus in joints
+        for p in plateaus
+        if p['payload_kg_that_explains_it'] is not None or abs(p['difference']) > 1.0
+    ]
+    for line in lines[:_MOST_EFFORTS]:
+        console.print(line, soft_wrap=True)
+    console.print(f'  {sum(len(p) for _, p in joints)} stretches in all: --json FILE has them')
+
+
+def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
+    p, payload = plateau, plateau['payload_kg_that_explains_it']
+    text = (
+        f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  measured {p["measured"]:.1f}, '
+        f'model {p["model"]:.1f}, difference {p["difference"]:+.1f} {p["unit"]}'
+    )
+    if p['saturated']:
+        return f'{text}: saturated, the effort stands at a limit'
+    if payload is None:
+        return f'{text}: no payload would do that'
+    if payload < -_LIGHT:
+        return f'{text}: it pushes against something'
+    return f'{text} = {max(payload, 0.0):.2f} kg of payload'

@@ -1,7 +1,8 @@
-"""Measured effort beside static torque at rest: where they differ, and what payload that would be."""
+"""Measured effort beside static torque at rest: where they differ, what payload that would be."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,17 +23,27 @@ SPACING = 50_000_000
 BIN = 1_000_000_000
 STEP_SHARE = 0.05
 STEP_LEAST = 1.0
+# A joint that feels less than this of a kg (N m or N) tells nothing of a payload.
+SLOPE_LEAST = 1.0
+# An effort this close to a limit (as a share of it) is clipped there.
+CLIPPED = 0.999
 
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
-    """A stretch at rest: times (ns), medians of measured effort and static torque (N m; N)."""
+    """A stretch at rest: times (ns), medians of measured effort and static torque (N m; N).
+
+    `slope` is what the joint feels of a kg of payload (N m or N); `payload` (kg) would explain the
+    difference, None where the joint cannot tell. `saturated`: the effort was clipped at a limit.
+    """
 
     start: int
     end: int
     measured: float
     model: float
+    slope: float
     payload: float | None
+    saturated: bool
 
 
 @dataclass(slots=True)
@@ -67,18 +78,35 @@ class EffortComparison:
         moving = np.abs(np.nan_to_num(table[:, 2 * n + j])) > REST
         good = np.isfinite(table[:, j]) & ~moving
         time, table = time[good], table[good]
-        return [self._plateau(j, time[rows], table[rows]) for rows in _split(time, table[:, j])]
+        most = float(np.abs(table[:, j]).max(initial=0.0))
+        return [
+            self._plateau(j, time[rows], table[rows], most) for rows in _split(time, table[:, j])
+        ]
 
-    def _plateau(self, j: int, time: NDArray[np.int64], table: Floats) -> Plateau:
+    def _plateau(self, j: int, time: NDArray[np.int64], table: Floats, most: float) -> Plateau:
+        """Return a plateau; `most` is the largest effort (N m; N) of the whole run."""
         n = len(self.settings.joints)
         measured, model = float(np.median(table[:, j])), float(np.median(table[:, n + j]))
-        q, gravity = np.median(table[:, 3 * n : 4 * n], axis=0), np.median(table[:, 4 * n :], axis=0)
+        q = np.median(table[:, 3 * n : 4 * n], axis=0)
+        gravity = np.median(table[:, 4 * n :], axis=0)
         robot = self.settings.robot
         cog = robot.payload.cog
         loads = [static_torque(robot, q, gravity, Payload(m, cog))[j] for m in (0.0, 1.0)]
         slope = float(loads[1] - loads[0])
-        payload = (measured - model) / slope if abs(slope) > 1e-6 else None
-        return Plateau(int(time[0]), int(time[-1]), measured, model, payload)
+        saturated = self._saturated(j, table[:, j], model, most)
+        tells = abs(slope) >= SLOPE_LEAST and not saturated
+        payload = (measured - model) / slope if tells else None
+        return Plateau(int(time[0]), int(time[-1]), measured, model, slope, payload, saturated)
+
+    def _saturated(self, j: int, effort: Floats, model: float, most: float) -> bool:
+        """Return whether an effort stands at a known limit, or often at exactly the run's largest."""
+        name = self.settings.robot.joint_names[j]
+        level = abs(float(np.median(effort)))
+        limits = (self.settings.limits.torque[j], self.settings.robot.joint(name).effort)
+        if any(0.0 < limit < np.inf and level >= CLIPPED * limit for limit in limits):
+            return True
+        far = level > 10.0 * max(abs(model), STEP_LEAST)
+        return far and bool(np.mean(np.abs(effort) == most) >= 0.25)
 
     def result(self, start: int) -> dict[str, Any]:
         """Return every joint's plateaus for JSON; times in seconds since `start` (ns)."""
@@ -90,7 +118,10 @@ class EffortComparison:
                     'measured': p.measured,
                     'model': p.model,
                     'difference': p.measured - p.model,
+                    'unit': 'N' if self.settings.robot.joint(name).kind == 'prismatic' else 'N m',
+                    'effort_per_kg': p.slope,
                     'payload_kg_that_explains_it': p.payload,
+                    'saturated': p.saturated,
                 }
                 for p in self.plateaus(j)
             ]
@@ -104,7 +135,7 @@ def _split(time: NDArray[np.int64], effort: Floats) -> Iterator[slice]:
         return
     bins = np.flatnonzero(np.diff((time - time[0]) // BIN, prepend=-1))
     edges = [*bins.tolist(), len(time)]
-    medians = [float(np.median(effort[a:b])) for a, b in zip(edges, edges[1:], strict=False)]
+    medians = [float(np.median(effort[a:b])) for a, b in pairwise(edges)]
     first = 0
     for k in range(1, len(medians) + 1):
         level = float(np.median(medians[first:k]))

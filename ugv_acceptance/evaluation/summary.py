@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.wording import describe
+from ugv_acceptance.evaluation.wording import advice, describe
 from ugv_acceptance.model.stability import SIDES, STATES
 
 
@@ -23,10 +23,8 @@ class Extreme:
 
     def see(self, values: NDArray[np.float64], times: NDArray[np.int64]) -> None:
         """Take many values (NaN: unknown)."""
-        if not np.isfinite(values).any():
-            return
-        k = int(np.nanargmax(values))
-        if values[k] > self.value:
+        if np.fmax.reduce(values) > self.value:
+            k = int(np.nanargmax(values))
             self.value, self.time = float(values[k]), int(times[k])
 
 
@@ -56,17 +54,18 @@ class Summary:
         self._close(int(rows.time[0]))
         known = rows.known
         limits = self.settings.limits
-        over = np.abs(rows.torque) >= limits.torque_error * np.array(limits.torque)
-        with np.errstate(invalid='ignore'):
-            tipping = rows.angle.min(axis=1) <= limits.tip_error
+        load = np.abs(rows.torque.T)
+        over = load >= limits.torque_error * np.array(limits.torque)[:, None]
+        tipping = np.asarray((rows.angle <= limits.tip_error).any(axis=1))
         held = np.where(known, rows.until - rows.time, 0)
         held[-1] = 0
         self.messages += len(known)
         self.evaluated += int(held.sum())
-        self.tip_violation += int(held[tipping].sum())
+        self.tip_violation += int((held * tipping).sum())
         for j, extreme in enumerate(self.load):
-            extreme.see(np.abs(rows.torque[:, j]), rows.time)
-            self.load_violation[j] += int(held[over[:, j]].sum())
+            extreme.see(load[j], rows.time)
+            if over[j].any():
+                self.load_violation[j] += int((held * over[j]).sum())
         for side, extreme in enumerate(self.tip):
             extreme.see(-rows.angle[:, side], rows.time)
         counts = np.bincount(rows.state[known], minlength=len(STATES))
@@ -75,7 +74,7 @@ class Summary:
                 self.states[name] = self.states.get(name, 0) + count
         if known[-1]:
             last = int(rows.time[-1]), int(rows.until[-1])
-            self._open = (*last, over[-1].tolist(), bool(tipping[-1]))
+            self._open = (*last, over[:, -1].tolist(), bool(tipping[-1]))
 
     def finish(self, now: int) -> None:
         """Say when the recording ended (ns)."""
@@ -135,6 +134,7 @@ def alert_result(alert: Alert, settings: Settings, start: int) -> dict[str, Any]
         'end_s': None if alert.end is None else (alert.end - start) / 1e9,
         'peak': _peak(alert),
         'message': describe(alert, settings),
+        'advice': advice(rule.code),
     }
 
 

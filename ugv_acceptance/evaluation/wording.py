@@ -12,15 +12,15 @@ WORDS = {
         'bring the load closer to the joint, or set it down',
     ),
     'TIP_OVER': (
-        '{peak:.1f} degrees of tilt left before it tips to the {subject}; {kind} {limit:.1f}',
-        'lower the arm and bring it over the tracks; turn the robot to face the slope',
+        '{tilt} to the {subject}; {kind} {limit:.1f} degrees of tilt left',
+        'lower the arm, bring it over the tracks, face the slope; if it stands well, check imu mounting',
     ),
     'NO_SUPPORT': (
         'the contact points give no support polygon, or nothing presses on the ground',
         'stop; check that the robot stands on its tracks',
     ),
     'STATIC_MODEL': (
-        '{subject} moves at {peak:.2f} rad/s, faster than the static model was shown to hold',
+        '{subject} moves at {peak:.2f} {rate}; the static model was shown to hold to {limit:.2f}',
         'move the joint more slowly',
     ),
     'INPUT_STALE': (
@@ -33,7 +33,7 @@ WORDS = {
     ),
     'INPUT_INVALID': (
         '{subject} holds numbers that cannot be used',
-        'check the sensor: not-a-number, or a position outside the limits (degrees for radians?)',
+        'check for not-a-number, degrees for radians, raw counts, a quaternion that is no rotation',
     ),
     'CLOCK': (
         'header stamps of {subject} differ from the time of receipt by over a second, or jump',
@@ -58,21 +58,30 @@ def describe(alert: Alert, settings: Settings) -> str:
     """Return the alert as one sentence: what happened."""
     rule = alert.rule
     peak, limit = alert.peak, rule.on
-    unit = 'N m'
+    turning = True
+    if rule.subject in settings.robot.joint_names:
+        turning = settings.robot.joint(rule.subject).kind != 'prismatic'
     if rule.code == 'TORQUE_LIMIT':
-        j = settings.robot.joint_names.index(rule.subject)
-        limit = settings.limits.torque[j]
-        unit = 'N' if settings.robot.joint(rule.subject).kind == 'prismatic' else 'N m'
+        limit = settings.limits.torque[settings.robot.joint_names.index(rule.subject)]
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
     return WORDS[rule.code][0].format(
         subject=rule.subject,
         peak=peak,
         limit=limit,
-        unit=unit,
+        unit='N m' if turning else 'N',
+        rate='rad/s' if turning else 'm/s',
+        tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
         kind='warning limit' if rule.level == WARN else 'limit',
     )
+
+
+def tilt_left(degrees: float) -> str:
+    """Return a tilt that is left, or how far the robot is past its tipping point, in words."""
+    if degrees >= 0.0:
+        return f'{degrees:.1f} degrees of tilt left before it tips'
+    return f'{-degrees:.1f} degrees past its tipping point'
 
 
 def advice(code: str) -> str:
