@@ -38,7 +38,7 @@ HEAVY = {'rclpy', 'mujoco', 'matplotlib', 'starlette'}
 HOME_OF = {
     'rclpy': {'nodes'},
     'mujoco': {'simulation'},
-    'pydantic': {'config'},
+    'pydantic': {'config', 'plan'},
     'yaml': {'config', 'bag', 'plan'},
     'defusedxml': {'config'},
     'mcap': {'bag'},

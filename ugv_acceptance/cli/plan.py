@@ -1,0 +1,99 @@
+"""`ugv-acceptance plan`: a test plan and an operator's card, derived from the robot's model."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from ugv_acceptance.plan.plan import Plan
+
+
+def plan(
+    *,
+    out: Annotated[
+        Path | None, typer.Option('--out', '-o', help='Write the plan to this YAML file.')
+    ] = None,
+    card: Annotated[
+        Path | None, typer.Option(help='Write the operator card to this HTML file.')
+    ] = None,
+    existing: Annotated[
+        Path | None, typer.Option('--from', help='Take this plan instead of deriving one.')
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
+    ] = None,
+    tilt: Annotated[
+        float, typer.Option(min=1.0, max=45.0, help='Tilt (deg) of the ramp for the orientations.')
+    ] = 10.0,
+    points: Annotated[
+        int, typer.Option(min=1, max=20, help='Points on each side of a boundary.')
+    ] = 3,
+    hours: Annotated[float, typer.Option(min=0.01, help='Length of the endurance part.')] = 6.0,
+    short: Annotated[
+        bool, typer.Option('--short', help='One step of each kind, for a demonstration.')
+    ] = False,
+) -> None:
+    """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
+
+    What would fail is marked for the simulation only. Without --out the steps are just listed.
+
+    \b
+    Examples:
+      ugv-acceptance plan -o plan.yaml --card card.html
+      ugv-acceptance plan --from plan.yaml --card card.html
+      ugv-acceptance plan --config my_robot.yaml --tilt 15 --points 5 -o plan.yaml
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    import math
+
+    from ugv_acceptance import AcceptanceError
+    from ugv_acceptance.config import load
+    from ugv_acceptance.plan.derive import Wanted, derive
+    from ugv_acceptance.plan.plan import read_plan, write_plan
+
+    loaded = load(config)
+    if existing is not None:
+        made = read_plan(existing, loaded.settings.robot)
+    else:
+        wanted = Wanted(math.radians(tilt), points=points, endurance=hours * 3600.0, short=short)
+        made = derive(loaded, wanted)
+    _print(made)
+    if out is not None:
+        write_plan(made, out)
+    if card is not None:
+        from ugv_acceptance.plan.card import card_of
+
+        try:
+            card.write_text(card_of(made, loaded), 'utf-8')
+        except OSError as error:
+            raise AcceptanceError(f'{card}: cannot be written: {error.strerror}') from None
+
+
+def _print(made: 'Plan') -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from ugv_acceptance.plan.order import duration
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2))
+    for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
+        table.add_column(heading, no_wrap=heading == 'step')
+    for step in made.steps:
+        use, tilt = step.expected.get('use'), step.expected.get('tilt_left_deg')
+        table.add_row(
+            step.id,
+            step.where,
+            f'{step.ground.orientation} {step.ground.tilt_deg:g}'
+            if step.ground.tilt_deg
+            else 'level',
+            f'{step.payload_kg:g} kg',
+            '' if use is None else f'{use:.0%}',
+            '' if tilt is None else f'{tilt:.1f} deg',
+            ', '.join(step.alerts.must),
+        )
+    console = Console(highlight=False)
+    console.print(table)
+    minutes = duration(made) / 60.0
+    console.print(f'{len(made.steps)} steps, {minutes:.0f} min of motion and holding')
+    console.print(f'plan {made.plan}, sha256 {made.sha256}', soft_wrap=True)

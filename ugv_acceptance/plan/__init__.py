@@ -1,0 +1,1 @@
+"""Test plans: what is tested and why, derived from the robot's model, written for people."""

@@ -1,0 +1,64 @@
+"""The order of a plan's steps: few changes of ground and load, then the shortest way of the arm."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from ugv_acceptance.plan.plan import SIMULATION, Plan, Posture, Step
+
+
+def ordered(steps: Sequence[Step], home: Posture) -> list[Step]:
+    """Return the steps: robot's before simulation's, one set-up after the other, greedy in each.
+
+    Steps that end with the robot on its side, and cycles, come last of their kind.
+    """
+    found: list[Step] = []
+    at = home
+    for setup in _setups(steps):
+        waiting = [s for s in steps if _setup(s) == setup]
+        while waiting:
+            nearest = min(waiting, key=lambda s: distance(at, s.posture_deg))
+            waiting.remove(nearest)
+            found.append(nearest)
+            at = {**home, **nearest.posture_deg}
+    return found
+
+
+def _setup(step: Step) -> tuple[object, ...]:
+    late = step.action in {'tip', 'cycle', 'pull'}
+    return (
+        step.where == SIMULATION,
+        late,
+        step.ground.orientation,
+        step.ground.tilt_deg,
+        step.payload_kg,
+    )
+
+
+def _setups(steps: Sequence[Step]) -> list[tuple[object, ...]]:
+    """Return the set-ups: level first, then as they were thought of."""
+    seen = list(dict.fromkeys(_setup(s) for s in steps))
+    return sorted(seen, key=lambda s: (s[0], s[1], s[2] != 'level', s[3], str(s[2]), s[4]))
+
+
+def distance(start: Posture, end: Posture) -> float:
+    """Return the largest way of a joint (deg) from one posture to another."""
+    return max((abs(angle - start.get(name, angle)) for name, angle in end.items()), default=0.0)
+
+
+def way(steps: Sequence[Step], home: Posture) -> float:
+    """Return the way (deg) of the joint that moves most, summed over all steps."""
+    places = [home, *({**home, **s.posture_deg} for s in steps)]
+    return float(np.sum([distance(a, b) for a, b in pairwise(places)]))
+
+
+def duration(plan: Plan) -> float:
+    """Return how long (s) the motions and holds of a plan take, without what a person does."""
+    total, at = 0.0, plan.home_deg
+    for step in plan.steps:
+        for stop in (*step.via_deg, step.posture_deg):
+            total += distance(at, stop) * np.pi / (2.0 * step.speed_degps)
+            at = {**plan.home_deg, **stop}
+        total += step.hold_s
+    return total

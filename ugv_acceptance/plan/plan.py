@@ -1,0 +1,190 @@
+"""A test plan as data: steps that a test engineer can read and edit in YAML, and their hash.
+
+Angles are in degrees here, as they stand in the file; `radians_of` is where they turn into radians.
+"""
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance.config.build import sentence_of
+from ugv_acceptance.config.document import read_document
+from ugv_acceptance.evaluation.alerts import LEVELS
+from ugv_acceptance.evaluation.wording import WORDS
+from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of
+from ugv_acceptance.model.robot import Robot, Vector
+
+ROBOT: Literal['robot'] = 'robot'
+SIMULATION: Literal['simulation'] = 'simulation'
+
+
+def _alert(text: str) -> str:
+    parts = text.split()
+    level, code = parts[0] if parts else '', parts[1] if len(parts) > 1 else None
+    if level not in LEVELS[1:] or (code is not None and code not in WORDS) or len(parts) > 3:
+        raise ValueError(f'expected LEVEL [CODE [SUBJECT]], such as ERROR TIP_OVER, got {text!r}')
+    return text
+
+
+def _orientation(text: str) -> str:
+    if text not in ORIENTATIONS:
+        raise ValueError(f'expected one of {", ".join(ORIENTATIONS)}, got {text!r}')
+    return text
+
+
+AlertPattern = Annotated[str, AfterValidator(_alert)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[Finite, Field(gt=0)]
+Posture = dict[str, Finite]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra='forbid', frozen=True)
+
+
+class Ground(_Part):
+    """What the robot stands on: an orientation of the paper's Figure 6 and its tilt."""
+
+    orientation: Annotated[str, AfterValidator(_orientation)] = 'level'
+    tilt_deg: Annotated[Finite, Field(ge=0, le=60)] = 0.0
+
+
+class Alerts(_Part):
+    """Alerts that a step must raise and those it must not: LEVEL, LEVEL CODE or with SUBJECT."""
+
+    must: tuple[AlertPattern, ...] = ()
+    must_not: tuple[AlertPattern, ...] = ('ERROR', 'STALE')
+
+
+class Step(_Part):
+    """One step of a plan, with all that a person needs to know before it.
+
+    `action` is hold: go to the posture and hold it. tip: the same, and the robot is expected to
+    tip over. sweep: move on from `via_deg` at `speed_degps`. drive: m/s and deg/s for `hold_s`.
+    pull: a person pulls with `force_n`. cycle: the postures of `via_deg` again and again for
+    `hold_s`. `expected` are the model's margins, for the reader.
+    """
+
+    id: Annotated[str, Field(min_length=1, pattern=r'^[A-Za-z0-9_-]+$')]
+    group: str
+    title: str
+    purpose: str
+    where: Literal['robot', 'simulation'] = ROBOT
+    action: Literal['hold', 'tip', 'sweep', 'drive', 'pull', 'cycle'] = 'hold'
+    preparation: tuple[str, ...] = ()
+    ground: Ground = Ground()
+    payload_kg: Annotated[Finite, Field(ge=0)] = 0.0
+    posture_deg: Posture
+    via_deg: tuple[Posture, ...] = ()
+    speed_degps: Positive = 20.0
+    hold_s: Positive = 3.0
+    drive: tuple[Finite, Finite] | None = None
+    force_n: Positive | None = None
+    limits: dict[str, Finite] = {}
+    expected: dict[str, Finite] = {}
+    alerts: Alerts = Alerts()
+    stop: str = 'stop at any ERROR or STALE alert that is not expected'
+
+    @model_validator(mode='after')
+    def _whole(self) -> 'Step':
+        if self.action == 'drive' and self.drive is None:
+            raise ValueError('expected drive: [m/s, deg/s] in a step of action drive, got none')
+        if self.action == 'pull' and self.force_n is None:
+            raise ValueError('expected force_n in a step of action pull, got none')
+        if self.action in {'cycle', 'sweep'} and not self.via_deg:
+            raise ValueError(f'expected postures in via_deg for action {self.action}, got none')
+        return self
+
+    def gravity(self, size: float) -> Vector:
+        """Return gravity (m/s2) in `base_link` on this step's ground."""
+        return gravity_of(self.ground.orientation, math.radians(self.ground.tilt_deg), size)
+
+
+class Plan(_Part):
+    """A plan: the robot it is for, the configuration it comes from, and its steps in order."""
+
+    plan: str
+    robot: str
+    config_sha256: str
+    tolerance_deg: Positive = 2.0
+    home_deg: Posture
+    steps: Annotated[tuple[Step, ...], Field(min_length=1)]
+
+    @model_validator(mode='after')
+    def _distinct(self) -> 'Plan':
+        ids = [step.id for step in self.steps]
+        twice = sorted({i for i in ids if ids.count(i) > 1})
+        if twice:
+            raise ValueError(f'expected a different id for every step, got {twice[0]} twice')
+        return self
+
+    @property
+    def sha256(self) -> str:
+        """Hash of everything the plan says; comments and the order of keys do not count."""
+        text = json.dumps(self.model_dump(mode='json'), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def radians_of(posture: Posture) -> dict[str, float]:
+    """Return a posture in radians."""
+    return {name: math.radians(angle) for name, angle in posture.items()}
+
+
+def vector_of(robot: Robot, home: Posture, posture: Posture) -> list[float]:
+    """Return the positions (j,) in rad of a posture; joints it does not name are at home."""
+    known = radians_of({**home, **posture})
+    return [known.get(name, 0.0) for name in robot.joint_names]
+
+
+def matches(pattern: str, level: str, code: str, subject: str) -> bool:
+    """Return whether an alert is one of LEVEL, LEVEL CODE or LEVEL CODE SUBJECT."""
+    return all(a == b for a, b in zip(pattern.split(), (level, code, subject), strict=False))
+
+
+def read_plan(path: Path, robot: Robot | None = None) -> Plan:
+    """Return the plan in a YAML file. Raises BadConfig with file, line and field.
+
+    With `robot`, the joints of all postures have to be joints of it.
+    """
+    try:
+        text = path.read_text('utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadConfig(f'{path}: expected a plan, got: {error}') from None
+    document = read_document(text, str(path))
+    try:
+        plan = Plan.model_validate(document.data)
+    except ValidationError as error:
+        raise BadConfig(sentence_of(document, error)) from None
+    for k, step in enumerate(plan.steps):
+        for posture in (step.posture_deg, *step.via_deg, plan.home_deg):
+            unknown = sorted(set(posture) - set(robot.joint_names)) if robot else []
+            if unknown:
+                where = document.where(('steps', k, 'posture_deg'))
+                raise BadConfig(f'{where}: expected joints of {plan.robot}, got {unknown[0]}')
+    return plan
+
+
+def write_plan(plan: Plan, path: Path) -> None:
+    """Write a plan as YAML with a head that says how to read it."""
+    data = plan.model_dump(mode='json', exclude_defaults=True)
+    for step, whole in zip(data['steps'], plan.steps, strict=True):
+        step['alerts'] = whole.alerts.model_dump(mode='json')
+        step['where'] = whole.where
+    body = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True)
+    try:
+        path.write_text(f'{HEAD}\n{body}', 'utf-8')
+    except OSError as error:
+        raise AcceptanceError(f'{path}: cannot be written: {error.strerror}') from None
+
+
+HEAD = """\
+# A test plan made by `ugv-acceptance plan`; edit it as you like. Every run notes the plan's hash.
+# where: robot = run on the robot and in simulation; simulation = would fail, so only simulated.
+# alerts.must: have to be raised; alerts.must_not: must not be active while the posture is held.
+# A pattern is LEVEL, LEVEL CODE or LEVEL CODE SUBJECT, such as: ERROR TIP_OVER left"""

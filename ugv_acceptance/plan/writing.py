@@ -1,0 +1,121 @@
+"""The words and numbers of a plan's step: preparation, limits, expected margins and alerts."""
+
+import math
+from dataclasses import dataclass
+
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.orientations import ORIENTATIONS
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.plan.plan import ROBOT, Alerts, Ground, Posture, Step
+from ugv_acceptance.plan.search import Arm, Found
+
+SAFE_STOP = (
+    'stop and freeze the arm at any ERROR or STALE alert that is not expected, when the posture is'
+    ' not reached, or when anybody says stop'
+)
+# Closer to a limit than this (share; deg), which side of it a measurement falls on is chance.
+NEAR_USE, NEAR_TILT = 0.03, 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What steps share: group, load (kg), ground (orientation, tilt in rad), where, action."""
+
+    group: str
+    load: float = 0.0
+    ground: tuple[str, float] = ('level', 0.0)
+    where: str = ROBOT
+    action: str = 'hold'
+
+
+def posture_deg(arm: Arm, q: Floats) -> Posture:
+    """Return a posture (j,) in degrees by joint name."""
+    pairs = zip(arm.robot.joint_names, q.tolist(), strict=True)
+    return {name: round(math.degrees(angle), 2) for name, angle in pairs}
+
+
+def hold_step(arm: Arm, setup: Setup, found: Found, k: int, title: str, purpose: str) -> Step:
+    """Return the step that holds row `k` of what was found."""
+    tilt = math.degrees(float(found.tilt[k]))
+    use = float(found.most[k])
+    tips = setup.action == 'tip'
+    return Step(
+        id=_slug(title, setup),
+        group=setup.group,
+        title=title,
+        purpose=purpose,
+        where=setup.where,  # type: ignore[arg-type]  # one of the two
+        action=setup.action,  # type: ignore[arg-type]  # one of them
+        preparation=preparation(setup),
+        ground=Ground(
+            orientation=setup.ground[0], tilt_deg=round(math.degrees(setup.ground[1]), 2)
+        ),
+        payload_kg=round(setup.load, 3),
+        posture_deg=posture_deg(arm, found.q[k]),
+        hold_s=4.0 if tips else 3.0,
+        limits=limits_of(arm.settings),
+        expected={'tilt_left_deg': round(tilt, 2), 'use': round(use, 3)},
+        alerts=alerts_of(arm.settings, use, tilt, tips=tips),
+        stop=SAFE_STOP if not tips else 'the robot tips over: let it, then stand it up again',
+    )
+
+
+def _slug(title: str, setup: Setup) -> str:
+    text = f'{title} {setup.load:g}kg'.lower()
+    return '-'.join(''.join(c if c.isalnum() else ' ' for c in text).split())
+
+
+def preparation(setup: Setup) -> tuple[str, ...]:
+    """Return what a person does before a step, one sentence each."""
+    name, tilt = setup.ground
+    words = ORIENTATIONS[name].words
+    ground = (
+        'robot on level, hard ground'
+        if name == 'level'
+        else f'robot on the ramp, {words}, {math.degrees(tilt):.0f} deg'
+    )
+    load = f'{setup.load:g} kg in the gripper, declared' if setup.load else 'gripper empty'
+    guard = 'belay the robot against tipping; nobody within 2 m'
+    return ground, load, guard
+
+
+def limits_of(settings: Settings) -> dict[str, float]:
+    """Return the limits a step is judged by, as people read them."""
+    limits = settings.limits
+    pairs = zip(settings.robot.joint_names, limits.torque, strict=True)
+    found = {f'{name}_nm': limit for name, limit in pairs if math.isfinite(limit)}
+    return found | {'tilt_left_deg': round(math.degrees(limits.tip_error), 3)}
+
+
+def alerts_of(settings: Settings, use: float, tilt: float, *, tips: bool = False) -> Alerts:
+    """Return what a posture must raise and must not, by its torque use and tilt left (deg).
+
+    Where it lies so near a limit that either can happen, neither is asked.
+    """
+    limits = settings.limits
+    must: list[str] = []
+    must_not: list[str] = ['STALE', 'ERROR INPUT_INVALID', 'ERROR IMU_INCONSISTENT']
+    bounds = (
+        ('WARN TORQUE_LIMIT', use - limits.torque_warn, NEAR_USE),
+        ('ERROR TORQUE_LIMIT', use - limits.torque_error, NEAR_USE),
+        ('WARN TIP_OVER', math.degrees(limits.tip_warn) - tilt, NEAR_TILT),
+        ('ERROR TIP_OVER', math.degrees(limits.tip_error) - tilt, NEAR_TILT),
+    )
+    for pattern, beyond, near in bounds:
+        if beyond > near:
+            must.append(pattern)
+        elif beyond < -near and not (tips and 'TORQUE' in pattern):
+            must_not.append(pattern)
+    if use > limits.torque_error:
+        # The motor gives way at its limit, so the posture that asks for more is never held.
+        must.remove('ERROR TORQUE_LIMIT') if 'ERROR TORQUE_LIMIT' in must else None
+        must_not = [p for p in must_not if not p.endswith('TIP_OVER')]
+    if tips:
+        must_not = ['ERROR INPUT_INVALID']
+    return Alerts(must=tuple(must), must_not=tuple(must_not))
+
+
+def side_text(index: int) -> str:
+    """Return the name of a side the robot can tip to."""
+    return SIDES[index]
