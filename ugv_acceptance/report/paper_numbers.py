@@ -169,8 +169,9 @@ def torque_rows(arm: PlanarArm = PAPER) -> list[Row]:
             'yes' if _narrower(arm, math.pi - acute, two_sided=False) else 'no',
             match=_narrower(arm, math.pi - acute, two_sided=False),
             reason=(
-                'cos θ₁ < 0 makes the numerator of (6) the larger. With -T judged too, '
-                + ('it holds' if _narrower(arm, math.pi - acute, two_sided=True) else 'it fails')
+                'true of τ ≥ -T instead, by symmetry; with both signs judged joint 2 '
+                + ('never has' if _narrower(arm, acute, two_sided=True) else 'can have')
+                + ' the narrower range'
             ),
         ),
     ]
