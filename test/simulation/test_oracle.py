@@ -1,5 +1,6 @@
 """The model's tip-over margins against a simulated robot that tips or does not."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import mujoco
@@ -22,7 +23,7 @@ from ugv_acceptance.simulation.tip_cases import (
     least_angle,
     random_cases,
 )
-from ugv_acceptance.simulation.vehicle import gravity_on_slope, vehicle_of
+from ugv_acceptance.simulation.vehicle import Vehicle, gravity_on_slope, vehicle_of
 
 LEVEL = (0.0, 0.0, -9.81)
 CASES = 30
@@ -109,38 +110,74 @@ def _goes_over(robot: Robot, energy: float) -> bool:
     """Return whether a rigid robot that begins to turn about its weakest edge tips over it."""
     vehicle = vehicle_of(robot, replace(BUILD, timestep=0.0005))
     model, data = vehicle.model, settled(vehicle, np.eye(3))
-    point, along = _weakest_edge(robot)
+    point, along = _weakest_edge(robot, _rise)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
     velocity = np.concatenate([np.cross(along, -point), along])
-    rate = np.sqrt(2.0 * energy / (velocity @ inertia @ velocity))
-    data.qvel[:] = rate * velocity
+    data.qvel[:] = np.sqrt(2.0 * energy / (velocity @ inertia @ velocity)) * velocity
+    return _turns(vehicle, data, 70.0)
+
+
+@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize(('share', 'tips'), [(0.97, False), (1.03, True)])
+def test_the_restoring_moment_is_the_torque_it_takes(
+    seed: int, share: float, *, tips: bool
+) -> None:
+    """A torque about the weakest edge lifts it from 3 % above the moment on, not 3 % below."""
+    robot = load().settings.robot
+    case = random_cases(robot, 6, seed=5)[seed]
+    robot = rigid(robot, (*case.q[:3], np.pi), Payload(min(case.payload.mass, 1.5)))
+    moments = np.array(stability(robot, [], LEVEL, robot.payload).moment, dtype=np.float64)
+    vehicle = vehicle_of(robot, BUILD)
+    data = settled(vehicle, np.eye(3))
+    _, along = _weakest_edge(robot, _lever)
+    data.xfrc_applied[vehicle.root, 3:] = share * float(moments.min()) * along
+    assert _turns(vehicle, data, 2.0) is tips
+
+
+def _turns(vehicle: Vehicle, data: mujoco.MjData, degrees: float) -> bool:
+    """Return whether the robot turns by so much within two seconds or more."""
     rest = attitude(vehicle, data)
     for _ in range(400):
-        mujoco.mj_step(model, data, nstep=10)
-        if turn(attitude(vehicle, data), rest) > np.radians(70.0):
+        mujoco.mj_step(vehicle.model, data, nstep=10)
+        if turn(attitude(vehicle, data), rest) > np.radians(degrees):
             return True
     return False
 
 
-def _weakest_edge(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Return a point of the edge with the least energy margin, and the axis of tipping over it."""
+def _lever(arm: np.ndarray) -> float:
+    """Return how far the centre of gravity lies inside of the edge, seen from above."""
+    return float(np.hypot(arm[0], arm[1]))
+
+
+def _rise(arm: np.ndarray) -> float:
+    """Return how far the centre of gravity must rise to pass over the edge."""
+    return float(np.linalg.norm(arm) - arm[2])
+
+
+def _weakest_edge(
+    robot: Robot, measure: Callable[[np.ndarray], float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a point of the edge of least `measure`, and the axis of tipping over it.
+
+    `measure` is of the arm (3,) square from the edge to the centre of gravity, on level ground.
+    """
     posture = posture_of(mechanics_of(robot), [], robot.payload.mass, robot.payload.cog)
     cog = np.array(posture.cog)
     points = [np.array(p) for p in posture.contacts]
     polygon = support_of(robot, posture.contacts, posture.cog).polygon  # type: ignore[arg-type]
 
-    def rise(edge: tuple[np.ndarray, np.ndarray]) -> float:
-        along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
+    def along(edge: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        unit: np.ndarray = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
+        return unit
+
+    def measured(edge: tuple[np.ndarray, np.ndarray]) -> float:
         arm = cog - edge[0]
-        arm = arm - along * (arm @ along)
-        return float(np.linalg.norm(arm) - arm[2])
+        return measure(arm - along(edge) * (arm @ along(edge)))
 
     pairs = zip(polygon, polygon[1:] + polygon[:1], strict=True)
-    edges = [(points[i], points[j]) for i, j in pairs]
-    start, end = min(edges, key=rise)
-    along = (end - start) / np.linalg.norm(end - start)
-    return start, along
+    edge = min(((points[i], points[j]) for i, j in pairs), key=measured)
+    return edge[0], along(edge)
 
 
 def test_flippers_on_the_ground_hold_it_longer() -> None:
