@@ -18,9 +18,19 @@ from ugv_acceptance.model.stability import SIDES, STATES
 
 def write_json(path: Path, result: object) -> None:
     """Write a result; a reader never meets half of it."""
+    write_text(path, json.dumps(result, indent=2, allow_nan=False, default=str) + '\n')
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text as UTF-8; names of a recording may hold what UTF-8 cannot."""
+    write_bytes(path, text.encode('utf-8', 'replace'))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all."""
     part = path.with_name(path.name + '.part')
     try:
-        part.write_text(json.dumps(result, indent=2, allow_nan=False, default=str) + '\n', 'utf-8')
+        part.write_bytes(content)
         part.replace(path)
     except OSError as error:
         raise unwritable(path, error.strerror) from None

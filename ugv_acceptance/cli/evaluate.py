@@ -1,6 +1,5 @@
 """`ugv-acceptance evaluate`: judge recorded runs and print what a person reads in ten seconds."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +8,9 @@ import typer
 from ugv_acceptance import AcceptanceError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ugv_acceptance.cli.evidence import Papers
     from ugv_acceptance.config import Config
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
@@ -37,6 +39,27 @@ def evaluate(
         bool,
         typer.Option('--compare-effort', help='Measured effort beside static torque at rest.'),
     ] = False,
+    criteria: Annotated[
+        Path | None,
+        typer.Option(help='YAML file of criteria; without it the limits of the configuration.'),
+    ] = None,
+    init_criteria: Annotated[
+        Path | None, typer.Option(help='Propose criteria from this (good) run in this file.')
+    ] = None,
+    identity: Annotated[
+        str | None,
+        typer.Option(help='operator=..,robot_serial=..,place=.. or a YAML file, for the report.'),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help='Write a report to sign, one HTML file.')
+    ] = None,
+    pdf: Annotated[Path | None, typer.Option(help='Write the report as PDF (extra pdf).')] = None,
+    junit: Annotated[
+        Path | None, typer.Option(help='Write JUnit XML, one case a criterion.')
+    ] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(help='Write the margins over time as Parquet (extra table).')
+    ] = None,
 ) -> None:
     """Judge recorded runs: margins, alerts and a verdict with its reasons.
 
@@ -48,21 +71,24 @@ def evaluate(
       ugv-acceptance evaluate bags/packbot_pass
       ugv-acceptance evaluate run_0.mcap run_1.mcap --json result.json --csv margins.csv
       ugv-acceptance evaluate run --config my_robot.yaml --urdf my_robot.urdf --compare-effort
+      ugv-acceptance evaluate run --criteria site.yaml --json r.json --report r.html --junit r.xml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.bag.result import check_writable, write_json
+    from ugv_acceptance.bag.result import write_json
+    from ugv_acceptance.cli.evidence import Papers, write_junit
     from ugv_acceptance.config import load
+    from ugv_acceptance.config.identity import identity_from
 
-    loaded = load(config, urdf=urdf)
-    groups = recordings(bags)
-    check_writable(json_file)
-    check_writable(csv_file)
-    if csv_file is not None and len(groups) > 1:
-        raise AcceptanceError(f'--csv takes the margins of one recording, got {len(groups)}')
+    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria)
+    groups, loaded = recordings(bags), load(config, urdf=urdf)
+    papers.check(len(groups), (json_file, junit))
+    entered = identity_from(identity)
     results: list[dict[str, Any]] = []
     codes: list[int] = []
     for paths in groups:
         try:
-            result = judge_recording(paths, loaded, csv_file, compare_effort=compare_effort)
+            result = judge_recording(
+                paths, loaded, papers, compare_effort=compare_effort, identity=entered
+            )
         except AcceptanceError as error:
             typer.echo(f'ugv-acceptance: {error}', err=True)
             result = {'verdict': 'BAD INPUT', 'reasons': [str(error)], 'bag': {'path': paths}}
@@ -72,6 +98,8 @@ def evaluate(
         results.append(result)
     if json_file is not None:
         write_json(json_file, results[0] if len(results) == 1 else results)
+    if junit is not None:
+        write_junit(junit, results)
     raise typer.Exit(worst(codes))
 
 
@@ -92,38 +120,20 @@ def recordings(paths: list[Path]) -> list[list[Path]]:
 
 
 def judge_recording(
-    paths: list[Path], config: 'Config', csv_file: Path | None = None, *, compare_effort: bool
+    paths: list[Path],
+    config: 'Config',
+    papers: 'Papers | None' = None,
+    *,
+    compare_effort: bool = False,
+    identity: 'Mapping[str, str] | None' = None,
 ) -> dict[str, Any]:
-    """Judge one recording, print its summary, and return its result."""
-    from ugv_acceptance.bag.judge import Terms, judge
-    from ugv_acceptance.bag.reader import choose_topics, open_bag
-    from ugv_acceptance.bag.result import CsvSink
-    from ugv_acceptance.cli.summary import print_result, progress_of
-    from ugv_acceptance.config.uncertain import sources_from
-    from ugv_acceptance.evaluation.effort import EffortComparison
+    """Judge one recording, print its summary, write its papers, and return its result."""
+    from ugv_acceptance.cli.evidence import Papers, judge_files, write_papers
+    from ugv_acceptance.cli.summary import print_result
 
-    bag = open_bag(paths)
-    wanted = config.topics
-    names = (wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
-    topics = choose_topics(bag, *names)
-    effort = EffortComparison(config.settings)
-    sinks = [effort.add] if compare_effort else []
-    terms = Terms(sources=sources_from(config), detail=csv_file is not None)
-    with (
-        CsvSink(csv_file, config.settings, bag.start_ns) as csv,
-        progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress,
-    ):
-        judged = judge(bag, topics, config.settings, [*sinks, *csv.sinks], progress, terms)
-    result = judged.result
-    result['robot'] = {
-        'name': config.name,
-        'serial': config.serial,
-        'config': str(config.path),
-        'urdf': str(config.urdf_path),
-        'sha256': config.sha256,
-        'warnings': list(config.warnings),
-    }
-    if compare_effort:
-        result['effort'] = effort.result(bag.start_ns)
+    papers = papers or Papers()
+    result, recorder = judge_files(paths, config, papers, compare_effort=compare_effort)
+    result['identity'] = dict(identity or {})
     print_result(result)
+    write_papers(papers, result, recorder, config.settings)
     return result

@@ -1,5 +1,7 @@
 """A criterion on a margin or another value, judged: worst value, violations, dwell, bound."""
 
+from math import isfinite
+
 from ugv_acceptance.evaluation.bounds import moment_json
 from ugv_acceptance.evaluation.criteria import ANY, FAIL, IGNORED, INCONCLUSIVE, PASS, Criterion
 from ugv_acceptance.evaluation.examination import ValueMeasure
@@ -64,7 +66,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
     demand, violation = measure.demand, measure.violation
     scale, unit = shown(demand.signal, demand.of, findings.settings)
     method = findings.examination.criteria.uncertainty_of(measure.criterion)
-    worst = measure.worst[0] if measure.worst else None
+    worst = measure.worst[0] if measure.worst and isfinite(measure.worst[0].value) else None
     bound = findings.bounds.worst(measure, method)
     start, end = measure.span
     distance = demand.distance(worst.value) * scale if worst else None

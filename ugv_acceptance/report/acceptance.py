@@ -1,0 +1,117 @@
+"""The acceptance report: a result as one self-contained HTML page a person can sign."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.strips import Strips
+from ugv_acceptance.report.numbers import (
+    bound_text,
+    interval_text,
+    limit_text,
+    number_text,
+    seconds_text,
+    worst_text,
+)
+from ugv_acceptance.report.regions import svg_of
+from ugv_acceptance.report.run_charts import run_chart
+from ugv_acceptance.report.track_map import track_map
+
+Json = dict[str, Any]
+
+# Seconds shown before and after an event, and charts of events at most.
+AROUND = 5.0
+MOST_EVENTS = 8
+MOST_ALERTS = 60
+MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?'}
+CLOSING = {
+    'PASS': 'This run met these criteria.',
+    'FAIL': 'This run did not meet these criteria.',
+    'INCONCLUSIVE': (
+        'This run did not meet these criteria: the data do not suffice to say that it did.'
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An SVG and what it shows."""
+
+    svg: str
+    caption: str
+
+
+def acceptance_page(
+    result: Json, strips: Strips, settings: Settings, parts: Mapping[str, str]
+) -> str:
+    """Return the report's HTML. `parts` names what an identity can say: key -> words."""
+    environment = Environment(
+        loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
+    )
+    environment.filters.update(
+        number=number_text,
+        seconds=seconds_text,
+        worst=worst_text,
+        limit=limit_text,
+        bound=bound_text,
+        interval=interval_text,
+    )
+    entered = result['identity']
+    return environment.get_template('acceptance.html').render(
+        result=result,
+        marks=MARKS,
+        closing=CLOSING[result['verdict']],
+        identity=[(words, entered.get(key)) for key, words in parts.items()],
+        inputs=[(key, result['inputs'][key]) for key in ('joint_states', 'imu')],
+        alerts=result['alerts'][:MOST_ALERTS],
+        more_alerts=max(0, len(result['alerts']) - MOST_ALERTS),
+        overview=_overview(result, strips, settings),
+        events=_events(result, strips, settings),
+        map=_map(result, strips, settings),
+    )
+
+
+def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:
+    made = run_chart(strips, result, settings)
+    caption = 'The whole run: the worst of each stretch of time.'
+    return Picture(svg_of(made, 'run'), caption) if made else None
+
+
+def _map(result: Json, strips: Strips, settings: Settings) -> Picture | None:
+    made = track_map(strips, result, settings)
+    caption = (
+        "The run's track (blue, from the dot) over the map at the moment of least tilt left: "
+        'attitude, payload and the other joints as they were then, so the track may cross areas '
+        'that were not there at other times.'
+    )
+    return Picture(svg_of(made, 'map'), caption) if made else None
+
+
+def _events(result: Json, strips: Strips, settings: Settings) -> list[Picture]:
+    pictures = []
+    for k, (title, start, end) in enumerate(_spans(result)[:MOST_EVENTS]):
+        made = run_chart(strips, result, settings, (start, end))
+        if made is not None:
+            pictures.append(Picture(svg_of(made, f'event{k}'), title))
+    return pictures
+
+
+def _spans(result: Json) -> list[tuple[str, float, float]]:
+    """Return what to show closely: alerts that are not mere warnings, joined where they overlap."""
+    duration = result['coverage']['duration_s']
+    spans: list[tuple[str, float, float]] = []
+    for alert in result['alerts']:
+        if alert['level'] == 'WARN':
+            continue
+        end = duration if alert['end_s'] is None else alert['end_s']
+        start, end = max(0.0, alert['start_s'] - AROUND), min(duration, end + AROUND)
+        title = f'{alert["start_s"]:.2f} s: {alert["message"]}'
+        if spans and start < spans[-1][2]:
+            before = spans[-1]
+            spans[-1] = (f'{before[0]}; {title}', before[1], max(before[2], end))
+        else:
+            spans.append((title, start, end))
+    return spans

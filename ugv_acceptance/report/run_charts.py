@@ -1,0 +1,134 @@
+"""Charts of a run over time: margins with their limits, and the alerts below them."""
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.strips import Strips
+from ugv_acceptance.report.regions import figure
+
+Floats = NDArray[np.float64]
+Json = dict[str, Any]
+
+# Colour-blind safe, and told apart by dashes as well.
+LINES = (('#0072b2', '-'), ('#d55e00', '--'), ('#009e73', '-.'), ('#cc79a7', ':'), ('#56b4e9', '-'))
+ALERT_COLOURS = {'WARN': '#e69f00', 'ERROR': '#d55e00', 'STALE': '#7f7f7f'}
+ALERT_HATCHES = {'WARN': '', 'ERROR': '////', 'STALE': '....'}
+# Points drawn; more are thinned to the worst of each stretch.
+MOST_POINTS = 1500
+
+
+def judged_joints(settings: Settings) -> list[int]:
+    """Return the numbers of the joints with a torque limit."""
+    return [j for j, limit in enumerate(settings.limits.torque) if math.isfinite(limit)]
+
+
+def run_chart(
+    strips: Strips, result: Json, settings: Settings, window: tuple[float, float] | None = None
+) -> Figure | None:
+    """Return the margins of a run, or of a window (s), over time; None where nothing was known."""
+    start, end = window or (0.0, result['coverage']['duration_s'])
+    rows = (strips.time >= start - 0.1) & (strips.time <= end + 0.1)
+    if not rows.any():
+        return None
+    alerts = [a for a in result['alerts'] if a['start_s'] <= end and _end(a, end) >= start]
+    kinds = list(dict.fromkeys((a['code'], a['subject']) for a in alerts))[:8]
+    made = figure(7.4, 3.6 + 0.22 * len(kinds))
+    heights = [2.0, 2.0, 0.3 + 0.3 * len(kinds)]
+    torque, tip, strip = made.subplots(3, 1, sharex=True, height_ratios=heights)
+    time, picks = strips.time[rows], _thinned(int(rows.sum()))
+    _draw_torque(torque, time, strips.torque[rows], settings, picks)
+    _draw_tip(tip, time, strips.angle[rows], settings, picks)
+    _draw_alerts(strip, alerts, kinds, end)
+    for axes in (torque, tip):
+        _shade_unknown(axes, result, end)
+        axes.grid(visible=True, linewidth=0.3)
+    strip.set_xlim(start, max(end, start + 1e-3))
+    strip.set_xlabel('time since the start of the recording (s)')
+    return made
+
+
+def _end(alert: Json, otherwise: float) -> float:
+    return otherwise if alert['end_s'] is None else float(alert['end_s'])
+
+
+def _thinned(count: int) -> NDArray[np.intp]:
+    """Return the first column of each stretch to draw as one point."""
+    return np.arange(0, count, max(1, math.ceil(count / MOST_POINTS)))
+
+
+def _draw_torque(
+    axes: Axes, time: Floats, torque: Floats, settings: Settings, picks: NDArray[np.intp]
+) -> None:
+    joints = judged_joints(settings)
+    for (colour, dashes), j in zip(LINES * len(joints), joints, strict=False):
+        share = np.fmax.reduceat(torque[:, j], picks) / settings.limits.torque[j]
+        name = plain(settings.robot.joint_names[j])
+        axes.plot(time[picks], 100.0 * share, color=colour, linestyle=dashes, lw=1.1, label=name)
+    _limit(axes, 100.0 * settings.limits.torque_error, 'limit')
+    axes.axhline(100.0 * settings.limits.torque_warn, color='#777777', lw=0.7, ls=':')
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel('torque (% of limit)')
+    if joints:
+        axes.legend(loc='upper left', ncols=3, fontsize=7.0)
+
+
+def _draw_tip(
+    axes: Axes, time: Floats, angle: Floats, settings: Settings, picks: NDArray[np.intp]
+) -> None:
+    worst = np.degrees(np.fmin.reduceat(angle, picks))
+    axes.plot(time[picks], np.where(np.isfinite(worst), worst, np.nan), color='#0072b2', lw=1.1)
+    _limit(axes, math.degrees(settings.limits.tip_error), 'limit')
+    axes.axhline(math.degrees(settings.limits.tip_warn), color='#777777', lw=0.7, ls=':')
+    axes.set_ylabel('tilt left (deg)')
+
+
+def _limit(axes: Axes, at: float, word: str) -> None:
+    axes.axhline(at, color='black', lw=1.0)
+    axes.annotate(
+        word, (1.0, at), xycoords=('axes fraction', 'data'), fontsize=7.0, ha='right', va='bottom'
+    )
+
+
+def _shade_unknown(axes: Axes, result: Json, end: float) -> None:
+    """Hatch the gaps of an input: nothing was known there."""
+    for key in ('joint_states', 'imu'):
+        for first, last in result['inputs'][key]['first_gaps_s']:
+            if first <= end:
+                axes.axvspan(
+                    first, last, facecolor='#dddddd', edgecolor='#999999', hatch='....', lw=0.0
+                )
+
+
+def _draw_alerts(axes: Axes, alerts: list[Json], kinds: list[tuple[str, str]], end: float) -> None:
+    for alert in alerts:
+        kind = (alert['code'], alert['subject'])
+        if kind not in kinds:
+            continue
+        length = max(_end(alert, end) - alert['start_s'], 0.0)
+        level = alert['level']
+        axes.barh(
+            kinds.index(kind),
+            length,
+            left=alert['start_s'],
+            height=0.7 if level == 'ERROR' else 0.4,
+            color=ALERT_COLOURS.get(level, '#777777'),
+            hatch=ALERT_HATCHES.get(level, ''),
+            edgecolor='black',
+            linewidth=0.4,
+        )
+    names = [plain(f'{code} {subject}') for code, subject in kinds]
+    axes.set_yticks(range(len(kinds)), names, fontsize=6.5)
+    axes.set_ylim(len(kinds) - 0.4, -0.6)
+    if not kinds:
+        axes.set_yticks([0], ['no alerts'], fontsize=6.5)
+
+
+def plain(name: str) -> str:
+    """Return a name that matplotlib does not take for mathematics, short enough for a label."""
+    return name.replace('$', r'\$')[:40]
