@@ -36,7 +36,10 @@ def test_the_document_has_what_its_readers_expect(written: tuple[Path, str]) -> 
     assert document['table_1'] == {'matches': 7, 'of': 7}
     assert (document['table_2']['matches'], document['table_2']['of']) == (16, 16)
     assert len(document['table_2']['rows']) == 8
-    assert document['critical_value'] == {'paper': 1.227, 'computed': pytest.approx(1.2626, abs=5e-5)}
+    assert document['critical_value'] == {
+        'paper': 1.227,
+        'computed': pytest.approx(1.2626, abs=5e-5),
+    }
     assert document['speed_limit_deg_s'] == pytest.approx(36.74, abs=0.01)
     assert all((written[0] / name).is_file() for name in document['figures'])
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ugv_acceptance.report.map_data import Scene
 
 
-def map(  # noqa: A001, PLR0917 - the verb's name; one parameter an option
+def map(  # noqa: A001 - the verb's name; one parameter an option
     kind: Annotated[str, typer.Argument(help='torque, rollover, payload or drag.')],
     out: Annotated[
         list[Path] | None,
@@ -64,7 +64,7 @@ def map(  # noqa: A001, PLR0917 - the verb's name; one parameter an option
     scene = scene_from(loaded, wanted)
     data = with_levels(map_of(kind, scene), caution, failure)
     track = _track(loaded, scene, from_bag) if from_bag else None
-    typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene)}')
+    typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}')
     found = classes(data.margin, data.levels.caution, data.levels.failure)
     for k, name in enumerate(CLASSES):
         typer.echo(f'  {name:8}{100.0 * area_fraction(found == k, scene.grid):6.1f} % of the map')

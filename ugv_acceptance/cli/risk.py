@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 
-def risk(  # noqa: PLR0917 - one parameter an option
+def risk(
     config: Annotated[
         Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
     ] = None,

@@ -50,6 +50,8 @@ def speed(
     if reference <= 0.0:
         raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
     mass = quantity(payload, 'mass', '--payload') if payload else robot.payload.mass
+    if mass < 0.0:
+        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
     load_carried = Payload(mass, robot.payload.cog)
     bound = critical or critical_value(samples=samples)
     if bound <= 1.0:

@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 Intervals = tuple[tuple[float, float], ...]
 
 TURN = 2.0 * math.pi
@@ -45,9 +43,12 @@ def length(intervals: Intervals) -> float:
     return math.fsum(end - start for start, end in intervals)
 
 
-def inside(intervals: Intervals, x: np.ndarray) -> np.ndarray:
-    """Return, for each angle (rad) in [0, 2 pi], whether it lies in an interval."""
-    found = np.zeros(np.shape(x), dtype=np.bool_)
-    for start, end in intervals:
-        found |= (x >= start) & (x <= end)
-    return found
+def intersect(a: Intervals, b: Intervals) -> Intervals:
+    """Return where both hold."""
+    both = [
+        (max(start, low), min(end, high))
+        for start, end in a
+        for low, high in b
+        if max(start, low) <= min(end, high)
+    ]
+    return merge(both)

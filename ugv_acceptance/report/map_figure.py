@@ -38,8 +38,8 @@ def shown(robot: Robot, joint: int, values: Floats) -> Floats:
     return np.degrees(values) if _turns(robot, joint) else values
 
 
-def assumptions(scene: Scene) -> str:
-    """Return what the map assumes, in words: attitude, payload, the other joints."""
+def assumptions(scene: Scene, kind: str) -> str:
+    """Return what a map of that kind assumes, in words: attitude, payload, joints, limits."""
     gx, gy, gz = scene.gravity
     roll, pitch = math.atan2(-gy, -gz), math.atan2(gx, math.hypot(gy, gz))
     ground = 'level ground'
@@ -55,9 +55,9 @@ def assumptions(scene: Scene) -> str:
             value = float(shown(scene.robot, k, np.array(scene.grid.q[k])))
             others.append(f'{name} {value:.0f}{unit}' if unit == '°' else f'{name} {value:.2f} m')
     load = '' if scene.robot.payload_link is None else f'payload {scene.payload.mass:g} kg'
-    return '; '.join(
-        part for part in (ground, load, ', '.join(others), _limits(scene), 'at rest') if part
-    )
+    limits = '' if kind == 'rollover' else _limits(scene)
+    parts = (ground, load, ', '.join(others), limits, 'at rest')
+    return '; '.join(part for part in parts if part)
 
 
 def _limits(scene: Scene) -> str:
@@ -87,8 +87,12 @@ def draw_map(scene: Scene, data: MapData, track: Floats | None = None) -> Figure
     if track is not None:
         _draw_track(axes, scene, track)
     _axis(axes, scene)
-    axes.set_title(f'{robot.name}: {data.what}\n{_wrapped(assumptions(scene))}', fontsize=9.5)
+    axes.set_title(
+        f'{robot.name}: {data.what}\n{_wrapped(assumptions(scene, data.kind))}', fontsize=9.5
+    )
     legend(made, WORDS[data.kind], loc='outside lower center', ncols=3)
+    if track is not None:
+        axes.legend(loc='upper right')
     return made
 
 
@@ -119,9 +123,9 @@ def _draw_track(axes: Axes, scene: Scene, track: Floats) -> None:
     x, y = points
     jump = np.hypot(np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1])) > _WRAPPED
     axes.plot(np.where(jump, np.nan, x), y, color='white', lw=4.0)
-    axes.plot(np.where(jump, np.nan, x), y, color='#0b3d91', lw=1.8)
-    axes.plot(x[0], y[0], 'o', color='#0b3d91', mec='white', ms=9)
-    axes.plot(x[-1], y[-1], 's', color='#0b3d91', mec='white', ms=9)
+    axes.plot(np.where(jump, np.nan, x), y, color='#0b3d91', lw=1.8, label='recorded run')
+    axes.plot(x[0], y[0], 'o', color='#0b3d91', mec='white', ms=13, label='start', ls='')
+    axes.plot(x[-1], y[-1], 's', color='#0b3d91', mec='white', ms=7, label='end', ls='')
 
 
 def _axis(axes: Axes, scene: Scene) -> None:
