@@ -59,7 +59,7 @@ def test_a_robot_that_cannot_fail_does_not() -> None:
 
 
 def test_a_robot_that_must_fail_does() -> None:
-    """Stretched forward with 4 kg the shoulder needs 74.8 N m of 50, whatever else varies a little."""
+    """Stretched forward with 4 kg the shoulder needs 74.8 N m of 50, whatever else varies."""
     found = document(
         '--posture', 'flipper_joint=180deg', '--vary', 'payload.mass=4', '--vary', 'slope=0'
     )

@@ -11,7 +11,7 @@ from ugv_acceptance.model.planar import paper_arm
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.model.validity import PAPER_SPEEDS_DEG_S, mean_square, paper_sweep
-from ugv_acceptance.report.arm_figures import DOWN, Simulated
+from ugv_acceptance.report.paper_numbers import DOWN, Simulated
 
 
 def simulated_arm() -> tuple[Simulated, Floats]:

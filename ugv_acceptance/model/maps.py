@@ -28,6 +28,14 @@ CLASSES = ('safe', 'caution', 'failure')
 _ROWS = 16
 
 
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """Where a margin turns: from `failure` down it fails, from `caution` down it warns."""
+
+    caution: float
+    failure: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TipMap:
     """`angle` (n, m): tilt left (rad), NaN where there is no margin; `side`: number in SIDES."""

@@ -1,7 +1,7 @@
 """Figures 4 and 5: the planar arm's torques over a turn, and its regions of failure."""
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,60 +18,25 @@ from ugv_acceptance.model.planar import PAPER, arm_robot, paper_arm, planar_torq
 from ugv_acceptance.model.statics import inverse_dynamics, static_torque
 from ugv_acceptance.model.validity import paper_sweep
 from ugv_acceptance.model.windows import Mask
+from ugv_acceptance.report.paper_numbers import DOWN, Simulated
 from ugv_acceptance.report.regions import degree_axes, figure
 
 THRESHOLDS = (30.0, 50.0, 70.0)
-DOWN = (0.0, 0.0, -9.81)
 TURN = 2.0 * math.pi
-
-
-@dataclass(frozen=True, slots=True)
-class Simulated:
-    """What a simulation gave over the sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
-
-    theta2: Floats
-    torque: Floats
 
 
 def figure_4(simulated: Simulated | None = None) -> Figure:
     """Return static and dynamic torque over theta_2 at theta_1 = pi/6, 7.2 deg/s."""
-    q = paper_sweep(math.pi / 6.0)
-    rates = np.array([0.0, math.radians(7.2)])
-    static = static_torque(paper_arm(), q, DOWN)
-    moving = inverse_dynamics(paper_arm(OFFSET1, OFFSET2), q, rates, np.zeros(2), DOWN)
     made = figure(7.2, 4.4)
     axes = made.subplots()
-    theta2 = np.degrees(q[:, 1])
-    axes.axhspan(50.0, 90.0, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', linewidth=0.0)
-    axes.axhspan(
-        -90.0, -50.0, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', linewidth=0.0
-    )
-    for joint, (dash, shade) in enumerate((('-', 'black'), ('--', '#1f5f8b'))):
-        axes.plot(
-            theta2, static[:, joint], dash, color=shade, lw=1.6, label=f'joint {joint + 1}, static'
-        )
-        axes.plot(
-            theta2[::8],
-            moving[::8, joint],
-            'os'[joint],
-            mfc='none',
-            color=shade,
-            ms=5,
-            label=f'joint {joint + 1}, dynamic 7.2°/s',
-        )
-        if simulated is not None:
-            axes.plot(
-                np.degrees(simulated.theta2)[4::8],
-                simulated.torque[4::8, joint],
-                'x+'[joint],
-                color=shade,
-                ms=5,
-                label=f'joint {joint + 1}, MuJoCo',
-            )
-    axes.text(180.0, 54.0, '+50 N m: saturation above', ha='center', backgroundcolor='white')
-    axes.text(
-        180.0, -57.0, '-50 N m: saturation below', ha='center', va='top', backgroundcolor='white'
-    )
+    for low, high in ((50.0, 90.0), (-90.0, -50.0)):
+        axes.axhspan(low, high, facecolor='#e7a9a0', hatch='////', edgecolor='#999999', lw=0.0)
+    _torque_curves(axes, simulated)
+    for height, words in (
+        (56.0, '+50 N m: saturation above'),
+        (-56.0, '-50 N m: saturation below'),
+    ):
+        axes.text(180.0, height, words, ha='center', va='center', backgroundcolor='white')
     degree_axes(axes, 'second joint θ₂', '')
     axes.yaxis.set_major_formatter('{x:.0f}')
     axes.yaxis.set_major_locator(MultipleLocator(25.0))
@@ -79,6 +44,26 @@ def figure_4(simulated: Simulated | None = None) -> Figure:
     axes.set_title('Figure 4: planar arm, θ₁ = 30°, 4 kg load, θ₂ moving through a turn in 50 s')
     axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.16), ncols=3)
     return made
+
+
+def _marks(shade: str) -> dict[str, Any]:
+    return {'mfc': 'none', 'color': shade, 'ms': 5}
+
+
+def _torque_curves(axes: Axes, simulated: Simulated | None) -> None:
+    q, rates = paper_sweep(math.pi / 6.0), np.array([0.0, math.radians(7.2)])
+    static = static_torque(paper_arm(), q, DOWN)
+    moving = inverse_dynamics(paper_arm(OFFSET1, OFFSET2), q, rates, np.zeros(2), DOWN)
+    theta2 = np.degrees(q[:, 1])
+    looks = (('-', 'o', 'x', 'black'), ('--', 's', '+', '#1f5f8b'))
+    for joint, (dash, mark, cross, shade) in enumerate(looks):
+        name, marks = f'joint {joint + 1}', _marks(shade)
+        axes.plot(theta2, static[:, joint], dash, color=shade, lw=1.6, label=f'{name}, static')
+        label = f'{name}, dynamic 7.2°/s'
+        axes.plot(theta2[::8], moving[::8, joint], mark, label=label, **marks)
+        if simulated is not None:
+            at, torque = np.degrees(simulated.theta2)[4::8], simulated.torque[4::8, joint]
+            axes.plot(at, torque, cross, label=f'{name}, MuJoCo', **marks)
 
 
 def paper_grid(steps: int = 401) -> Grid:

@@ -11,10 +11,9 @@ from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.model.bilinear import Grid
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.capacity import CAUSES, lift_capacity, pull_capacity
-from ugv_acceptance.model.maps import rollover_map, torque_forms, utilisation_map
+from ugv_acceptance.model.maps import Levels, rollover_map, torque_forms, utilisation_map
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.report.regions import Levels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -56,8 +56,8 @@ def assumptions(scene: Scene, kind: str) -> str:
             others.append(f'{name} {value:.0f}{unit}' if unit == '°' else f'{name} {value:.2f} m')
     load = '' if scene.robot.payload_link is None else f'payload {scene.payload.mass:g} kg'
     limits = '' if kind == 'rollover' else _limits(scene)
-    parts = (ground, load, ', '.join(others), limits, 'at rest')
-    return '; '.join(part for part in parts if part)
+    words = (ground, load, ', '.join(others), limits, 'at rest')
+    return '; '.join(part for part in words if part)
 
 
 def _limits(scene: Scene) -> str:

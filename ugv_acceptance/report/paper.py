@@ -12,7 +12,6 @@ from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.arm_figures import (
-    Simulated,
     disagreement,
     figure_4,
     figure_5,
@@ -28,6 +27,7 @@ from ugv_acceptance.report.capacity_figures import (
 )
 from ugv_acceptance.report.page import Picture, Section
 from ugv_acceptance.report.paper_numbers import (
+    Simulated,
     family,
     ideal_row,
     speed_rows,

@@ -33,6 +33,8 @@ from ugv_acceptance.model.validity import (
     critical_value,
 )
 
+DOWN = (0.0, 0.0, -9.81)
+
 # Table 1: theta_1 and the printed roots of theta_2, in units of pi.
 TABLE_1: tuple[tuple[str, float, tuple[float, ...]], ...] = (
     ('0', 0.0, (0.0, 2.0)),
@@ -43,6 +45,14 @@ TABLE_1: tuple[tuple[str, float, tuple[float, ...]], ...] = (
     ('5π/6', 5 / 6, (1 / 6,)),
     ('π', 1.0, (0.0, 2.0)),
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """What a simulation gave over the sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
+
+    theta2: Floats
+    torque: Floats
 
 
 @dataclass(frozen=True, slots=True)

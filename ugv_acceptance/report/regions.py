@@ -2,7 +2,6 @@
 
 import io
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.maps import Levels
 
 # Colours that stay apart in grey and for colour-blind readers; the hatch says it without them.
 COLOURS = ('#ffffff', '#fff0c2', '#e7a9a0')
@@ -30,14 +30,6 @@ STYLE: Any = {
     'legend.frameon': True,
     'legend.framealpha': 1.0,
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Levels:
-    """Where a margin turns: from `failure` down it fails, from `caution` down it warns."""
-
-    caution: float
-    failure: float
 
 
 def figure(width: float, height: float) -> Figure:
