@@ -37,14 +37,19 @@ def once(mode: str, rates: tuple[int, int], seconds: float) -> dict[str, float]:
 
     listener = start('live_listener.py', mode)
     load = start('live_load.py', *rates, seconds)
-    assert load.stdout
-    assert listener.stdout
-    sent = sum(json.loads(load.stdout.readline()))
+    sent = sum(told(load))
     listener.send_signal(signal.SIGINT)
-    heard = json.loads(listener.stdout.readline())
+    heard = told(listener)
     listener.wait()
     load.wait()
     return figures(heard, sent)
+
+
+def told(process: 'subprocess.Popen[str]') -> Any:  # noqa: ANN401 - JSON
+    """Return the line of JSON that a process prints."""
+    if process.stdout is None:
+        sys.exit('expected a process whose output is read')
+    return json.loads(process.stdout.readline())
 
 
 def figures(heard: dict[str, Any], sent: int) -> dict[str, float]:

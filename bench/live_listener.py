@@ -5,21 +5,21 @@ import signal
 import struct
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState
 
-sys.path.insert(0, str(Path(__file__).parent))
-from naive_monitor import NaiveMonitor
-
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from bench.naive_monitor import NaiveMonitor, best_effort
+from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.nodes.monitor import Monitor
-from ugv_acceptance.nodes.running import Stop, spin
+from ugv_acceptance.nodes.running import Stop, end, spin
 
 STAMP = struct.Struct('<iI')
 DEPTH = 1000
@@ -45,7 +45,7 @@ class Tally:
         sec, nanosec = STAMP.unpack_from(data, 4)
         self.seen(sec * 1_000_000_000 + nanosec)
 
-    def decoded(self, message: Any) -> None:
+    def decoded(self, message: Any) -> None:  # noqa: ANN401 - of either type
         """Take a message object."""
         self.seen(message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec)
 
@@ -53,7 +53,7 @@ class Tally:
 def empty(tally: Tally, *, raw: bool) -> Node:
     """Return a node that only listens."""
     node = rclpy.create_node('empty')
-    qos = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+    qos = best_effort(DEPTH)
     take = tally.raw if raw else tally.decoded
     node.create_subscription(JointState, 'joint_states', take, qos, raw=raw)
     node.create_subscription(Imu, 'imu/data', take, qos, raw=raw)
@@ -64,17 +64,20 @@ def monitor(tally: Tally) -> Node:
     """Return the monitor, which tells of every margin."""
     node = Monitor()
     node.bring_up()
-    publish = node.session.on_margins
+    session = node.session
+    if session is None:
+        sys.exit('expected an active monitor')
+    publish = session.on_margins
 
-    def margins(stamp: int, found: Any) -> None:
+    def margins(stamp: int, found: Margins) -> None:
         tally.seen(stamp)
         publish(stamp, found)
 
-    node.session.on_margins = margins
+    session.on_margins = margins
     return node
 
 
-MODES = {
+MODES: dict[str, Callable[[Tally], Any]] = {
     'raw': lambda tally: empty(tally, raw=True),
     'decoded': lambda tally: empty(tally, raw=False),
     'monitor': monitor,
@@ -90,7 +93,7 @@ def main() -> None:
     signal.signal(signal.SIGINT, lambda *_: setattr(stop, 'asked', True))
     node = MODES[mode](tally)
     if mode == 'naive':
-        executor = SingleThreadedExecutor()
+        executor: Any = SingleThreadedExecutor()
         executor.add_node(node)
         while not stop.asked:
             executor.spin_once(timeout_sec=0.5)
@@ -103,7 +106,7 @@ def main() -> None:
         taken = sum(count.taken for count in node.session.counts.values())
     told = {'cpu': cpu, 'taken': taken, 'latencies': tally.latencies}
     print(json.dumps(told), flush=True)
-    node.destroy_node()
+    end(node)
     rclpy.shutdown()
 
 

@@ -5,8 +5,8 @@ alerts, no staleness, no payload, no checks. It stands beside the real one in be
 """
 
 import math
-
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -25,6 +25,13 @@ SHOULDER = np.array([0.15, 0.0, 0.2])
 CORNERS = np.array([[0.25, 0.2, 0], [-0.25, 0.2, 0], [-0.25, -0.2, 0], [0.25, -0.2, 0]])
 
 
+def best_effort(depth: int) -> QoSProfile:
+    """Return the QoS of sensor data with a queue of `depth`."""
+    profile: Any = QoSProfile
+    made: QoSProfile = profile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    return made
+
+
 class NaiveMonitor(Node):
     """Computes and publishes on every message; `seen(stamp)` is called with its stamp (ns)."""
 
@@ -33,7 +40,7 @@ class NaiveMonitor(Node):
         self.seen = seen
         self.gravity: Floats | None = None
         self.angles: dict[str, float] = {}
-        qos = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+        qos = best_effort(depth)
         self.create_subscription(JointState, 'joint_states', self.on_joints, qos)
         self.create_subscription(Imu, 'imu/data', self.on_imu, qos)
         self.values = self.create_publisher(Float64MultiArray, 'naive/margins', 10)

@@ -120,7 +120,9 @@ def played(live: Live, path: Path) -> tuple[dict[Any, Any], list[Alert], Any, in
     try:
         live.until(lambda: session_of(monitor).counts['imu'].taken > 0)
         began = session_of(monitor).clock.now()
-        strangers = [len(monitor.get_publishers_info_by_topic(t)) for t in ('/joint_states', '/imu/data')]
+        strangers = [
+            len(monitor.get_publishers_info_by_topic(t)) for t in ('/joint_states', '/imu/data')
+        ]
         assert strangers == [1, 1], 'somebody else publishes here'
         end = time.monotonic() + SECONDS - 0.5
         live.until(lambda: time.monotonic() > end)

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import pytest
-
 from nodes.live_case import Live, live_nodes, ros_context
 
 

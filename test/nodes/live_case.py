@@ -12,13 +12,14 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import ok, try_shutdown
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.nodes.monitor import Monitor
 from ugv_acceptance.nodes.outputs import LATCHED
+from ugv_acceptance.nodes.running import end
 from ugv_acceptance.nodes.status import Status
 
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
@@ -39,6 +40,13 @@ def imu(roll: float = 0.0, stamp: int | None = None) -> bytes:
     orientation = (math.sin(roll / 2), 0.0, 0.0, math.cos(roll / 2))
     force = (0.0, 9.81 * math.sin(roll), 9.81 * math.cos(roll))
     return imu_cdr(when, 'imu_link', orientation, (0.0, 0.0, 0.0), force)
+
+
+def parameter(name: str, value: Any) -> Parameter:
+    """Return a parameter; `__` in a name stands for a dot, so that it can be a keyword."""
+    make: Any = Parameter
+    made: Parameter = make(name.replace('__', '.'), value=value)
+    return made
 
 
 class Driver(Node):
@@ -86,12 +94,14 @@ class Live:
         self.nodes.append(node)
         return node
 
-    def monitor(self, *, up: bool = True, arguments: tuple[str, ...] = (), **values: Any) -> Monitor:
+    def monitor(
+        self, *, up: bool = True, arguments: tuple[str, ...] = (), **values: Any
+    ) -> Monitor:
         """Return a monitor, brought up unless `up` is false, with parameter `values`."""
         node: Monitor = self.add(
             Monitor(
                 lambda kind, status: self.heard.append((kind, status)),
-                parameter_overrides=[Parameter(k.replace('__', '.'), value=v) for k, v in values.items()],
+                parameter_overrides=[parameter(k, v) for k, v in values.items()],
                 cli_args=['--ros-args', *arguments] if arguments else None,
             )
         )
@@ -152,12 +162,15 @@ def levels(driver: Driver) -> list[int]:
 
 @contextmanager
 def ros_context() -> Iterator[None]:
-    """Initialise rclpy for a while."""
+    """Initialise rclpy for a while, unless somebody has."""
+    if ok():
+        yield
+        return
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     try:
         yield
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
 
 
 @contextmanager
@@ -170,8 +183,5 @@ def live_nodes() -> Iterator[Live]:
     finally:
         for node in live.nodes:
             executor.remove_node(node)
-            node.destroy_node()
+            end(node)
         executor.shutdown()
-
-
-LATE_JOINER = QoSProfile(depth=1, durability=LATCHED.durability)

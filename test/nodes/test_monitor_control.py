@@ -13,8 +13,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from nodes.live_case import ERROR, FOLDED, OK, STALE, WARN, Live, levels, session_of
-from rclpy.parameter import Parameter
+from nodes.live_case import ERROR, FOLDED, OK, STALE, WARN, Live, imu, levels, parameter, session_of
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from ugv_acceptance import BadConfig
@@ -36,7 +37,7 @@ def state(live: Live) -> str:
 
 def put(monitor: Any, **values: Any) -> Any:
     """Set parameters at once, as set_parameters_atomically does."""
-    parameters = [Parameter(k.replace('__', '.'), value=v) for k, v in values.items()]
+    parameters = [parameter(k, v) for k, v in values.items()]
     return monitor.set_parameters_atomically(parameters)
 
 
@@ -86,18 +87,16 @@ def test_a_bad_configuration_is_refused_with_its_reason(live: Live) -> None:
 def test_autostart_with_a_bad_configuration_raises(live: Live) -> None:
     """Brought up by itself it does not go on with a bad configuration."""
     monitor = live.monitor(up=False, config='/nowhere/robot.yaml')
-    with pytest.raises(BadConfig, match='/nowhere/robot.yaml'):
+    with pytest.raises(BadConfig, match='/nowhere/robot'):
         monitor.bring_up()
 
 
 def test_the_verdict_is_latched(live: Live) -> None:
     """Who subscribes late gets the last verdict at once."""
     live.running()
-    late = live.add(__import__('rclpy').create_node('late'))
+    late = live.add(Node('late'))
     heard: list[Any] = []
-    late.create_subscription(
-        DiagnosticStatus, 'acceptance_monitor/verdict', heard.append, LATCHED
-    )
+    late.create_subscription(DiagnosticStatus, 'acceptance_monitor/verdict', heard.append, LATCHED)
     live.until(lambda: heard)
 
 
@@ -214,7 +213,7 @@ VALUES = {
 @settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_random_sets_are_wholly_taken_or_wholly_refused(live: Live, data: st.DataObject) -> None:
     """What the parameters say after any set is what the running evaluation judges by."""
-    monitor = live.nodes[0] if live.nodes else live.monitor()
+    monitor: Any = live.nodes[0] if live.nodes else live.monitor()
     names = data.draw(st.sets(st.sampled_from(sorted(VALUES)), min_size=1))
     values = {name: data.draw(VALUES[name]) for name in names}
     before = {k.name: monitor.get_parameter(k.name).value for k in monitor.knobs}
@@ -232,13 +231,19 @@ def test_random_sets_are_wholly_taken_or_wholly_refused(live: Live, data: st.Dat
 def test_it_ends_cleanly_when_asked(number: signal.Signals) -> None:
     """SIGINT, SIGTERM, and a second one meanwhile: exit code 0 and no traceback."""
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    code = 'from ugv_acceptance.nodes.monitor import main; print("up", flush=True); main()'
+    code = (
+        'import sys; from ugv_acceptance.nodes.monitor import Monitor\n'
+        'from ugv_acceptance.nodes.running import run\n'
+        'sys.exit(run(lambda: Monitor(lambda *_: print("up", flush=True))))'
+    )
     process = subprocess.Popen(
-        [sys.executable, '-c', code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [sys.executable, '-c', code],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
     )
     assert process.stdout
     process.stdout.readline()
-    time.sleep(2.0)
     process.send_signal(number)
     time.sleep(0.1)
     if process.poll() is None:
@@ -250,8 +255,6 @@ def test_it_ends_cleanly_when_asked(number: signal.Signals) -> None:
 
 def test_margins_are_published_for_every_message(live: Live) -> None:
     """With publish_rate 0 a listener gets margins for each message, by name, in N m and rad."""
-    from sensor_msgs.msg import JointState
-
     monitor, driver = live.running(publish_rate=0.0)
     torque: list[Any] = []
     tip: list[Any] = []
@@ -270,8 +273,6 @@ def test_margins_are_published_for_every_message(live: Live) -> None:
 
 def test_stale_inputs_silence_the_margin_topics(live: Live) -> None:
     """No margins are published while an input is missing."""
-    from sensor_msgs.msg import JointState
-
     monitor, driver = live.running(publish_rate=0.0)
     heard: list[Any] = []
     driver.create_subscription(JointState, 'acceptance_monitor/stability', heard.append, 100)
@@ -279,7 +280,5 @@ def test_stale_inputs_silence_the_margin_topics(live: Live) -> None:
     live.until(lambda: session_of(monitor).level == STALE)
     live.spin(0.2)
     heard.clear()
-    from nodes.live_case import imu
-
     live.spin(0.5, lambda: driver.imu.publish(imu()))
     assert heard == []

@@ -31,8 +31,13 @@ def test_never_ok_with_an_absent_input(live: Live, present: str) -> None:
         'joints': lambda: driver.joints.publish(joints()),
         'imu': lambda: driver.imu.publish(imu()),
     }[present]
-    live.until(lambda: any(a.values[2].value == 'imu' for a in driver.alerts) or
-               any(a.values[2].value == 'joint_states' for a in driver.alerts), send)
+    live.until(
+        lambda: (
+            any(a.values[2].value == 'imu' for a in driver.alerts)
+            or any(a.values[2].value == 'joint_states' for a in driver.alerts)
+        ),
+        send,
+    )
     live.until(lambda: len(driver.verdicts) > 1, send)
     assert set(levels(driver)) == {STALE}
 

@@ -1,4 +1,4 @@
-"""Any recording message by message, as it was serialised, in the order it was logged: for replay."""
+"""Any recording message by message, as serialised, in the order it was logged: for replay."""
 
 import heapq
 import os
@@ -81,7 +81,10 @@ def _piece(
             os.preadv(file, [room.data[LEAD : LEAD + size]], piece.start)
         else:
             os.preadv(file, [room.data[: piece.length]], piece.start)
-            size, records = piece.head.size, buffers.records(piece.head, room[: piece.length + SLACK])
+            size, records = (
+                piece.head.size,
+                buffers.records(piece.head, room[: piece.length + SLACK]),
+            )
     except BadBag:
         return []
     data = records.data[LEAD : LEAD + size]
@@ -103,7 +106,9 @@ def _sqlite(member: Member, wanted: set[str]) -> Iterator[Logged]:
         'JOIN topics ON topics.id = messages.topic_id ORDER BY messages.timestamp, messages.id'
     )
     try:
-        with closing(sqlite3.connect(f'{member.content.as_uri()}?mode=ro', uri=True)) as db:
+        with closing(
+            sqlite3.connect(f'{member.content.resolve().as_uri()}?mode=ro', uri=True)
+        ) as db:
             for log_time, topic, data in db.execute(query):
                 if topic in wanted:
                     yield Logged(int(log_time), str(topic), bytes(data))
@@ -112,9 +117,11 @@ def _sqlite(member: Member, wanted: set[str]) -> Iterator[Logged]:
 
 
 def _ros1(member: Member, wanted: set[str]) -> Iterator[Logged]:
-    store = get_typestore(Stores.ROS1_NOETIC)
+    # ROS 2's types: their headers have no sequence number, and ROS 1's is left out.
+    store = get_typestore(Stores.ROS2_JAZZY)
     with Ros1Reader(member.content) as reader:
-        connections = [c for c in reader.connections if c.topic in wanted]
+        known = [c for c in reader.connections if normal_type(c.msgtype) in store.types]
+        connections = [c for c in known if c.topic in wanted]
         for connection, log_time, data in reader.messages(connections):
             content = bytes(store.ros1_to_cdr(data, normal_type(connection.msgtype)))
             yield Logged(log_time, connection.topic, content)

@@ -1,4 +1,4 @@
-"""The parts of the demo: a player in a process of its own, the monitor in this one, then the bag."""
+"""The parts of the demo: a player in its own process, the monitor in this one, then the bag."""
 
 import os
 import random
@@ -33,7 +33,9 @@ def demonstrate(bag: Path | None, rate: float) -> int:
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     console.rule('1. Live: a recorded run, published through DDS, watched by the monitor')
-    console.print(f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}', soft_wrap=True)
+    console.print(
+        f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}', soft_wrap=True
+    )
     alerts, played = live(path, rate, console)
     console.rule('2. The same run from the recording')
     result = judge_recording([path], load(), compare_effort=False)
@@ -77,9 +79,7 @@ def player(path: Path, rate: float) -> Iterator['subprocess.Popen[bytes]']:
         process.wait()
 
 
-def conclude(
-    console: Console, alerts: list['Status'], played: bool, result: dict[str, Any]
-) -> int:
+def conclude(console: Console, alerts: list['Status'], played: bool, result: dict[str, Any]) -> int:
     """Say what came of it."""
     console.rule('3. What came of it')
     seen = Counter(

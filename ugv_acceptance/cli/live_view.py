@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from rich.console import Console, Group
+from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.markup import escape
 from rich.table import Table
@@ -21,7 +21,7 @@ _SHOWN = 8
 
 
 class Lines:
-    """Prints every change of an alert, and the verdict when its level changes or `every` s passed."""
+    """Prints every change of an alert; the verdict when its level changes and every few seconds."""
 
     def __init__(self, console: Console, every: float) -> None:
         self._console = console
@@ -72,7 +72,12 @@ class Panel:
 
     def draw(self, monitor: 'Monitor') -> None:
         """Show the monitor as it is now."""
-        rows = [self._verdict, table_of(monitor), *self._lines, '[dim]Ctrl-C ends[/]']
+        rows: list[RenderableType] = [
+            self._verdict,
+            table_of(monitor),
+            *self._lines,
+            '[dim]Ctrl-C ends[/]',
+        ]
         self._live.update(Group(*rows), refresh=True)
 
 
@@ -97,7 +102,9 @@ def table_of(monitor: 'Monitor') -> Table:
         if math.isfinite(limit):
             left = f'{limit - abs(torque):.1f}'
             table.add_row(escape(name), f'{torque:.1f}', f'{limit:.1f}', left)
-    for side, angle in zip(('front', 'left', 'rear', 'right'), margins.stability.angle, strict=True):
+    for side, angle in zip(
+        ('front', 'left', 'rear', 'right'), margins.stability.angle, strict=True
+    ):
         least = math.degrees(settings.limits.tip_error)
         table.add_row(f'tip to the {side} (deg)', '', f'{least:.1f}', f'{math.degrees(angle):.1f}')
     return table
@@ -113,7 +120,7 @@ def watch(
 ) -> list['Status']:
     """Run the monitor in this process until it is interrupted; return the alerts it raised."""
     from ugv_acceptance.nodes.monitor import build
-    from ugv_acceptance.nodes.running import ros, spin
+    from ugv_acceptance.nodes.running import end, ros, spin
 
     lines = Lines(console, every)
     with ros(ros_args) as stop:
@@ -127,5 +134,5 @@ def watch(
                 node.bring_up()
                 node.create_timer(0.25, lambda: panel.draw(node), clock=node.steady)
                 spin(node, stop, until)
-        node.destroy_node()
+        end(node)
     return lines.alerts

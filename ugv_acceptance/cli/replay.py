@@ -39,7 +39,7 @@ def replay(
       ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.nodes.player import Play, player_of
-    from ugv_acceptance.nodes.running import ros
+    from ugv_acceptance.nodes.running import end, ros
 
     play = Play(bag, rate, loop, tuple(topics or ()), clock, restamp)
     with ros(ros_arguments(context)) as stop:
@@ -48,7 +48,7 @@ def replay(
             typer.echo(f'{topic} is not played: {reason}', err=True)
         player.wait_for_subscribers(stop)
         _play(player, stop)
-        player.node.destroy_node()
+        end(player.node)
     typer.echo(f'{player.published} messages of {len(player.publishers)} topics published')
 
 

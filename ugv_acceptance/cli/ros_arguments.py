@@ -1,4 +1,4 @@
-"""What stands behind --ros-args on the command line is handed to ROS: remaps, parameters, log levels."""
+"""What stands behind --ros-args is handed to ROS: remaps, parameters, log levels."""
 
 import typer
 

@@ -23,6 +23,8 @@ SLOWEST = 10.0
 LEVEL = math.radians(15)
 # A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
 OUTSIDE = 0.1
+# An arm or flipper joint (rad) that has turned further is more likely told in degrees.
+MANY_TURNS = 2 * math.tau
 Vector = tuple[float, float, float]
 
 
@@ -72,7 +74,9 @@ def _topic(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
             yield Finding(FAIL, name, f'QoS of {node} does not match: {reason}', do)
     if len(heard.publishers) > 1:
         nodes = ', '.join(sorted(node for node, _, _ in heard.publishers))
-        yield Finding(WARN, name, f'{heard.topic} has several publishers: {nodes}', 'stop all but one')
+        yield Finding(
+            WARN, name, f'{heard.topic} has several publishers: {nodes}', 'stop all but one'
+        )
     if heard.malformed:
         text = f'{len(heard.malformed)} messages cannot be decoded: {heard.malformed[-1]}'
         yield Finding(FAIL, name, text, 'check the version of the message type at the publisher')
@@ -91,7 +95,9 @@ def _rate(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
     if rate < SLOWEST:
         yield Finding(WARN, name, text, f'raise the rate to at least {SLOWEST:g} Hz')
     elif worst > max(3 / rate, 0.1):
-        yield Finding(WARN, name, text, 'such gaps are STALE to the monitor: check load and network')
+        yield Finding(
+            WARN, name, text, 'such gaps are STALE to the monitor: check load and network'
+        )
     else:
         yield Finding(OK, name, text)
     yield from _clock(name, heard)
@@ -121,7 +127,9 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
     }
     missing = sorted(set(wanted) - names)
     if missing:
-        do = f'set joints.<joint>.topic_name; the topic has {", ".join(sorted(names)) or "no names"}'
+        do = (
+            f'set joints.<joint>.topic_name; the topic has {", ".join(sorted(names)) or "no names"}'
+        )
         yield Finding(FAIL, 'joint names', f'not on the topic: {", ".join(missing)}', do)
     else:
         text = f'all {len(wanted)} of the robot, {len(names) - len(wanted)} others'
@@ -138,13 +146,20 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
             text = f'at {q:.3f}, limits {joint.lower:.3f} to {joint.upper:.3f}'
             do = f'check joints.{name}.sign and offset; are degrees sent in place of radians?'
             yield Finding(FAIL, name, text, do)
+        elif joint.kind != 'prismatic' and abs(q) > MANY_TURNS:
+            text = f'at {q:.1f} rad, {abs(q) / math.tau:.0f} turns'
+            yield Finding(WARN, name, text, 'are degrees sent in place of radians?')
 
 
 def _imu(samples: Sequence[ImuSample], config: Config) -> Iterator[Finding]:
     imu, g = config.settings.imu, config.settings.robot.gravity
     spin = median(math.hypot(*sample.angular_velocity) for sample in samples)
     if not spin <= imu.rest_rate:
-        text = f'the robot turns at {spin:.2f} rad/s' if spin == spin else 'angular velocity is NaN'
+        text = (
+            'angular velocity is NaN'
+            if math.isnan(spin)
+            else f'the robot turns at {spin:.2f} rad/s'
+        )
         yield Finding(WARN, 'imu', f'{text}: gravity cannot be judged', 'let it stand still')
         return
     ax, ay, az = (fmean(sample.linear_acceleration[k] for sample in samples) for k in range(3))
@@ -167,7 +182,9 @@ def _gravity(size: float, g: float) -> Finding:
     if abs(size - 1.0) <= 0.15:
         return Finding(FAIL, about, seen, 'it is in g: let the driver send m/s2 (REP-145)')
     if size <= 0.15 * g:
-        return Finding(FAIL, about, seen, 'gravity is removed: let the driver send raw acceleration')
+        return Finding(
+            FAIL, about, seen, 'gravity is removed: let the driver send raw acceleration'
+        )
     return Finding(FAIL, about, seen, f'expected {g:.2f}: calibrate it, or check its unit')
 
 

@@ -27,7 +27,7 @@ class Follower:
         """Return whether any alert was raised or cleared since `take`."""
         if len(self.log) != self._seen:
             return True
-        return any([alert.end is not None for alert in self.open])
+        return any(alert.end is not None for alert in self.open)
 
     def take(self) -> list[tuple[Alert, str]]:
         """Return what changed: alerts with raised or cleared, in that order for each."""

@@ -23,7 +23,7 @@ _DURABILITY = {
 
 
 def qos_of(topic: Topic, depth: int) -> QoSProfile:
-    """Return the QoS of an input. No deadline is asked for: publishers without one would not match."""
+    """Return the QoS of an input: no deadline, for publishers without one would not match."""
     return QoSProfile(
         depth=max(depth, topic.depth),
         reliability=_RELIABILITY[topic.reliability],

@@ -1,4 +1,4 @@
-"""What can be heard of a robot in a few seconds: who publishes what, and samples of it, for `doctor`."""
+"""What can be heard of a robot in a few seconds: who publishes what, and samples of it."""
 
 import os
 import time
@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 from rclpy.utilities import get_rmw_implementation_identifier
@@ -22,6 +20,8 @@ from ugv_acceptance.nodes.running import ros, spin
 
 # Samples of an input that are kept.
 KEPT = 5000
+# Seconds until all publishers should be known; then the listening begins.
+DISCOVERY = 4.0
 
 
 @dataclass(slots=True)
@@ -72,8 +72,14 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
         node = Node('doctor')
         joints = _subscribe(node, topics.joint_states, Decoder(JOINT_STATE))
         imu = _subscribe(node, topics.imu, Decoder(IMU))
+        began = time.monotonic()
+
+        def found_all() -> bool:
+            all_there = all(node.count_publishers(heard.topic) for heard in (joints, imu))
+            return all_there or time.monotonic() > began + DISCOVERY
+
+        spin(node, stop, found_all)
         end = time.monotonic() + seconds
-        node.create_timer(0.1, lambda: None, clock=Clock(clock_type=ClockType.STEADY_TIME))
         spin(node, stop, lambda: time.monotonic() >= end)
         for heard, topic in ((joints, topics.joint_states), (imu, topics.imu)):
             _look(node, heard, topic)
@@ -103,12 +109,16 @@ def _distribution() -> str:
 
 def _subscribe(node: Node, topic: Topic, decoder: Decoder[Any]) -> Heard:
     heard = Heard(node.resolve_topic_name(topic.name), topic.type)
+
+    def take(data: Any) -> None:  # noqa: ANN401 - bytes, for it is raw
+        heard.take(decoder.one, data)
+
     # Best effort, volatile: hears every publisher, whatever the configuration says.
     anything = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
     node.create_subscription(
         message_type(topic.type),
         topic.name,
-        lambda data: heard.take(decoder.one, data),
+        take,
         anything,
         raw=True,
     )

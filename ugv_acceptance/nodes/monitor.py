@@ -19,7 +19,6 @@ from std_srvs.srv import Trigger
 
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config, load
-from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.nodes.inputs import Inputs
 from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
@@ -40,9 +39,7 @@ Listener = Callable[[str, Status], None]
 class Monitor(LifecycleNode):
     """The monitor. `listener` hears all verdicts and changes of alerts, for a console."""
 
-    def __init__(
-        self, listener: Listener = lambda _kind, _status: None, **node: Any
-    ) -> None:
+    def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
         super().__init__(NAME, **node)
         self.listener = listener
         self.config: Config | None = None
@@ -256,14 +253,17 @@ class Monitor(LifecycleNode):
         """Refuse a set as a whole, with the reason; what it would change is not touched here."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
-            fixed = [name for name in AT_REST if name in values and self.session is not None]
-            if fixed:
-                raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
+            self._check_at_rest(values)
             if self._settings is not None:
                 changed(self._settings, self.knobs, values)
         except (BadConfig, TypeError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _check_at_rest(self, values: dict[str, Any]) -> None:
+        fixed = [name for name in AT_REST if name in values and self.session is not None]
+        if fixed:
+            raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         values = {parameter.name: parameter.value for parameter in parameters}
@@ -280,9 +280,7 @@ class Monitor(LifecycleNode):
             self._margins.limits = self._settings.limits.torque
 
 
-def build(
-    config: str | None, urdf: str | None, listener: Listener
-) -> Monitor:
+def build(config: str | None, urdf: str | None, listener: Listener) -> Monitor:
     """Return a monitor of a robot; None: what the ROS arguments say."""
     given = {'config': config, 'urdf': urdf}
     overrides = [Parameter(name, value=value) for name, value in given.items() if value]

@@ -90,8 +90,8 @@ class MarginOutput:
             self._publishers[1].publish(self._joints.fill(stamp, margins.q, left))
         if tip:
             found = margins.stability
-            data = self._sides.fill(stamp, found.angle, found.moment)
-            self._publishers[2].publish(data)
+            angle, moment = map(float, found.angle), map(float, found.moment)
+            self._publishers[2].publish(self._sides.fill(stamp, tuple(angle), tuple(moment)))
 
     def destroy(self) -> None:
         """Take the topics away."""

@@ -1,7 +1,7 @@
 """Parameters: what can be set while the monitor runs, its ranges, and how it changes the settings.
 
-Names are those of the YAML file, units included. A set is checked as a whole and is wholly taken or
-wholly refused; `use ros2 param set` or, for several that belong together, set_parameters_atomically.
+Names are those of the YAML file, units included. A set is checked as a whole and is wholly taken
+or wholly refused; several values that belong together go into one set_parameters_atomically.
 """
 
 import math
@@ -22,7 +22,7 @@ NOT_JUDGED = 0.0
 
 @dataclass(frozen=True, slots=True)
 class Knob:
-    """A parameter: how it is read from settings and put into them. `lower` to `upper` is its range."""
+    """A parameter: how it is read from settings and put into them; its range."""
 
     name: str
     what: str
@@ -70,9 +70,9 @@ _TABLE: dict[str, tuple[str, str, float, float, float, str]] = {
     'limits.tip_deadband_deg': (
         'limits', 'tip_deadband', math.pi / 180, 0.0, 90.0, 'tilt above the limit that clears, deg',
     ),
-    'delays.tip_on_s': ('delays', 'tip_on', 1.0, 0.0, 10.0, 'how long before a tip-over alert, s'),
-    'delays.torque_on_s': ('delays', 'torque_on', 1.0, 0.0, 10.0, 'how long before a torque alert, s'),
-    'delays.fault_on_s': ('delays', 'fault_on', 1.0, 0.0, 10.0, 'how long before an input alert, s'),
+    'delays.tip_on_s': ('delays', 'tip_on', 1.0, 0.0, 10.0, 'how long before a tip-over alert'),
+    'delays.torque_on_s': ('delays', 'torque_on', 1.0, 0.0, 10.0, 'how long before a torque alert'),
+    'delays.fault_on_s': ('delays', 'fault_on', 1.0, 0.0, 10.0, 'how long before an input alert'),
     'delays.off_s': ('delays', 'off', 1.0, 0.0, 60.0, 'how long good before an alert clears, s'),
     'delays.stale_after_s': (
         'delays', 'stale_after', 1.0, 0.001, 60.0, 'shortest silence that is stale, s',
@@ -92,7 +92,7 @@ def knobs_of(settings: Settings) -> tuple[Knob, ...]:
     return (*(_field_knob(name, *row) for name, row in _TABLE.items()), *torque, *_CHOICES)
 
 
-def _field_knob(  # noqa: PLR0913, PLR0917 - a row of the table
+def _field_knob(
     name: str, part: str, key: str, unit: float, lower: float, upper: float, what: str
 ) -> Knob:
     def get(settings: Settings) -> float:
@@ -177,11 +177,9 @@ def changed(settings: Settings, knobs: Sequence[Knob], values: Mapping[str, Any]
             continue
         if isinstance(value, float) and not math.isfinite(value):
             raise BadConfig(f'{knob.name}: expected a finite number, got {value}')
-        if knob.lower is not None and knob.upper is not None:
-            if not knob.lower <= value <= knob.upper:
-                raise BadConfig(
-                    f'{knob.name}: expected {knob.lower:g} to {knob.upper:g}, got {value}'
-                )
+        lower, upper = knob.lower, knob.upper
+        if lower is not None and upper is not None and not lower <= value <= upper:
+            raise BadConfig(f'{knob.name}: expected {lower:g} to {upper:g}, got {value}')
         settings = knob.put(settings, value)
     _check(settings)
     return settings

@@ -91,16 +91,14 @@ class Player:
         time.sleep(SETTLING)
 
     def run(self, stop: Stop, progress: Callable[[float], None] = lambda _: None) -> None:
-        """Play until the end, or for ever with `loop`; `progress` takes seconds of the recording."""
+        """Play to the end, or for ever with `loop`; `progress` takes seconds of the recording."""
         clock = self.node.create_publisher(Clock, '/clock', 10) if self.play.clock else None
         while not stop.asked:
             self._once(stop, clock, progress)
             if not self.play.loop:
                 break
 
-    def _once(
-        self, stop: Stop, clock: Publisher | None, progress: Callable[[float], None]
-    ) -> None:
+    def _once(self, stop: Stop, clock: Publisher | None, progress: Callable[[float], None]) -> None:
         first, began = self.bag.start_ns, time.monotonic_ns()
         shift = time.time_ns() - first
         told = clocked = 0.0

@@ -18,6 +18,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import ok, try_shutdown
 
 from ugv_acceptance import AcceptanceError
 
@@ -42,7 +43,7 @@ def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
                 node.bring_up()
                 spin(node, stop)
             finally:
-                node.destroy_node()
+                end(node)
     except AcceptanceError as error:
         sys.stderr.write(f'ugv-acceptance: {error}\n')
         return BAD_INPUT
@@ -67,10 +68,15 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
     try:
         yield stop
     finally:
-        # The handlers stay until the end: a second Ctrl-C must not break the shutdown off.
-        rclpy.try_shutdown()
+        try_shutdown()
+        # Once asked to end, a second Ctrl-C must not break off what is left of it.
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_IGN if stop.asked else handler)
+
+
+def end(node: Node) -> None:
+    """Take a node down."""
+    node.destroy_node()
 
 
 def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
@@ -79,7 +85,7 @@ def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> N
     executor.add_node(node)
     never: Future = Future()
     try:
-        while rclpy.ok() and not stop.asked and not until():
+        while ok() and not stop.asked and not until():
             executor.spin_until_future_complete(never, timeout_sec=PATIENCE)
     finally:
         executor.remove_node(node)

@@ -32,8 +32,10 @@ class InputCount:
 
 @dataclass(slots=True)
 class Session:
-    """The evaluation of a running robot. `on_margins(stamp, margins)` is called for every message
-    that gave margins, with its own header stamp (ns); `on_change()` when alerts or level changed.
+    """The evaluation of a running robot.
+
+    `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
+    stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log.
     """
 
     settings: Settings

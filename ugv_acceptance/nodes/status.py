@@ -1,4 +1,4 @@
-"""What the monitor says of itself: verdict and diagnostics as plain values, ready to be published."""
+"""What the monitor says: verdict and diagnostics as plain values, ready to be published."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ class Status:
 
 
 def worst_joint(margins: Margins, settings: Settings) -> tuple[str, float]:
-    """Return the joint that uses most of its limit, and how much (1 is all); '' where none has one."""
+    """Return the joint that uses most of its limit, and its share; '' where none has a limit."""
     joints = zip(settings.robot.joint_names, margins.torque, settings.limits.torque, strict=True)
     uses = [(name, abs(tau) / limit) for name, tau, limit in joints if math.isfinite(limit)]
     return max(uses, key=lambda use: use[1], default=('', 0.0))
@@ -31,7 +31,8 @@ def worst_joint(margins: Margins, settings: Settings) -> tuple[str, float]:
 
 def least_tilt(margins: Margins) -> tuple[str, float]:
     """Return the side to which least tilt is left, and how much (rad); NaN where none is known."""
-    known = [(s, a) for s, a in zip(SIDES, margins.stability.angle, strict=True) if a == a]
+    angles = map(float, margins.stability.angle)
+    known = [(s, a) for s, a in zip(SIDES, angles, strict=True) if not math.isnan(a)]
     return min(known, key=lambda side: side[1], default=('', math.nan))
 
 

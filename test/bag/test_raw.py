@@ -1,0 +1,95 @@
+"""Messages of a recording as they were serialised, against rosbags and against what was written."""
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from bag.bag_cases import run, write_mcap
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from ugv_acceptance.bag.cdr import imu_decoder
+from ugv_acceptance.bag.raw import Logged, Offered, messages, offered
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.writer import BagWriter, Qos
+
+BAGS = (
+    'abitobot',
+    'rosbag2_recorded/default',
+    'rosbag2_recorded/split',
+    'rosbag2_recorded/zstd_small',
+    'rosbag2/rosbag2_tests/resources/sqlite3/cdr_test',
+)
+
+
+def of_rosbags(path: Path) -> Counter[tuple[int, str, bytes]]:
+    """Return all messages as rosbags reads them."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with AnyReader([path], default_typestore=store) as reader:
+        return Counter((time, c.topic, bytes(data)) for c, time, data in reader.messages())
+
+
+@pytest.mark.parametrize('name', BAGS)
+def test_all_messages_are_those_rosbags_reads(shared_bags: Path, name: str) -> None:
+    """Every message of every topic, with its log time, in order of log time."""
+    path = shared_bags / name
+    bag = open_bag(path)
+    ours = list(messages(bag, bag.topics))
+    assert [m.log_time for m in ours] == sorted(m.log_time for m in ours)
+    assert Counter(map(tuple, ours)) == of_rosbags(path)
+
+
+def test_ros_1_messages_become_cdr(shared_bags: Path) -> None:
+    """A ROS 1 Imu turned into CDR holds the numbers that rosbags reads from the original."""
+    path = shared_bags / 'robot_localization' / 'robot_localization_test2.bag'
+    bag, decoder = open_bag(path), imu_decoder()
+    topic = next(name for name, topic in bag.topics.items() if topic.type.endswith('/Imu'))
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS1_NOETIC)) as reader:
+        theirs = [
+            (time, vars(vars(reader.deserialize(data, c.msgtype))['linear_acceleration']))
+            for c, time, data in reader.messages()
+            if c.topic == topic
+        ]
+    ours = [(m.log_time, decoder.one(m.data)) for m in messages(bag, [topic])]
+    assert len(ours) == len(theirs) > 3000
+    for (our_time, sample), (time, force) in zip(ours, theirs, strict=True):
+        assert our_time == time
+        assert sample.linear_acceleration == (force['x'], force['y'], force['z'])
+
+
+def test_a_recording_comes_back_in_order(tmp_path: Path) -> None:
+    """What is written, chunk by chunk, is what is read."""
+    written = run(300)
+    path = write_mcap(tmp_path / 'run.mcap', written)
+    topics = {topic for topic, *_ in written}
+    expected = sorted((Logged(time, topic, data) for topic, _, time, data in written))
+    assert sorted(messages(open_bag(path), topics)) == expected
+
+
+def test_only_the_topics_asked_for_are_read(tmp_path: Path) -> None:
+    """Other topics are left out."""
+    written = run(50)
+    path = write_mcap(tmp_path / 'run.mcap', written)
+    one = written[0][0]
+    assert {message.topic for message in messages(open_bag(path), [one])} == {one}
+
+
+def test_the_quality_of_service_is_that_of_the_recorder(tmp_path: Path) -> None:
+    """Reliability and durability come from metadata.yaml."""
+    path = tmp_path / 'run'
+    with BagWriter(path) as writer:
+        writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos('best_effort', 'transient_local'))
+        writer.add_topic('/b', 'sensor_msgs/msg/Imu', Qos())
+    found = offered(open_bag(path))
+    assert found == {'/a': Offered('best_effort', 'transient_local'), '/b': Offered()}
+
+
+def test_metadata_of_any_kind_is_survived(tmp_path: Path) -> None:
+    """Where metadata.yaml says nothing useful, nothing is known."""
+    path = tmp_path / 'run'
+    with BagWriter(path) as writer:
+        writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos())
+    bag = open_bag(path)
+    for text in ('', '[]', 'rosbag2_bagfile_information: 3', '{', 'a: &a [*a]'):
+        (path / 'metadata.yaml').write_text(text)
+        assert offered(bag) == {}

@@ -1,0 +1,166 @@
+"""The doctor: what it says of set-ups with one thing wrong each, and of a real one."""
+
+import math
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from nodes.live_case import FOLDED, NAMES, Live, imu, joints
+
+from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
+from ugv_acceptance.config import load
+from ugv_acceptance.nodes.examination import FAIL, OK, WARN, Finding, examine
+from ugv_acceptance.nodes.listening import Heard, Surroundings
+
+CONFIG = load()
+MS = 1_000_000
+T0 = 1_700_000_000_000 * MS
+
+
+def joint_state(**changes: Any) -> JointStateSample:
+    """Return a sample of a healthy driver, with changes."""
+    return JointStateSample(T0, '', NAMES, FOLDED, (), ())._replace(**changes)
+
+
+def imu_sample(**changes: Any) -> ImuSample:
+    """Return a sample of a healthy IMU on a robot that stands level, with changes."""
+    up = (0.01, 0.0, 0.0, math.sqrt(1 - 1e-4))
+    force = (0.0, 9.81 * 0.02, 9.81)
+    return ImuSample(T0, 'imu_link', up, (0.0,) * 3, force, 0.0, 0.0, 0.0)._replace(**changes)
+
+
+def heard(name: str, kind: str, sample: Any, period: int) -> Heard:
+    """Return a hundred messages at a steady rate from one publisher."""
+    times = [T0 + k * period for k in range(100)]
+    samples = [sample._replace(stamp=sample.stamp + k * period) for k in range(100)]
+    return Heard(name, kind, [('/driver', kind, '')], [], times, samples)
+
+
+def healthy(joint: Any = None, inertial: Any = None) -> Surroundings:
+    """Return surroundings in which all is well, but for the samples given."""
+    joint_states = heard(
+        '/joint_states', 'sensor_msgs/msg/JointState', joint or joint_state(), 5 * MS
+    )
+    imus = heard('/imu/data', 'sensor_msgs/msg/Imu', inertial or imu_sample(), 2 * MS)
+    return Surroundings('jazzy', 'rmw', '0', 'SUBNET', [], 1.0, joint_states, imus)
+
+
+def findings(around: Surroundings) -> list[Finding]:
+    """Return what is not OK."""
+    return [found for found in examine(around, CONFIG) if found.level != OK]
+
+
+def test_a_healthy_set_up_has_no_finding() -> None:
+    """Everything is OK, and each check says so."""
+    assert findings(healthy()) == []
+    assert len(list(examine(healthy(), CONFIG))) >= 9
+
+
+@pytest.mark.parametrize(
+    ('change', 'level', 'advice'),
+    [
+        ({'linear_acceleration': (0.0, 0.0, 1.0)}, FAIL, 'in g'),
+        ({'linear_acceleration': (0.0, 0.0, 0.0)}, FAIL, 'gravity is removed'),
+        ({'linear_acceleration': (0.0, 0.0, -9.81)}, FAIL, 'mounting'),
+        ({'linear_acceleration': (9.81, 0.0, 0.0)}, WARN, 'mounting'),
+        ({'linear_acceleration': (0.0, 0.0, 12.0)}, FAIL, 'calibrate'),
+        ({'angular_velocity': (0.0, 0.0, 1.0)}, WARN, 'still'),
+        ({'angular_velocity': (math.nan,) * 3}, WARN, 'still'),
+        ({'orientation_covariance_0': -1.0}, WARN, 'attitude'),
+        ({'orientation': (0.0, 0.0, 0.0, 1.0)}, WARN, 'attitude'),
+        ({'orientation': (0.0, 0.0, 0.0, 0.0)}, FAIL, 'attitude'),
+        ({'orientation': (0.5, 0.0, 0.0, 196.0)}, FAIL, 'attitude'),
+        ({'orientation': (math.sin(0.4), 0.0, 0.0, math.cos(0.4))}, FAIL, 'axes'),
+        ({'frame_id': 'camera_imu'}, WARN, 'mounting'),
+        ({'stamp': T0 - 9 * 86400 * 1000 * MS}, WARN, 'synchronise'),
+    ],
+)
+def test_what_is_wrong_with_an_imu_is_named(
+    change: dict[str, Any], level: str, advice: str
+) -> None:
+    """Unit, sign, mounting, orientation, frame, clock: each a line with what to do."""
+    found = findings(healthy(inertial=imu_sample(**change)))
+    assert [f for f in found if f.level == level and advice in f.do], found
+
+
+@pytest.mark.parametrize(
+    ('change', 'level', 'about', 'advice'),
+    [
+        ({'names': ('a', 'b', 'c', 'd')}, FAIL, 'joint names', 'topic_name'),
+        ({'names': ()}, FAIL, 'joint names', 'no names'),
+        ({'position': (0.0, 114.6, 0.0, 0.0)}, WARN, 'shoulder_joint', 'degrees'),
+    ],
+)
+def test_what_is_wrong_with_joints_is_named(
+    change: dict[str, Any], level: str, about: str, advice: str
+) -> None:
+    """Names that do not fit and positions that cannot be: each a line with what to do."""
+    found = findings(healthy(joint=joint_state(**change)))
+    assert [f for f in found if (f.level, f.about) == (level, about) and advice in f.do], found
+
+
+@pytest.mark.parametrize(
+    ('change', 'level', 'advice'),
+    [
+        ({'publishers': [], 'alike': []}, FAIL, 'start its driver'),
+        ({'publishers': [], 'alike': ['/arm/joint_states']}, FAIL, 'arm/joint_states'),
+        ({'publishers': [('/d', 'std_msgs/msg/String', '')]}, FAIL, 'another topic'),
+        ({'publishers': [('/d', 'sensor_msgs/msg/JointState', 'reliability')]}, FAIL, 'qos'),
+        ({'publishers': [('/d', 'sensor_msgs/msg/JointState', '')] * 2}, WARN, 'stop'),
+        ({'malformed': ['name[0]: needs bytes 8..12']}, FAIL, 'version'),
+        ({'times': [T0]}, FAIL, 'driver'),
+        ({'times': [T0 + k * 500 * MS for k in range(9)]}, WARN, 'raise the rate'),
+        ({'times': [T0 + k * 5 * MS + (k > 50) * 900 * MS for k in range(99)]}, WARN, 'load'),
+    ],
+)
+def test_what_is_wrong_with_a_topic_is_named(
+    change: dict[str, Any], level: str, advice: str
+) -> None:
+    """Absent, of another type, not matching, shared, slow, with gaps: each with what to do."""
+    around = healthy()
+    changed = replace(around, joint_states=replace(around.joint_states, **change))
+    found = findings(changed)
+    assert [f for f in found if f.level == level and advice in f.do], found
+
+
+def doctor(*options: str) -> 'subprocess.Popen[str]':
+    """Start the verb in a process of its own."""
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    code = 'from ugv_acceptance.cli import main; main()'
+    return subprocess.Popen(
+        [sys.executable, '-c', code, 'doctor', *options],
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_it_says_that_nobody_publishes() -> None:
+    """Without a robot both inputs fail with advice, and the exit code is 1."""
+    process = doctor('--seconds', '0.5')
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'nobody publishes /joint_states' in text
+    assert 'nobody publishes /imu/data' in text
+
+
+def test_it_hears_a_real_robot(live: Live) -> None:
+    """A driver that sends both inputs is found healthy but for its default orientation."""
+    driver = live.driver()
+    process = doctor('--seconds', '2')
+
+    def send() -> None:
+        driver.joints.publish(joints())
+        driver.imu.publish(imu(0.05))
+
+    end = time.monotonic() + 60
+    live.until(lambda: process.poll() is not None or time.monotonic() > end, send)
+    text, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, text
+    assert 'OK   joint names: all 4' in text
+    assert 'OK   imu gravity' in text
+    assert 'OK   imu orientation' in text

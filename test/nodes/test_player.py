@@ -1,0 +1,146 @@
+"""The player: every message, its bytes, order, quality of service and time."""
+
+import struct
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nodes.live_case import Live, joints
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from ugv_acceptance import BadBag, BadConfig
+from ugv_acceptance.bag.raw import Offered
+from ugv_acceptance.bag.writer import BagWriter, Qos
+from ugv_acceptance.nodes.player import Play, Player, qos_of, restamped
+from ugv_acceptance.nodes.running import Stop
+
+NS = 1_000_000_000
+T0 = 1_700_000_000 * NS
+
+
+def write(folder: Path, count: int = 40, period: int = 5_000_000) -> tuple[Path, list[bytes]]:
+    """Record joint states, and an Imu topic that is best effort; return the former."""
+    path = folder / 'run'
+    sent = [joints((0.1, 0.01 * k, 0.0, 0.0), T0 + k * period) for k in range(count)]
+    with BagWriter(path) as writer:
+        writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState', Qos())
+        quick = Qos(reliability='best_effort')
+        writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu', quick)
+        for k, data in enumerate(sent):
+            writer.write('/joint_states', T0 + k * period, data)
+    return path, sent
+
+
+def listener(live: Live, heard: list[bytes]) -> Node:
+    """Return a node that keeps every JointState as bytes."""
+    node: Node = live.add(Node('listener'))
+    qos = qos_of(Offered())
+    node.create_subscription(JointState, 'joint_states', heard.append, qos, raw=True)
+    return node
+
+
+def player(live: Live, play: Play) -> Player:
+    """Return a player that somebody listens to."""
+    return Player(live.add(Node('bag_player')), play)
+
+
+def play_all(live: Live, play: Play) -> list[bytes]:
+    """Play to a listener; return what it heard."""
+    heard: list[bytes] = []
+    listener(live, heard)
+    player_ = player(live, play)
+    player_.wait_for_subscribers(Stop())
+    player_.run(Stop())
+    live.until(lambda: len(heard) >= player_.published)
+    return heard
+
+
+def test_every_message_comes_as_it_was_recorded(live: Live, tmp_path: Path) -> None:
+    """Bytes and order are those of the recording."""
+    path, sent = write(tmp_path)
+    assert play_all(live, Play(path)) == sent
+
+
+def test_topics_can_be_chosen(live: Live, tmp_path: Path) -> None:
+    """Only the topics asked for are played."""
+    path, _ = write(tmp_path)
+    assert list(player(live, Play(path, topics=('/imu/data',))).publishers) == ['/imu/data']
+
+
+def test_the_recorded_quality_of_service_is_offered(live: Live, tmp_path: Path) -> None:
+    """A topic that was best effort is offered as best effort, a reliable one as reliable."""
+    path, _ = write(tmp_path)
+    playing = player(live, Play(path))
+    offered = {
+        topic: playing.node.get_publishers_info_by_topic(topic)[0].qos_profile
+        for topic in ('/joint_states', '/imu/data')
+    }
+    assert offered['/joint_states'].reliability == ReliabilityPolicy.RELIABLE
+    assert offered['/imu/data'].reliability == ReliabilityPolicy.BEST_EFFORT
+    assert offered['/imu/data'].durability == DurabilityPolicy.VOLATILE
+
+
+def test_restamped_messages_carry_the_time_of_replay(live: Live, tmp_path: Path) -> None:
+    """All stamps move by the same time, to now; all other bytes stay."""
+    path, sent = write(tmp_path)
+    before = time.time_ns()
+    heard = play_all(live, Play(path, restamp=True))
+    shifts = {stamp_of(a) - stamp_of(b) for a, b in zip(heard, sent, strict=True)}
+    assert len(shifts) == 1
+    assert before <= stamp_of(heard[0]) <= time.time_ns()
+    assert [data[12:] for data in heard] == [data[12:] for data in sent]
+
+
+def stamp_of(data: bytes) -> int:
+    """Return the header stamp (ns)."""
+    sec, nanosec = struct.unpack_from('<iI', data, 4)
+    return int(sec) * NS + int(nanosec)
+
+
+@given(st.integers(0, 2**31 - 1), st.integers(0, NS - 1), st.integers(-(2**40), 2**40))
+def test_a_stamp_moves_by_the_shift(sec: int, nanosec: int, shift: int) -> None:
+    """The stamp moves by the shift, but not before 1970."""
+    stamp = sec * NS + nanosec
+    moved = stamp_of(restamped(joints(stamp=stamp), shift))
+    assert moved == max(stamp + shift, 0) or stamp + shift >= 2**31 * NS
+
+
+@pytest.mark.parametrize(
+    ('play', 'error', 'text'),
+    [
+        ({'rate': 0.0}, BadConfig, 'rate'),
+        ({'topics': ('/nothing',)}, BadBag, '/joint_states'),
+        ({'bag': Path('/nowhere')}, BadBag, '/nowhere'),
+    ],
+)
+def test_what_cannot_be_played_is_refused(
+    live: Live, tmp_path: Path, play: dict[str, Any], error: type[Exception], text: str
+) -> None:
+    """A rate of nothing, a topic or a recording that is not there: one sentence."""
+    path, _ = write(tmp_path)
+    with pytest.raises(error, match=text):
+        player(live, Play(**({'bag': path} | play)))
+
+
+def test_a_stopped_player_ends_at_once(live: Live, tmp_path: Path) -> None:
+    """Asked to stop it publishes no more."""
+    path, _ = write(tmp_path, count=10, period=NS * 100)
+    playing = player(live, Play(path))
+    stop = Stop(asked=True)
+    playing.run(stop)
+    assert playing.published == 0
+
+
+def test_it_tells_how_far_it_is(live: Live, tmp_path: Path) -> None:
+    """Progress goes up to the length of the recording."""
+    path, _ = write(tmp_path)
+    playing = player(live, Play(path, rate=10.0))
+    seen: list[float] = []
+    playing.run(Stop(), seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == pytest.approx(playing.bag.duration_s)

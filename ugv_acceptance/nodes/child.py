@@ -1,0 +1,54 @@
+"""A node in a process of its own that ends when its parent does, even one that was killed.
+
+`python -m ugv_acceptance.nodes.child simulator --ros-args ...`: standard input is the parent's pipe.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import import_module
+
+# Seconds to end by itself before it is killed.
+PATIENCE = 5.0
+
+
+@contextmanager
+def child(
+    module: str, ros_args: list[str], environment: Mapping[str, str] | None = None
+) -> Iterator['subprocess.Popen[bytes]']:
+    """Run the node of ugv_acceptance.nodes.MODULE until the block is left."""
+    # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
+    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    command = [sys.executable, '-m', 'ugv_acceptance.nodes.child', module, *ros_args]
+    process = subprocess.Popen(  # noqa: S603 - our own module
+        command, stdin=subprocess.PIPE, env={**env, **(environment or {})}
+    )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _end_with_parent() -> None:
+    while sys.stdin.buffer.read(1024):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+
+
+def main() -> None:
+    """Run the node named by the first argument."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    import_module(f'ugv_acceptance.nodes.{sys.argv[1]}').main(sys.argv[2:])
+
+
+if __name__ == '__main__':
+    main()
