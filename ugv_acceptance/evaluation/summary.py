@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.alarm_rates import rates_result
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
@@ -115,6 +116,7 @@ def result_of(
         },
         'stability': _stability_result(summary, start),
         'alerts': [alert_result(alert, settings, start) for alert in ordered(alerts)],
+        'alarm_rates': rates_result([alert.start for alert in alerts], start, duration),
     }
 
 
