@@ -105,10 +105,10 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
         )
     if demand.signal == 'tip_angle':
         degrees = math.degrees(worst.value)
-        return (
-            f'{degrees:.1f} degrees of tilt left before it tips to the {worst.subject} {at}; '
-            f'{must} ({spent})'
-        )
+        where = f'of tilt left before it tips to the {worst.subject}'
+        if degrees < 0.0:
+            where = f'past its tipping point to the {worst.subject}'
+        return f'{abs(degrees):.1f} degrees {where} {at}; {must} ({spent})'
     subject = '' if worst.subject == 'robot' else f' of {worst.subject}'
     words = SIGNALS[demand.signal].words
     return f'{words}{subject} was {number(worst.value, demand, settings)} {at}; {must} ({spent})'

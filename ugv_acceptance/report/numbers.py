@@ -21,7 +21,7 @@ def _in_unit(value: float | None, measured: Json) -> str:
         return DASH
     if measured['signal'] == 'torque_utilisation':
         return f'{value:.1%}'
-    return f'{value:.4g} {measured["unit"]}'.strip()
+    return f'{value:.{measured.get("digits", 4)}g} {measured["unit"]}'.strip()
 
 
 def worst_text(measured: Json) -> str:
@@ -51,7 +51,7 @@ def limit_text(measured: Json) -> str:
 def bound_text(measured: Json) -> str:
     """Return the uncertainty of a worst value; a dash where none is known."""
     bound = measured.get('uncertainty')
-    return DASH if not bound else f'± {_in_unit(bound["bound"], measured)}'
+    return DASH if not bound else _in_unit(bound['bound'], {**measured, 'digits': 2})
 
 
 def interval_text(found: Json | None, unit: str = '') -> str:
@@ -59,4 +59,9 @@ def interval_text(found: Json | None, unit: str = '') -> str:
     if found is None:
         return DASH
     half = (found['high'] - found['low']) / 2.0
-    return f'{found["value"]:.3g} ± {half:.2g} {unit}'.strip()
+    return f'{_short(found["value"])} ± {_short(half)} {unit}'.strip()
+
+
+def _short(value: float) -> str:
+    """Return a number of two places after the point, or three digits of a large one."""
+    return f'{value:.2f}' if abs(value) < 100.0 else f'{value:.3g}'

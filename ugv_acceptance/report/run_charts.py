@@ -72,7 +72,7 @@ def _draw_torque(
         axes.plot(time[picks], 100.0 * share, color=colour, linestyle=dashes, lw=1.1, label=name)
     _limit(axes, 100.0 * settings.limits.torque_error, 'limit')
     axes.axhline(100.0 * settings.limits.torque_warn, color='#777777', lw=0.7, ls=':')
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_ylabel('torque (% of limit)')
     if joints:
         axes.legend(loc='upper left', ncols=3, fontsize=7.0)

@@ -1,0 +1,142 @@
+"""`ugv-acceptance verify`: compute a result again from its recording, and compare everything."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ugv_acceptance import AcceptanceError
+
+Json = dict[str, Any]
+
+# Relative difference of numbers that is rounding of another machine's arithmetic.
+ROUNDING = 1e-9
+MOST_SHOWN = 12
+
+
+def verify(
+    result_file: Annotated[
+        Path, typer.Argument(metavar='RESULT', help='The JSON file that evaluate --json wrote.')
+    ],
+    bag: Annotated[
+        list[Path] | None, typer.Option(help='The recording, where it is not where it was.')
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option('--config', '-c', help="The robot's YAML file, likewise.")
+    ] = None,
+    urdf: Annotated[Path | None, typer.Option(help='The URDF, likewise.')] = None,
+    criteria: Annotated[Path | None, typer.Option(help='The criteria, likewise.')] = None,
+) -> None:
+    """Verify a result: everything is computed again; hashes, verdicts and numbers are compared.
+
+    The exit code is 0 where all agree, 1 where anything differs, 2 for bad input.
+
+    \b
+    Examples:
+      ugv-acceptance verify result.json
+      ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    told = read_result(result_file)
+    found = again(told, bag, config, urdf, criteria)
+    differences = compare(told, found)
+    for line in differences[:MOST_SHOWN]:
+        typer.echo(f'  {line}')
+    if len(differences) > MOST_SHOWN:
+        typer.echo(f'  and {len(differences) - MOST_SHOWN} more')
+    if differences:
+        typer.echo(f'[X] DIFFERS  {result_file}: {len(differences)} differences')
+        raise typer.Exit(1)
+    typer.echo(
+        f'[OK] VERIFIED  {result_file}: the same hashes, verdicts and numbers ({told["verdict"]})'
+    )
+
+
+def read_result(path: Path) -> Json:
+    """Return a result of one recording. Raises AcceptanceError where it is none of ours."""
+    import json
+
+    from ugv_acceptance.bag.judge import RESULT_VERSION
+
+    try:
+        told = json.loads(path.read_text('utf-8'))
+    except OSError as error:
+        raise AcceptanceError(f'{path}: expected a result, got: {error.strerror}') from None
+    except (ValueError, RecursionError) as error:
+        raise AcceptanceError(f'{path}: expected JSON, got: {str(error)[:100]}') from None
+    if not isinstance(told, dict):
+        raise AcceptanceError(f'{path}: expected the result of one recording, got a list or less')
+    if told.get('version') != RESULT_VERSION:
+        raise AcceptanceError(
+            f'{path}: expected a result of version {RESULT_VERSION}, got {told.get("version")!r}'
+        )
+    for key, kind in (('bag', dict), ('robot', dict), ('criteria', dict), ('verdict', str)):
+        if not isinstance(told.get(key), kind):
+            raise AcceptanceError(f'{path}: {key}: expected a result of evaluate, got none')
+    return told
+
+
+def again(
+    told: Json,
+    bag: list[Path] | None,
+    config: Path | None,
+    urdf: Path | None,
+    criteria: Path | None,
+) -> Json:
+    """Return the result computed again, from the places it names unless others are given."""
+    import json
+
+    from ugv_acceptance.cli.evidence import Papers, judge_files
+    from ugv_acceptance.config import load
+
+    try:
+        paths = bag or [Path(path) for path in told['bag']['path']]
+        robot, named = told['robot'], told['criteria']['path']
+        loaded = load(config or Path(robot['config']), urdf=urdf or Path(robot['urdf']))
+    except (KeyError, TypeError) as error:
+        raise AcceptanceError(f'expected a result of evaluate; there is no {error}') from None
+    papers = Papers(criteria=criteria or (None if named is None else Path(named)))
+    result, _ = judge_files(paths, loaded, papers, compare_effort='effort' in told)
+    found: Json = json.loads(json.dumps(result, default=str))
+    return found
+
+
+# Where a file lies, what computed it and what a person entered may differ.
+_FREE: set[tuple[str, ...]] = {
+    ('bag', 'path'),
+    ('robot', 'config'),
+    ('robot', 'urdf'),
+    ('criteria', 'path'),
+}
+_FREE |= {('software',), ('identity',), ('robot', 'warnings')}
+
+
+def compare(told: Any, found: Any, path: tuple[str, ...] = ()) -> list[str]:  # noqa: ANN401 - JSON
+    """Return one line for everything that differs between two results; hashes come first."""
+    if path in _FREE:
+        return []
+    where = '.'.join(path) or 'result'
+    if isinstance(told, dict) and isinstance(found, dict):
+        keys = sorted({*told, *found}, key=str)
+        lines = [
+            line
+            for key in keys
+            for line in compare(told.get(key), found.get(key), (*path, str(key)))
+        ]
+        return sorted(lines, key=lambda line: 'sha256' not in line.split(':', 1)[0])
+    if isinstance(told, list) and isinstance(found, list):
+        if len(told) != len(found):
+            return [f'{where}: {len(told)} in the result, {len(found)} computed again']
+        pairs = enumerate(zip(told, found, strict=True))
+        return [line for k, (a, b) in pairs for line in compare(a, b, (*path, str(k)))]
+    return (
+        [] if _same(told, found) else [f'{where}: {told!r} in the result, {found!r} computed again']
+    )
+
+
+def _same(told: object, found: object) -> bool:
+    numbers = (int, float)
+    if isinstance(told, bool) or isinstance(found, bool):
+        return told is found
+    if isinstance(told, numbers) and isinstance(found, numbers):
+        return abs(told - found) <= ROUNDING * max(1.0, abs(told), abs(found))
+    return told == found
