@@ -99,7 +99,7 @@ class EffortComparison:
         return Plateau(int(time[0]), int(time[-1]), measured, model, slope, payload, saturated)
 
     def _saturated(self, j: int, effort: Floats, model: float, most: float) -> bool:
-        """Return whether an effort stands at a known limit, or often at exactly the run's largest."""
+        """Return whether an effort stands at a known limit, or at the run's largest."""
         name = self.settings.robot.joint_names[j]
         level = abs(float(np.median(effort)))
         limits = (self.settings.limits.torque[j], self.settings.robot.joint(name).effort)

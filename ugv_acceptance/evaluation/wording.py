@@ -13,7 +13,7 @@ WORDS = {
     ),
     'TIP_OVER': (
         '{tilt} to the {subject}; {kind} {limit:.1f} degrees of tilt left',
-        'lower the arm, bring it over the tracks, face the slope; if it stands well, check imu mounting',
+        'lower the arm, bring it over the tracks, face the slope; if it stands well, check the IMU',
     ),
     'NO_SUPPORT': (
         'the contact points give no support polygon, or nothing presses on the ground',

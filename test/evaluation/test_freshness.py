@@ -1,0 +1,103 @@
+"""Freshness: the period is learnt from receipt times; silence is judged by it, never by stamps."""
+
+import numpy as np
+import pytest
+from evaluation.streams import MS, T0, S
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.evaluation.freshness import STARTUP, WINDOW, Freshness
+from ugv_acceptance.evaluation.settings import Delays
+
+_steps = st.lists(st.integers(1, 400), min_size=1, max_size=150)
+
+
+def times_of(steps: list[int]) -> list[int]:
+    """Return receipt times (ns) from intervals in ms."""
+    return [T0 + t * MS for t in np.cumsum(steps).tolist()]
+
+
+@given(_steps, st.lists(st.integers(0, 150), max_size=5))
+def test_many_messages_are_as_many_single_ones(steps: list[int], cuts: list[int]) -> None:
+    """Limits before and after each message, period and deadline are the same."""
+    times = times_of(steps)
+    one, many = Freshness(Delays()), Freshness(Delays())
+    expected = []
+    for now in times:
+        before = one.limit
+        one.message(now)
+        expected.append((before, one.limit))
+    got = []
+    for part in np.split(np.array(times), sorted(min(c, len(times)) for c in cuts)):
+        if len(part):
+            befores, afters = many.messages(part)
+            got += list(zip(befores.tolist(), afters.tolist(), strict=True))
+    assert got == expected
+    assert many.deadline == one.deadline
+    np.testing.assert_equal(many.period, one.period)
+
+
+@given(_steps)
+def test_the_period_is_the_median_of_the_last_full_window(steps: list[int]) -> None:
+    """Of 32 intervals; until then nothing is known and the start-up limit holds."""
+    fresh = Freshness(Delays())
+    fresh.messages(np.array(times_of(steps)))
+    whole = (len(steps) - 1) // WINDOW * WINDOW
+    if not whole:
+        assert np.isnan(fresh.period)
+        assert fresh.limit == STARTUP
+        return
+    period = float(np.median(np.array(steps[1:])[whole - WINDOW : whole])) * MS
+    assert fresh.period == period
+    assert fresh.limit == int(max(3 * period, 100 * MS))
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 3 * S), st.integers(-3 * S, 3 * S)), min_size=1, max_size=40),
+    st.integers(0, 40),
+)
+def test_clock_of_many_is_clock_of_each(pairs: list[tuple[int, int]], cut: int) -> None:
+    """Also where the messages come in two parts."""
+    times = T0 + np.cumsum([step for step, _ in pairs])
+    stamps = times + [shift for _, shift in pairs]
+    one, many = Freshness(Delays()), Freshness(Delays())
+    expected = []
+    for now, stamp in zip(times.tolist(), stamps.tolist(), strict=True):
+        expected.append(one.clock(now, stamp))
+        one.message(now)
+    got = []
+    for a, b in zip(np.split(times, [cut]), np.split(stamps, [cut]), strict=True):
+        got += many.clocks(a, b).tolist()
+        if len(a):
+            many.messages(a)
+    assert got == expected
+
+
+@pytest.mark.parametrize(
+    ('stamps', 'wrong'),
+    [
+        ([0, 1], [0.0, 0.0]),
+        ([0, 1 + 3600], [0.0, 1.0]),
+        ([0, 1 - 3600], [0.0, 1.0]),
+        ([-9 * 86400, 1 - 9 * 86400], [1.0, 1.0]),
+    ],
+)
+def test_stamps_that_jump_or_are_days_off_are_a_clock_fault(
+    stamps: list[int], wrong: list[float]
+) -> None:
+    """A second of slack; staleness does not depend on stamps."""
+    fresh = Freshness(Delays())
+    times = np.array([T0, T0 + S])
+    assert fresh.clocks(times, T0 + np.array(stamps) * S).tolist() == wrong
+    fresh.messages(times)
+    assert fresh.deadline == T0 + S + STARTUP
+
+
+def test_a_frozen_clock_is_a_fault_within_two_seconds() -> None:
+    """Stamps that stand still while messages are received."""
+    fresh = Freshness(Delays())
+    wrong = []
+    for k in range(40):
+        wrong.append(fresh.clock(T0 + k * 50 * MS, T0))
+        fresh.message(T0 + k * 50 * MS)
+    assert wrong.index(1.0) * 50 <= 1100

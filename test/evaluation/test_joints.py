@@ -1,0 +1,98 @@
+"""Joint states: found by name, in robot convention, partial ones merged, odd ones told apart."""
+
+import math
+
+import hypothesis
+import numpy as np
+import pytest
+from evaluation.streams import MS, T0, Joints, batch_of, joint_messages, settings, split
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.evaluation.joints import JointMerger
+
+
+def merged(message: Joints) -> JointMerger:
+    """Return a merger that took one message."""
+    merger = JointMerger(settings())
+    m = message
+    merger.merge(m.time, m.names, m.position, m.velocity, m.effort)
+    return merger
+
+
+@hypothesis.settings(max_examples=200)
+@given(
+    st.lists(joint_messages(), min_size=1, max_size=25), st.lists(st.integers(0, 25), max_size=4)
+)
+def test_columns_are_merged_as_single_messages_are(messages: list[Joints], cuts: list[int]) -> None:
+    """Whatever joints each message names, in whatever order, with whatever numbers."""
+    timed = [
+        Joints(T0 + k * MS, m.names, m.position, m.velocity, m.effort)
+        for k, m in enumerate(messages)
+    ]
+    one, many = JointMerger(settings()), JointMerger(settings())
+    expected = [
+        (m.time, [*one.q, *one.qd, *one.effort], min(one.seen))
+        for m in timed
+        if one.merge(m.time, m.names, m.position, m.velocity, m.effort)
+    ]
+    rows = [many.merge_columns(batch_of(part).joints) for part in split(timed, cuts)]
+    got = [
+        (int(r.time[k]), [*r.q[k], *r.qd[k], *r.effort[k]], int(r.oldest[k]))
+        for r in rows
+        for k in range(len(r.time))
+    ]
+    assert [(t, oldest) for t, _, oldest in got] == [(t, oldest) for t, _, oldest in expected]
+    np.testing.assert_array_equal([x for _, x, _ in got], [x for _, x, _ in expected])
+    assert many.seen == one.seen
+
+
+def test_sign_offset_and_effort_scale_are_undone() -> None:
+    """The lift counts downwards from 0.1 rad and tells its torque in kN m of other sign."""
+    merger = merged(Joints(T0, position=(0.3, 0.2), velocity=(0.5, 0.1), effort=(0.02, 7.0)))
+    assert merger.q == [pytest.approx(-0.2), 0.2]
+    assert merger.qd == [-0.5, 0.1]
+    assert merger.effort == [-20.0, 7.0]
+
+
+def test_names_may_come_in_any_order_among_others() -> None:
+    """Joints are found by name."""
+    merger = merged(Joints(T0, ('wheel', 'hand_slide', 'lift'), (9.0, 0.2, 0.3)))
+    assert merger.q == [pytest.approx(-0.2), 0.2]
+
+
+@pytest.mark.parametrize('position', [math.nan, math.inf, -math.inf, 1e308, 90.0])
+def test_a_position_that_cannot_be_the_joints_is_unknown(position: float) -> None:
+    """Not a number, infinite, or far outside its limits, as degrees given for radians are."""
+    merger = merged(Joints(T0, position=(position, 0.2)))
+    assert math.isnan(merger.q[0])
+    assert merger.q[1] == 0.2
+
+
+def test_a_name_that_stands_twice_is_left_out() -> None:
+    """Nobody can tell which of the two it is."""
+    merger = merged(Joints(T0, ('lift', 'lift', 'hand_slide'), (0.1, 0.2, 0.3)))
+    assert math.isnan(merger.q[0])
+    assert merger.q[1] == 0.3
+
+
+@pytest.mark.parametrize(
+    'message',
+    [
+        Joints(T0, ('wheel',), (1.0,)),
+        Joints(T0, (), ()),
+        Joints(T0, position=()),
+        Joints(T0, position=(0.1,)),
+    ],
+)
+def test_a_message_without_a_position_of_ours_is_no_event(message: Joints) -> None:
+    """Foreign joints, no names, no positions, or another number of them than of names."""
+    merger = JointMerger(settings())
+    m = message
+    assert not merger.merge(m.time, m.names, m.position, m.velocity, m.effort)
+
+
+def test_empty_velocity_and_effort_are_unknown_not_zero() -> None:
+    """As many drivers leave them empty."""
+    merger = merged(Joints(T0))
+    assert all(map(math.isnan, [*merger.qd, *merger.effort]))
