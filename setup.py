@@ -14,6 +14,7 @@ REQUIRES = [
     'PyYAML',
     'defusedxml',
     'jinja2',
+    'junitparser',
     'matplotlib',
     'lz4',
     'mcap',
@@ -26,18 +27,31 @@ REQUIRES = [
     'zstandard',
 ]
 SIMULATION = ['mujoco']
+PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
+TABLE = ['pyarrow']
 TEST = [
     'catkin-pkg',
     'hypothesis',
+    'jsonschema',
     'pin',
     'pytest',
     'pytest-timeout',
     'pytest-xdist',
     'setuptools<80',
     'wheel',
+    *PDF,
     *SIMULATION,
+    *TABLE,
 ]
-LINT = ['mypy', 'pre-commit', 'ruff', 'scipy-stubs', 'types-PyYAML', 'types-defusedxml']
+LINT = [
+    'mypy',
+    'pre-commit',
+    'ruff',
+    'scipy-stubs',
+    'types-PyYAML',
+    'types-defusedxml',
+    'types-jsonschema',
+]
 
 
 def version() -> str:
@@ -74,17 +88,29 @@ setup(
     maintainer_email='maintainers@ugv-acceptance.invalid',
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed'], f'{NAME}.report': ['templates/*'], f'{NAME}.plan': ['templates/*']},
+    package_data={
+        NAME: ['py.typed'],
+        f'{NAME}.report': ['templates/*'],
+        f'{NAME}.plan': ['templates/*'],
+    },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (SHARE, ['package.xml']),
         *share('msg_configs'),
+        *share('schema'),
         *share('urdf'),
         *share('launch'),
         *share('bags'),
     ],
     install_requires=REQUIRES,
-    extras_require={'sim': SIMULATION, 'fast': ['isal'], 'test': TEST, 'lint': LINT},
+    extras_require={
+        'sim': SIMULATION,
+        'fast': ['isal'],
+        'pdf': PDF,
+        'table': TABLE,
+        'test': TEST,
+        'lint': LINT,
+    },
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',

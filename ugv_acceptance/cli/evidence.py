@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ugv_acceptance import AcceptanceError, BadConfig, __version__
+from ugv_acceptance import AcceptanceError, __version__
 
 if TYPE_CHECKING:
     from ugv_acceptance.bag.reader import Bag
@@ -131,9 +131,8 @@ def write_papers(
     papers: Papers, result: Json, recorder: 'StripRecorder | None', settings: 'Settings'
 ) -> None:
     """Write the report, the PDF and the proposed criteria of one recording."""
-    from ugv_acceptance.bag.result import write_text
-
     if recorder is not None:
+        from ugv_acceptance.bag.result import write_text
         from ugv_acceptance.config.identity import PARTS
         from ugv_acceptance.report.acceptance import acceptance_page
 
@@ -143,11 +142,19 @@ def write_papers(
         if papers.pdf is not None:
             _write_pdf(papers.pdf, html)
     if papers.init_criteria is not None:
-        from ugv_acceptance.evaluation.proposal import proposed_criteria
+        _propose(papers.init_criteria, result)
 
-        if result['verdict'] != 'PASS':
-            raise BadConfig(f'--init-criteria: expected a run that passes, got {result["verdict"]}')
-        write_text(papers.init_criteria, proposed_criteria(result, result['robot']['name']))
+
+def _propose(path: Path, result: Json) -> None:
+    """Write criteria that a good run meets; of any other say so and go on: its verdict stands."""
+    from ugv_acceptance.bag.result import write_text
+    from ugv_acceptance.evaluation.proposal import proposed_criteria
+
+    if result['verdict'] == 'PASS':
+        write_text(path, proposed_criteria(result, result['robot']['name']))
+    else:
+        text = f'--init-criteria: expected a run that passes, got {result["verdict"]}'
+        typer.echo(f'ugv-acceptance: {text}', err=True)
 
 
 def _write_pdf(path: Path, html: str) -> None:
