@@ -43,7 +43,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     console = console or Console(highlight=False)
     word = result['verdict']
     paths = result['bag']['path']
-    console.print(f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}')
+    heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
+    console.print(heading, soft_wrap=True)
     for reason in result['reasons'][:5]:
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:

@@ -1,0 +1,207 @@
+"""`ugv-acceptance evaluate` from bag to exit code, as a process of its own."""
+
+import csv
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
+from ugv_acceptance.bag.writer import BagWriter
+
+START = 1_700_000_000_000_000_000
+MS = 1_000_000
+MAIN = 'from ugv_acceptance.cli import main; main()'
+NAMES = ['turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint']
+FOLDED = (0.0, math.radians(120.0), math.radians(-140.0), math.pi)
+STRETCHED = (0.0, 0.0, 0.0, math.pi)
+COVARIANCES = ((1e-4, *(0.0,) * 8),) * 3
+
+
+def evaluate(*arguments: object) -> 'subprocess.CompletedProcess[str]':
+    """Run the verb."""
+    command = [sys.executable, '-c', MAIN, 'evaluate', *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+def write_run(
+    folder: Path, posture: Iterable[float] = FOLDED, seconds: float = 3.0,
+    silent: tuple[float, float] = (0.0, 0.0),
+) -> Path:  # fmt: skip
+    """Record a PackBot that stands still: joints at 50 Hz, IMU at 100 Hz but for its silence."""
+    with BagWriter(folder) as bag:
+        bag.add_topic('/joint_states', 'sensor_msgs/msg/JointState')
+        bag.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
+        q = list(posture)
+        for k in range(int(seconds * 100)):
+            now = START + k * 10 * MS
+            if not silent[0] <= k / 100 < silent[1]:
+                still = ((0.0, 0.0, 0.7071068, 0.7071068), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
+                bag.write('/imu/data', now, imu_cdr(now, 'imu_link', *still, COVARIANCES))
+            if k % 2 == 0:
+                body = joint_state_cdr(now, '', NAMES, q, [0.0] * 4, [])
+                bag.write('/joint_states', now + MS, body)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ('name', 'code', 'verdict'),
+    [('packbot_pass', 0, 'PASS'), ('packbot_fail', 1, 'FAIL'), ('packbot_gap', 3, 'INCONCLUSIVE')],
+)
+def test_the_runs_that_ship_give_their_verdicts(
+    name: str, code: int, verdict: str, repository: Path, tmp_path: Path
+) -> None:
+    """In the exit code, in the first line, and in the JSON with all that it promises."""
+    found = tmp_path / 'result.json'
+    done = evaluate(repository / 'bags' / name, '--json', found)
+    assert done.returncode == code, done.stderr
+    assert verdict in done.stdout.splitlines()[1]
+    result = json.loads(found.read_text())
+    assert result['verdict'] == verdict
+    assert set(result) >= {
+        'version', 'verdict', 'reasons', 'bag', 'robot', 'coverage', 'torque', 'stability',
+        'alerts', 'inputs',
+    }  # fmt: skip
+    keys = {'path', 'sha256', 'duration_s', 'messages', 'protected', 'salvaged'}
+    assert set(result['bag']) >= keys
+    for source in ('joint_states', 'imu'):
+        assert set(result['inputs'][source]) >= {'messages', 'rate_hz', 'gaps', 'faults'}
+
+
+def test_a_posture_beyond_the_limit_fails_for_that_joint(tmp_path: Path) -> None:
+    """The paper's arm with 4 kg needs 74.8 N m at full reach, of 50."""
+    found = tmp_path / 'result.json'
+    done = evaluate(write_run(tmp_path / 'run', STRETCHED), '--json', found)
+    assert done.returncode == 1
+    shoulder = json.loads(found.read_text())['torque']['shoulder_joint']
+    assert shoulder['max_abs'] == pytest.approx(74.8, abs=0.05)
+    assert shoulder['time_in_violation_s'] == pytest.approx(3.0, abs=0.03)
+
+
+def test_a_silent_imu_is_no_pass(tmp_path: Path) -> None:
+    """A quarter of the run without attitude."""
+    done = evaluate(write_run(tmp_path / 'run', silent=(1.0, 2.0), seconds=4.0))
+    assert done.returncode == 3
+    assert 'no message from imu' in done.stdout
+
+
+def test_csv_has_one_row_a_message(tmp_path: Path) -> None:
+    """With a header, unknown margins empty, and the same worst value as the result."""
+    table, found = tmp_path / 'margins.csv', tmp_path / 'result.json'
+    evaluate(write_run(tmp_path / 'run'), '--csv', table, '--json', found)
+    rows: list[dict[str, Any]] = list(csv.DictReader(table.read_text().splitlines()))
+    assert len(rows) == 300 + 150
+    assert rows[0]['state'] == 'unknown'
+    assert rows[0]['shoulder_joint_torque_margin'] == ''
+    known = [row for row in rows if row['state'] != 'unknown']
+    assert len(known) == len(rows) - 1
+    result = json.loads(found.read_text())
+    least = min(float(row['shoulder_joint_torque_margin']) for row in known)
+    assert least == result['torque']['shoulder_joint']['min_margin']
+    side = min(float(row[f'{result["stability"]["edge"]}_angle_deg']) for row in known)
+    assert side == pytest.approx(result['stability']['min_angle_deg'], rel=1e-12)
+
+
+def test_the_same_bag_gives_the_same_bytes(tmp_path: Path) -> None:
+    """Twice the same result."""
+    run = write_run(tmp_path / 'run', STRETCHED)
+    texts = []
+    for k in range(2):
+        evaluate(run, '--json', tmp_path / f'{k}.json')
+        texts.append((tmp_path / f'{k}.json').read_bytes())
+    assert texts[0] == texts[1]
+
+
+def test_of_several_bags_the_worst_counts(tmp_path: Path) -> None:
+    """A failure beside a pass fails; a bag that cannot be read does not hide it."""
+    runs = [write_run(tmp_path / 'good'), write_run(tmp_path / 'bad', STRETCHED)]
+    found = tmp_path / 'result.json'
+    assert evaluate(*runs, tmp_path / 'none', '--json', found).returncode == 1
+    verdicts = [result['verdict'] for result in json.loads(found.read_text())]
+    assert verdicts == ['PASS', 'FAIL', 'BAD INPUT']
+
+
+def broken_input(kind: str, folder: Path) -> list[object]:
+    """Return arguments that cannot be used."""
+    run = write_run(folder / 'run', seconds=0.2)
+    text = folder / 'text.mcap'
+    text.write_text('not a bag')
+    empty = folder / 'empty'
+    empty.mkdir()
+    wrong = folder / 'wrong.yaml'
+    wrong.write_text('robot: {nome: packbot}\n')
+    cases: dict[str, list[object]] = {
+        'no such bag': [folder / 'none'],
+        'no bag': [text],
+        'folder without bags': [empty],
+        'no such config': [run, '--config', folder / 'none.yaml'],
+        'wrong config': [run, '--config', wrong],
+        'no such urdf': [run, '--urdf', folder / 'none.urdf'],
+        'json into no folder': [run, '--json', folder / 'none' / 'result.json'],
+        'json over a folder': [run, '--json', empty],
+        'csv into no folder': [run, '--csv', folder / 'none' / 'margins.csv'],
+        'one csv of two bags': [run, write_run(folder / 'other'), '--csv', folder / 'm.csv'],
+    }
+    return cases[kind]
+
+
+@pytest.mark.parametrize(
+    'kind',
+    [
+        'no such bag', 'no bag', 'folder without bags', 'no such config', 'wrong config',
+        'no such urdf', 'json into no folder', 'json over a folder', 'csv into no folder',
+        'one csv of two bags',
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line_and_exit_code_2(kind: str, tmp_path: Path) -> None:
+    """It says what was expected and what came; nothing half-written stays."""
+    done = evaluate(*broken_input(kind, tmp_path))
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert done.stderr.startswith('ugv-acceptance: ')
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert not list(tmp_path.rglob('*.part'))
+
+
+def test_effort_of_a_foreign_recording_shows_its_payload(
+    shared_bags: Path, repository: Path, tmp_path: Path
+) -> None:
+    """A SCARA arm holds 98.0 N, and 137.2 N after it grasps 4 kg: the difference is the payload."""
+    folder, found = shared_bags / 'abitobot', tmp_path / 'result.json'
+    done = evaluate(
+        *(folder, '--config', repository / 'msg_configs' / 'abitobot.yaml'),
+        *('--urdf', folder / 'robot.urdf', '--compare-effort', '--json', found),
+    )
+    assert 'appears as their difference' in done.stdout
+    plateaus = json.loads(found.read_text())['effort']['arm_3_link_joint']
+    grasped = [p for p in plateaus if 137.0 < p['measured'] < 137.4]
+    assert [p['payload_kg_that_explains_it'] for p in grasped] == [pytest.approx(4.0, abs=0.01)]
+    before = [p for p in plateaus if p['end_s'] < grasped[0]['start_s'] and not p['saturated']]
+    assert before[0]['measured'] == pytest.approx(97.99, abs=0.05)
+    assert before[0]['model'] == pytest.approx(98.0, abs=0.05)
+    clipped = [p for p in plateaus if p['saturated']]
+    assert clipped
+    assert {p['payload_kg_that_explains_it'] for p in clipped} == {None}
+
+
+def test_no_recording_of_others_crashes_or_hangs(shared_bags: Path, tmp_path: Path) -> None:
+    """Each gives a verdict, or one line that says why not."""
+    bags = sorted(
+        {path.parent if (path.parent / 'metadata.yaml').exists() else path
+         for folder in shared_bags.iterdir() if folder.is_dir() and folder.name != 'conformance'
+         for path in folder.rglob('*') if path.suffix in {'.mcap', '.db3', '.bag', '.zstd'}}
+    )  # fmt: skip
+    assert len(bags) > 30
+    found = tmp_path / 'results.json'
+    done = evaluate(*bags, '--json', found)
+    results = json.loads(found.read_text())
+    refused = [result for result in results if result['verdict'] == 'BAD INPUT']
+    assert 'Traceback' not in done.stderr
+    assert all(result['reasons'] for result in results)
+    assert len(done.stderr.strip().splitlines()) == len(refused)
+    assert len(results) - len(refused) >= 11
+    assert sum(len(result['bag']['path']) for result in results) >= len(bags)
