@@ -24,7 +24,8 @@ def paper(
         bool, typer.Option(help='Run the arm in MuJoCo beside the closed form.')
     ] = True,
     truth: Annotated[
-        int, typer.Option(help='Random cases in which MuJoCo decides whether the robot tips.')
+        int,
+        typer.Option(help='Random cases in which MuJoCo decides what tips: 0.3 s each.'),
     ] = 0,
 ) -> None:
     """Compute the paper again and write it as a page and as JSON; print the table of matches.
@@ -67,6 +68,8 @@ def paper(
     for row in rows:
         if not row.match:
             typer.echo(f'  differs: {row.what}: paper {row.paper}, ours {row.ours}: {row.reason}')
+    for line in subject.truth:
+        typer.echo('  '.join(f'{cell:24}' for cell in line).rstrip())
     typer.echo(f'Wrote {out / "paper.html"} and {out / "paper.json"}.')
 
 
@@ -74,12 +77,18 @@ def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -
     import numpy as np
 
     from ugv_acceptance.report.paper import Subject
+    from ugv_acceptance.report.parts import check_parts
 
     robot, limits = loaded.settings.robot, np.array(loaded.settings.limits.torque)
     if not simulate:
         return Subject(robot, limits)
-    from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_truth
+    from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_joints, simulated_truth
 
+    check_parts(robot)
     torques, f_values = simulated_arm()
+    joints = [simulated_joints(robot, free=False)]
+    if truth:
+        with console.status('Turning the elbow on the simulated vehicle'):
+            joints.append(simulated_joints(robot, free=True))
     lines = simulated_truth(robot, truth, console) if truth else ()
-    return Subject(robot, limits, torques, f_values, lines)
+    return Subject(robot, limits, torques, f_values, lines, joints)

@@ -7,11 +7,13 @@ from rich.console import Console
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
+from ugv_acceptance.model.orientations import grounding_angle
 from ugv_acceptance.model.planar import paper_arm
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.model.validity import PAPER_SPEEDS_DEG_S, mean_square, paper_sweep
 from ugv_acceptance.report.paper_numbers import DOWN, Simulated
+from ugv_acceptance.report.parts import PARTS, posture
 
 
 def simulated_arm() -> tuple[Simulated, Floats]:
@@ -26,6 +28,33 @@ def simulated_arm() -> tuple[Simulated, Floats]:
     }
     squares = np.array([mean_square(effort - static) for effort in runs.values()])
     return Simulated(paper_sweep(math.pi / 6.0)[:, 1], runs[7.2]), squares / squares[0]
+
+
+def simulated_joints(robot: Robot, *, free: bool) -> list[list[str]]:
+    """Return the least and the largest force, torque, rate and acceleration at each joint.
+
+    The elbow turns once at 7.2 deg/s, the shoulder at 30 deg, flippers forward: the whole vehicle
+    on its wheels where `free`, else its chassis held.
+    """
+    from ugv_acceptance.simulation.sweep import sweep
+
+    flippers = grounding_angle(robot, PARTS.flipper)
+    start = posture(robot, shoulder=math.pi / 6.0, flipper=flippers)
+    found = sweep(robot, start, PARTS.elbow, math.radians(7.2), free=free)
+    turning = np.degrees(np.stack([found.rate, found.acceleration], axis=-1))
+    columns = [found.force, found.effort[..., np.newaxis], turning]
+    table = np.concatenate(columns, axis=-1)
+    head = 'vehicle on its wheels' if free else 'chassis held'
+    names = ['longitudinal force, N', 'lateral', 'vertical', 'torque, N m', 'rate, °/s', '°/s²']
+    return [[head, *names]] + [
+        [name, *(f'{_ends(values)}' for values in table[:, k].T)]
+        for k, name in enumerate(robot.joint_names)
+    ]
+
+
+def _ends(values: Floats) -> str:
+    low, high = (round(float(x), 2) + 0.0 for x in (values.min(), values.max()))
+    return f'{low:.2f}' if low == high else f'{low:.2f} to {high:.2f}'
 
 
 def simulated_truth(robot: Robot, count: int, console: Console) -> list[list[str]]:

@@ -21,8 +21,9 @@ from ugv_acceptance.model.capacity import (
 )
 from ugv_acceptance.model.orientations import grounding_angle
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.report.parts import PARTS, STOWED, posture
 from ugv_acceptance.report.regions import degree_axes, figure
-from ugv_acceptance.report.rollover_figures import PARTS, STOWED, arm_grid, posture
+from ugv_acceptance.report.rollover_figures import arm_grid
 
 Causes = NDArray[np.int8]
 

@@ -90,9 +90,8 @@ def draw_map(scene: Scene, data: MapData, track: Floats | None = None) -> Figure
     axes.set_title(
         f'{robot.name}: {data.what}\n{_wrapped(assumptions(scene, data.kind))}', fontsize=9.5
     )
-    legend(made, WORDS[data.kind], loc='outside lower center', ncols=3)
-    if track is not None:
-        axes.legend(loc='upper right')
+    more = axes.get_legend_handles_labels()[0]
+    legend(made, WORDS[data.kind], more, loc='outside lower center', ncols=3)
     return made
 
 

@@ -38,11 +38,13 @@ from ugv_acceptance.report.paper_numbers import (
 from ugv_acceptance.report.paper_prose import (
     CAPABILITY,
     FIGURE_4,
+    MULTI_BODY,
     ROLLOVER,
     STATISTICS,
     WORST_CASE,
 )
-from ugv_acceptance.report.rollover_figures import check_parts, figure_6, figure_7, level_figure
+from ugv_acceptance.report.parts import check_parts
+from ugv_acceptance.report.rollover_figures import figure_6, figure_7, level_figure
 from ugv_acceptance.report.safe_range import one_sided_table
 
 Extra = dict[str, Any]
@@ -53,7 +55,8 @@ class Subject:
     """What the page is about: a robot with its torque limits (N m), and what a simulation gave.
 
     `simulated` are the arm's torques in a multi-body simulation, `simulated_f` the F values (8, 2)
-    from it; `truth` lines of a table that compares the rollover map with simulated tipping.
+    from it, `truth` the lines of a table that compares the rollover map with simulated tipping,
+    `joints` tables of what each joint of the simulated vehicle bears.
     """
 
     robot: Robot
@@ -61,6 +64,7 @@ class Subject:
     simulated: Simulated | None = None
     simulated_f: Floats | None = None
     truth: Sequence[Sequence[str]] = ()
+    joints: Sequence[Sequence[Sequence[str]]] = ()
 
 
 Built = tuple[Section, Extra]
@@ -98,7 +102,9 @@ def dynamic(subject: Subject) -> Built:
     if subject.simulated is not None:
         caption += ' Crosses: the same arm in MuJoCo.'
     picture = Picture('figure_4', figure_4(subject.simulated), caption)
-    return Section('Figure 4: static and dynamic torque', pictures=[picture]), {}
+    text = MULTI_BODY if subject.joints else ()
+    title = 'Figure 4: static and dynamic torque'
+    return Section(title, text, tables=subject.joints, pictures=[picture]), {}
 
 
 def statistics(subject: Subject) -> Built:

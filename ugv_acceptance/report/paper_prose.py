@@ -23,6 +23,12 @@ the centres of gravity that give Table 2. At 7.2°/s the motion itself adds 0.03
 seen between line and marks is the offset of the centres of gravity.
 """)
 
+MULTI_BODY = _paragraphs("""
+What the paper took from ADAMS: forces, torque, rate and acceleration at each joint, here of the
+whole robot in MuJoCo. The elbow turns once at 7.2°/s, the shoulder is at 30°, flippers forward. A
+cell gives the least and the largest value; the force is what the parent link exerts on the child.
+""")
+
 STATISTICS = _paragraphs("""
 All 16 cells follow from rigid-body dynamics once the links' centres of gravity are not at mid-link.
 The offsets that give every cell form two narrow bands: link 2 by {second_low:.2f} to

@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -66,13 +67,18 @@ def draw_regions(
                     text.set_bbox({'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.8})
 
 
-def legend(target: Figure | Axes, words: Sequence[str] = WORDS, **options: Any) -> None:  # noqa: ANN401 - matplotlib's own
-    """Add the key of the three areas to a figure or to axes."""
+def legend(
+    target: Figure | Axes,
+    words: Sequence[str] = WORDS,
+    more: Sequence[Artist] = (),
+    **options: Any,  # noqa: ANN401 - matplotlib's own
+) -> None:
+    """Add the key of the three areas, and of `more`, to a figure or to axes."""
     patches = [
         Patch(facecolor=colour, hatch=hatch, edgecolor='#666666', label=word)
         for colour, hatch, word in zip(COLOURS, HATCHES, words, strict=True)
     ]
-    target.legend(handles=patches, **options)
+    target.legend(handles=[*patches, *more], **options)
 
 
 def degree_axes(axes: Axes, x_name: str, y_name: str, step: float = 90.0) -> None:

@@ -9,29 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from ugv_acceptance import BadConfig
 from ugv_acceptance.model.bilinear import Grid
 from ugv_acceptance.model.maps import Levels, area_fraction, rollover_map
 from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of, grounding_angle
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.report.parts import PARTS, STOWED, Parts, posture
 from ugv_acceptance.report.regions import degree_axes, draw_regions, figure, legend
 
 # Caution from 10 degrees of tilt left; at 0 the robot tips.
 TIP_LEVELS = Levels(10.0, 0.0)
-STOWED = math.pi
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """Which joints play the parts of the paper's robot."""
-
-    shoulder: str = 'shoulder_joint'
-    elbow: str = 'elbow_joint'
-    turret: str = 'turret_joint'
-    flipper: str = 'flipper_joint'
-
-
-PARTS = Parts()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,24 +38,6 @@ class Panel:
         return (
             f'right tilt {math.degrees(self.tilt):.0f}°, flippers {flippers}\narm {turret}, {load}'
         )
-
-
-def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
-    """Raise BadConfig where the robot has no turret, shoulder, elbow or flipper joint."""
-    for name in (parts.shoulder, parts.elbow, parts.turret, parts.flipper):
-        if name not in robot.joint_names:
-            raise BadConfig(
-                f'robot {robot.name}: expected a joint {name} for the figures of rollover, '
-                f'it has {", ".join(robot.joint_names)}'
-            )
-
-
-def posture(robot: Robot, parts: Parts = PARTS, **angles: float) -> np.ndarray:
-    """Return the posture (j,) with the parts at `angles` (rad); flippers stowed unless given."""
-    q = np.zeros(len(robot.joint_names))
-    for part, angle in {'flipper': STOWED, **angles}.items():
-        q[robot.joint_names.index(getattr(parts, part))] = angle
-    return q
 
 
 def arm_grid(robot: Robot, q: np.ndarray, steps: int, parts: Parts = PARTS) -> Grid:

@@ -1,0 +1,43 @@
+"""Which joints of a robot play the parts of the paper's: shoulder, elbow, turret, flippers."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.robot import Robot
+
+# Flippers folded back along the tracks (rad).
+STOWED = math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Which joints play the parts of the paper's robot."""
+
+    shoulder: str = 'shoulder_joint'
+    elbow: str = 'elbow_joint'
+    turret: str = 'turret_joint'
+    flipper: str = 'flipper_joint'
+
+
+PARTS = Parts()
+
+
+def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
+    """Raise BadConfig where the robot has no turret, shoulder, elbow or flipper joint."""
+    for name in (parts.shoulder, parts.elbow, parts.turret, parts.flipper):
+        if name not in robot.joint_names:
+            raise BadConfig(
+                f'robot {robot.name}: expected a joint {name} for the figures of rollover, '
+                f'it has {", ".join(robot.joint_names)}'
+            )
+
+
+def posture(robot: Robot, parts: Parts = PARTS, **angles: float) -> np.ndarray:
+    """Return the posture (j,) with the parts at `angles` (rad); flippers stowed unless given."""
+    q = np.zeros(len(robot.joint_names))
+    for part, angle in {'flipper': STOWED, **angles}.items():
+        q[robot.joint_names.index(getattr(parts, part))] = angle
+    return q
