@@ -2,6 +2,7 @@
 
 import struct
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -226,3 +227,16 @@ def test_a_big_endian_message_is_read_too() -> None:
     assert struct.unpack_from('>i', data, 4)[0] == stamp // NS
     watched.take_joint_state(data)
     assert watched.evaluator.margins is not None
+
+
+@pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)
+def test_every_parameter_is_documented(repository: Path, knob: Any) -> None:
+    """docs/ros_interface.md names every parameter."""
+    name = knob.name if '.limit_' not in knob.name else 'joints.JOINT.limit_nm'
+    assert f'`{name}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('code', WORDS)
+def test_every_alert_of_the_node_is_documented(repository: Path, code: str) -> None:
+    """docs/ros_interface.md names every alert that only the node raises."""
+    assert f'`{code}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')

@@ -6,6 +6,7 @@ subscribed as raw bytes on activation, so an inactive monitor costs nothing.
 
 import sys
 from collections.abc import Callable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +127,11 @@ class Monitor(LifecycleNode):
         for knob in knobs:
             if not self.has_parameter(knob.name):
                 self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
+        for name in sorted(self._parameter_overrides):
+            if not self.has_parameter(name):
+                near = get_close_matches(name, [knob.name for knob in knobs], 1)
+                hint = f'; did you mean {near[0]}?' if near else ''
+                self.get_logger().warning(f'parameter {name} is not known and not used{hint}')
         values = {knob.name: self._value(knob.name) for knob in knobs}
         self._settings, self.knobs = changed(defaults, knobs, values), knobs
         self.output.hardware_id = self.config.serial or self.config.name
