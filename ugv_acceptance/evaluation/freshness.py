@@ -76,9 +76,9 @@ class Freshness:
         intervals = np.concatenate((known, steps[1:] if fresh else steps))
         blocks = intervals[: len(intervals) // WINDOW * WINDOW].reshape(-1, WINDOW)
         middle = np.sort(blocks, axis=1)[:, WINDOW // 2 - 1 : WINDOW // 2 + 1].sum(axis=1) / 2
-        learnt = np.concatenate(([self.limit], [self._silence(float(x)) for x in middle]))
+        learnt = np.concatenate(([self.limit], self._silences(middle)))
         ends = np.arange(len(times)) + len(known) + (0 if fresh else 1)
-        limits = learnt[ends // WINDOW].astype(np.int64)
+        limits = learnt[ends // WINDOW]
         before = np.concatenate(([self.limit], limits[:-1]))
         if len(middle):
             self.period, self.limit = float(middle[-1]), int(learnt[-1])
@@ -91,6 +91,10 @@ class Freshness:
         self.period = (ordered[WINDOW // 2 - 1] + ordered[WINDOW // 2]) / 2
         self.limit = self._silence(self.period)
         self._intervals.clear()
+
+    def _silences(self, periods: NDArray[np.float64]) -> Times:
+        longest = np.maximum(periods * self.delays.stale_periods, self.delays.stale_after * 1e9)
+        return longest.astype(np.int64)
 
     def _silence(self, period: float) -> int:
         return int(max(period * self.delays.stale_periods, self.delays.stale_after * 1e9))

@@ -126,10 +126,10 @@ class ImuTracker:
         time = np.concatenate([s.log_time for s in columns])
         order = np.argsort(time, kind='stable') if (np.diff(time) < 0).any() else slice(None)
         time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
-        q = np.concatenate([s.orientation for s in columns])[order].T
+        q = _lines([s.orientation for s in columns])[:, order]
         covariance_0 = np.concatenate([s.orientation_covariance_0 for s in columns])[order]
-        omega = np.concatenate([s.angular_velocity for s in columns])[order].T
-        acceleration = np.concatenate([s.linear_acceleration for s in columns])[order].T
+        omega = _lines([s.angular_velocity for s in columns])[:, order]
+        acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
         with np.errstate(all='ignore'):
             smooth = self._filter_columns(stamp, acceleration)
             return self._rows(time, stamp, (q, covariance_0, omega), smooth)
@@ -178,7 +178,7 @@ class ImuTracker:
         """
         step = np.diff(stamp, prepend=self.stamp) * 1e-9
         self.stamp = int(stamp[-1])
-        finite = (x * x).sum(axis=0) <= BELIEVABLE * BELIEVABLE
+        finite = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] <= BELIEVABLE * BELIEVABLE
         if not finite.all():
             x = np.where(finite, x, np.nan)
         carried = (step > 0.0) & (step <= LONGEST_STEP) & np.concatenate(([True], finite[:-1]))
@@ -218,6 +218,12 @@ def _orientation_tells(
 def _norm(v: Sequence[float]) -> float:
     x, y, z = v
     return math.sqrt(x * x + y * y + z * z)
+
+
+def _lines(tables: Sequence[Floats]) -> Floats:
+    """Return tables (n, k) one after the other as k contiguous lines."""
+    out = np.empty((tables[0].shape[1], sum(map(len, tables))))
+    return np.concatenate([table.T for table in tables], axis=1, out=out)
 
 
 def _norms(v: Floats) -> Floats:

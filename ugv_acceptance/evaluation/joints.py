@@ -118,9 +118,11 @@ class JointMerger:
 
     def _fill(self, tables: Floats, named: NDArray[np.bool_], segment: JointStateColumns) -> None:
         """Write a segment's positions, rates and efforts, and which joints it names."""
-        tables.fill(np.nan)
-        named[:] = False
-        for j, k in self.layout(segment.names):
+        layout = self.layout(segment.names)
+        if len(layout) < len(named) or not (segment.velocity.size and segment.effort.size):
+            tables.fill(np.nan)
+            named[:] = False
+        for j, k in layout:
             joint = self.settings.joints[j]
             with np.errstate(all='ignore'):
                 q = joint.sign * segment.position[:, k] + joint.offset
