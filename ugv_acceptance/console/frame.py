@@ -1,0 +1,232 @@
+"""A snapshot as a frame of plain JSON: the same for the live robot and for a recording.
+
+Degrees at this edge, in names ending `_deg`. What is not a finite number is null: a page must say
+that it does not know. `describe_robot` is what does not change from frame to frame.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from ugv_acceptance.console.skeleton import Figure, Skeleton, skeleton_of
+from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.attitude import roll_pitch
+from ugv_acceptance.model.stability import SIDES, STATES
+
+# One word a level, and what the page says where nothing is wrong or nothing is known.
+WORDS = {OK: 'OK', WARN: 'CAUTION', ERROR: 'DANGER', STALE: 'NO DATA'}
+FINE = 'all margins kept'
+UNKNOWN = 'margins are not known'
+WAIT = 'do not move the robot on these numbers; see the inputs'
+
+Plain = dict[str, Any]
+
+
+def describe_robot(settings: Settings) -> Plain:
+    """Return what a page must know once: names, units, limits."""
+    robot, limits = settings.robot, settings.limits
+    return {
+        'robot': robot.name,
+        'sides': list(SIDES),
+        'tip_warn_deg': math.degrees(limits.tip_warn),
+        'tip_error_deg': math.degrees(limits.tip_error),
+        'torque_warn': limits.torque_warn,
+        'torque_error': limits.torque_error,
+        'payload_link': robot.payload_link,
+        'joints': [
+            {
+                'name': name,
+                'kind': robot.joint(name).kind,
+                'unit': 'N' if robot.joint(name).kind == 'prismatic' else 'N m',
+                'limit': number(limit),
+            }
+            for name, limit in zip(robot.joint_names, limits.torque, strict=True)
+        ],
+    }
+
+
+def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
+    """Return the frame of a snapshot; `figure` is that of the settings' robot."""
+    level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
+    cause, advice = _cause(snapshot, level)
+    skeleton = skeleton_of(figure, snapshot.q, snapshot.gravity, snapshot.payload)
+    return {
+        'time_s': snapshot.time / 1e9,
+        'level': LEVELS[level],
+        'word': WORDS[level],
+        'cause': cause,
+        'advice': advice,
+        'left': what_is_left(snapshot, settings),
+        'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
+        'q': numbers(snapshot.q),
+        'posture': None if skeleton is None else _posture(skeleton),
+        'attitude': _attitude(snapshot),
+        'tilt': _tilt(snapshot),
+        'state': STATES[snapshot.state],
+        'torque': _torque(snapshot, settings),
+        'inputs': [_input(row) for row in snapshot.inputs],
+        'payload': {
+            'mass_kg': snapshot.payload.mass,
+            'cog_m': list(snapshot.payload.cog),
+        },
+    }
+
+
+def number(value: float) -> float | None:
+    """Return a number rounded to six digits behind the point; None where it is not finite."""
+    return round(float(value), 6) if math.isfinite(value) else None
+
+
+def numbers(values: Iterable[float]) -> list[float | None]:
+    """Return `number` of each."""
+    return [number(value) for value in values]
+
+
+def what_is_left(snapshot: Snapshot, settings: Settings) -> str:
+    """Return the smallest margins in a few words; '' where they are not known."""
+    if not snapshot.known:
+        return ''
+    parts = []
+    tilts = [(a, side) for side, a in zip(SIDES, snapshot.angle, strict=True) if math.isfinite(a)]
+    if tilts:
+        angle, side = min(tilts)
+        degrees = math.degrees(angle)
+        ways = (f'{degrees:.1f} degrees of tilt left', f'{-degrees:.1f} degrees past tipping')
+        parts.append(f'{ways[degrees < 0]} to the {side}')
+    else:
+        parts.append(f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})')
+    uses = _uses(snapshot, settings)
+    if uses:
+        use, name = max(uses)
+        parts.append(f'{name} at {use:.0%} of its limit')
+    return ', '.join(parts)
+
+
+def _uses(snapshot: Snapshot, settings: Settings) -> list[tuple[float, str]]:
+    joints = zip(settings.robot.joint_names, snapshot.torque, settings.limits.torque, strict=False)
+    return [
+        (abs(tau) / limit, name)
+        for name, tau, limit in joints
+        if math.isfinite(limit) and math.isfinite(tau)
+    ]
+
+
+def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
+    """Active before over, then severe, unseen and new first; a robot that tips before a motor.
+
+    A caution whose danger is there as well says nothing new and is left out.
+    """
+    worse = {(row.code, row.subject) for row in rows if row.level == ERROR and row.end is None}
+    rows = [row for row in rows if row.level != WARN or (row.code, row.subject) not in worse]
+
+    def key(row: AlertRow) -> tuple[object, ...]:
+        tips = row.code in {'TIP_OVER', 'NO_SUPPORT'}
+        return (row.end is not None, -row.level, not tips, not row.unseen, -row.start, row.key)
+
+    return sorted(rows, key=key)
+
+
+def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
+    active = [row for row in _by_urgency(snapshot.alerts) if row.end is None]
+    over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None and row.unseen]
+    if active and not (level == STALE and snapshot.problem):
+        more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
+        return active[0].text + more, active[0].advice
+    if level == STALE:
+        return snapshot.problem or UNKNOWN, WAIT
+    if over:
+        return f'over now, not acknowledged: {over[0].text}', 'acknowledge it when it is understood'
+    return FINE, ''
+
+
+def _alert(row: AlertRow, now: int) -> Plain:
+    return {
+        'key': row.key,
+        'code': row.code,
+        'subject': row.subject,
+        'level': LEVELS[row.level],
+        'word': WORDS[row.level],
+        'state': row.state,
+        'active': row.end is None,
+        'unseen': row.unseen,
+        'text': row.text,
+        'advice': row.advice,
+        'age_s': round((now - row.start) / 1e9, 1),
+        'offers': list(row.offers),
+        'note': row.note,
+    }
+
+
+def _posture(skeleton: Skeleton) -> Plain:
+    def point(p: Sequence[float]) -> list[float]:
+        return [round(x, 4) for x in p]
+
+    return {
+        'limbs': [
+            {'joint': limb.joint, 'from': point(limb.start), 'to': point(limb.end)}
+            for limb in skeleton.limbs
+        ],
+        'body': [point(corner) for corner in skeleton.body],
+        'contacts': [point(contact) for contact in skeleton.contacts],
+        'polygon': [point(corner) for corner in skeleton.polygon],
+        'cog': point(skeleton.cog),
+        'plumb': None if skeleton.plumb is None else point(skeleton.plumb),
+        'load': None if skeleton.load is None else point(skeleton.load),
+    }
+
+
+def _attitude(snapshot: Snapshot) -> Plain | None:
+    gravity = snapshot.gravity
+    if not all(map(math.isfinite, gravity)) or not any(gravity):
+        return None
+    x, y, z = gravity
+    roll, pitch = roll_pitch((-x, -y, -z))
+    size = math.sqrt(x * x + y * y + z * z)
+    return {
+        'roll_deg': number(math.degrees(roll)),
+        'pitch_deg': number(math.degrees(pitch)),
+        'slope_deg': number(math.degrees(math.acos(max(-1.0, min(1.0, -z / size))))),
+        'gravity': numbers(gravity),
+    }
+
+
+def _tilt(snapshot: Snapshot) -> list[Plain]:
+    return [
+        {'side': side, 'left_deg': number(math.degrees(angle))}
+        for side, angle in zip(SIDES, snapshot.angle, strict=True)
+    ]
+
+
+def _torque(snapshot: Snapshot, settings: Settings) -> list[Plain]:
+    nothing = (math.nan,) * len(settings.robot.joint_names)
+    rows = zip(
+        settings.robot.joint_names,
+        snapshot.torque or nothing,
+        snapshot.effort or nothing,
+        settings.limits.torque,
+        strict=True,
+    )
+    return [
+        {
+            'joint': name,
+            'torque': number(tau),
+            'measured': number(effort),
+            'limit': number(limit),
+            'use': number(abs(tau) / limit),
+        }
+        for name, tau, effort, limit in rows
+    ]
+
+
+def _input(row: InputRow) -> Plain:
+    return {
+        'name': row.name,
+        'topic': row.topic,
+        'level': LEVELS[row.level],
+        'rate_hz': number(row.rate),
+        'age_s': number(row.age),
+        'publishers': list(row.publishers),
+        'text': row.text,
+    }

@@ -1,0 +1,156 @@
+"""One feed, many clients: a frame is made once; who is slow gets the newest that he can take."""
+
+import asyncio
+import json
+import math
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from ugv_acceptance import AcceptanceError, BadSample
+from ugv_acceptance.console.feed import Feed
+from ugv_acceptance.console.frame import describe_robot, frame_of
+from ugv_acceptance.console.safe_map import MapKey, axes_of, key_of, probe, safe_map
+from ugv_acceptance.console.skeleton import Figure, figure_of
+from ugv_acceptance.console.snapshot import Snapshot
+
+# Seconds between frames and, at least, between two maps.
+FRAME = 0.05
+MAP = 0.2
+# A client that takes nothing for this long (s) is let go; more than this many are not let in.
+PATIENCE = 10.0
+MOST_CLIENTS = 32
+# Answers that wait for a client.
+_ANSWERS = 32
+
+
+@dataclass(slots=True, eq=False)
+class Client:
+    """One page or terminal: the newest frame and map it has not taken yet, and answers to it."""
+
+    axes: tuple[str, str]
+    frame: str | None = None
+    map: str | None = None
+    answers: deque[str] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
+    shown: MapKey | None = None
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def take(self) -> list[str]:
+        """Return what waits, and forget it: answers, then the map, then the frame."""
+        found = [*self.answers, *(text for text in (self.map, self.frame) if text is not None)]
+        self.answers.clear()
+        self.frame = self.map = None
+        self.ready.clear()
+        return found
+
+
+@dataclass(slots=True, eq=False)
+class Hub:
+    """Makes frames at 20 Hz while anybody looks, and does what clients ask."""
+
+    feed: Feed
+    clients: set[Client] = field(default_factory=set)
+    sent: int = 0
+    _figure: Figure = field(init=False)
+    _snapshot: Snapshot = field(init=False)
+    _maps: dict[MapKey, str] = field(default_factory=dict)
+    _map_due: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._figure = figure_of(self.feed.settings.robot)
+        self._snapshot = self.feed.snapshot()
+
+    async def run(self) -> None:
+        """Make frames until cancelled."""
+        clock = asyncio.get_running_loop().time
+        due = clock()
+        while True:
+            self._snapshot = self.feed.snapshot()
+            if self.clients:
+                self._offer_frame()
+                if clock() >= self._map_due:
+                    self._map_due = clock() + MAP
+                    await self._offer_maps()
+            # Late frames are left out, not made up for.
+            due = max(due + FRAME, clock())
+            await asyncio.sleep(due - clock())
+
+    def _offer_frame(self) -> None:
+        self.sent += 1
+        frame = frame_of(self._snapshot, self.feed.settings, self._figure)
+        text = as_json({'kind': 'frame', 'number': self.sent, **frame, **self.feed.extra()})
+        for client in self.clients:
+            client.frame = text
+            client.ready.set()
+
+    async def _offer_maps(self) -> None:
+        snapshot, settings = self._snapshot, self.feed.settings
+        for client in tuple(self.clients):
+            key = key_of(snapshot, settings, client.axes)
+            if key is None or key == client.shown:
+                continue
+            if key not in self._maps:
+                made = await asyncio.to_thread(safe_map, snapshot, settings, client.axes)
+                while len(self._maps) >= MOST_CLIENTS:
+                    del self._maps[next(iter(self._maps))]
+                self._maps[key] = as_json({'kind': 'map', **made})
+            client.shown, client.map = key, self._maps[key]
+            client.ready.set()
+
+    def join(self) -> Client:
+        """Return a new client, greeted. Raises BadSample where there are too many."""
+        if len(self.clients) >= MOST_CLIENTS:
+            raise BadSample(f'expected at most {MOST_CLIENTS} clients')
+        client = Client(axes_of(self.feed.settings))
+        hello = {**describe_robot(self.feed.settings), **self.feed.describe()}
+        client.answers.append(as_json({'kind': 'hello', 'axes': list(client.axes), **hello}))
+        client.ready.set()
+        self.clients.add(client)
+        return client
+
+    async def serve(self, client: Client, send: Callable[[str], Awaitable[None]]) -> None:
+        """Send a client what there is until it is gone or takes nothing any more."""
+        while True:
+            await client.ready.wait()
+            for text in client.take():
+                await asyncio.wait_for(send(text), PATIENCE)
+
+    def ask(self, client: Client, text: str) -> None:
+        """Do what a client asks (JSON with `do`); it is answered, whatever it sent."""
+        number: object = None
+        try:
+            values = json.loads(text)
+            if not isinstance(values, dict) or not isinstance(values.get('do'), str):
+                raise BadSample('expected an object with "do"')
+            number = values.get('number')
+            answer = {'ok': True, **self._do(client, values['do'], values)}
+        except (AcceptanceError, ValueError, RecursionError) as error:
+            answer = {'ok': False, 'text': str(error)}
+        client.answers.append(as_json({'kind': 'answer', 'number': _small(number), **answer}))
+        client.ready.set()
+
+    def _do(self, client: Client, do: str, values: dict[str, Any]) -> dict[str, Any]:
+        settings = self.feed.settings
+        if do == 'axes':
+            client.axes = axes_of(settings, (str(values.get('x')), str(values.get('y'))))
+            client.shown = None
+            return {'axes': list(client.axes)}
+        if do == 'probe':
+            at = (_number(values.get('x')), _number(values.get('y')))
+            return {'probe': probe(self._snapshot, settings, client.axes, at)}
+        return {'text': self.feed.command(do, values)}
+
+
+def as_json(value: dict[str, Any]) -> str:
+    """Return compact JSON that every parser takes: no NaN."""
+    return json.dumps(value, separators=(',', ':'), allow_nan=False)
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _small(number: object) -> int | None:
+    """Return a client's own number of its question; nothing else is sent back."""
+    return number if isinstance(number, int) and abs(number) < 1 << 53 else None

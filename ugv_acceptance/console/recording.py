@@ -1,0 +1,222 @@
+"""A recording as a console's feed: judged once, then played, paused and searched."""
+
+import math
+import time
+from bisect import bisect_right
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.judge import Judgement, judge
+from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.console.frame import number
+from ugv_acceptance.console.numbers import number_in
+from ugv_acceptance.console.playhead import SPEEDS, Playhead
+from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.track import Track, TrackMaker
+from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
+from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.summary import ordered
+from ugv_acceptance.evaluation.wording import advice, describe
+from ugv_acceptance.model.robot import Payload
+
+# An alert stays on the page this long (ns) after it is over.
+LINGER = 10_000_000_000
+INPUTS = ('joint_states', 'imu')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A judged recording: `snapshot_at` any of its times. Times are log times, ns."""
+
+    settings: Settings
+    bag: Bag
+    topics: Topics
+    judgement: Judgement
+    track: Track
+    worst: TrackMaker
+    alerts: tuple[Alert, ...]
+    payloads: tuple[tuple[int, Payload], ...]
+
+    def snapshot_at(self, when: int) -> Snapshot:
+        """Return what was known at `when`."""
+        alerts = tuple(self._alert(k, a, when) for k, a in self._near(when))
+        active = [row.level for row in alerts if row.end is None]
+        k = self.track.row(when)
+        payload = self.payloads[bisect_right(self.payloads, when, key=lambda p: p[0]) - 1][1]
+        if k < 0:
+            return Snapshot(when, STALE, 'nothing was received yet', payload=payload)
+        track = self.track
+        known = bool(track.known[k]) and not any(self._silent(w, when) for w in range(2))
+        nothing = Snapshot(when)
+        return Snapshot(
+            when,
+            max([*active, OK if known else STALE]),
+            '',
+            known,
+            _numbers(track.q[k]),
+            _numbers(track.effort[k]),
+            _numbers(track.gravity[k]) if known else nothing.gravity,  # type: ignore[arg-type]
+            _numbers(track.torque[k]) if known else (),
+            _numbers(track.angle[k]) if known else nothing.angle,
+            int(track.state[k]) if known else nothing.state,
+            payload,
+            alerts,
+            tuple(self._input(w, k, when) for w in range(2)),
+        )
+
+    def _near(self, when: int) -> list[tuple[int, Alert]]:
+        return [
+            (k, alert)
+            for k, alert in enumerate(self.alerts)
+            if alert.start <= when and (alert.end is None or when < alert.end + LINGER)
+        ]
+
+    def _alert(self, k: int, alert: Alert, when: int) -> AlertRow:
+        rule = alert.rule
+        over = alert.end is not None and alert.end <= when
+        # As it was known then: the worst up to now, not what was yet to come.
+        alert = replace(alert, peak=self.track.worst_of(rule, alert.start, when, alert.peak))
+        return AlertRow(
+            f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}-{k}',
+            rule.code,
+            rule.subject,
+            rule.level,
+            'over' if over else 'active',
+            describe(alert, self.settings),
+            advice(rule.code),
+            alert.start,
+            alert.end if over else None,
+        )
+
+    def _silent(self, which: int, when: int) -> bool:
+        return any(a <= when < b for a, b in self.judgement.evaluator.gaps[which])
+
+    def _input(self, which: int, k: int, when: int) -> InputRow:
+        heard = int(self.track.heard[k, which])
+        silent = heard < 0 or self._silent(which, when)
+        period = self.judgement.evaluator.fresh[which].period
+        topic = (self.topics.joint_states, self.topics.imu)[which] or ''
+        bad = [
+            a
+            for a in self.alerts
+            if a.rule.subject == INPUTS[which]
+            and a.start <= when
+            and (a.end is None or when < a.end)
+        ]
+        return InputRow(
+            INPUTS[which],
+            topic,
+            max([a.rule.level for a in bad], default=STALE if silent else OK),
+            0.0 if silent or not period > 0 else 1e9 / period,
+            math.nan if heard < 0 else (when - heard) / 1e9,
+            ('the recording',),
+            '; '.join(describe(a, self.settings) for a in bad),
+        )
+
+    def timeline(self) -> dict[str, Any]:
+        """Return the run at a glance: worst margins by stretches, alerts, verdict."""
+        start = self.bag.start_ns
+        return {
+            'duration_s': self.bag.duration_s,
+            'verdict': self.judgement.result['verdict'],
+            'tilt_deg': [number(math.degrees(x)) for x in self.worst.tilt],
+            'use': [number(x) for x in self.worst.use],
+            'alerts': [
+                {
+                    'code': a.rule.code,
+                    'level': LEVELS[a.rule.level],
+                    'text': describe(a, self.settings),
+                    'from_s': (a.start - start) / 1e9,
+                    'to_s': ((self.bag.end_ns if a.end is None else a.end) - start) / 1e9,
+                }
+                for a in self.alerts
+            ],
+        }
+
+
+def judge_for_console(bag: Bag, topics: Topics, settings: Settings) -> Recording:
+    """Return a recording that can be shown: reads all of it once."""
+    maker = TrackMaker(settings, bag.start_ns, bag.end_ns)
+    judgement = judge(bag, topics, settings, [maker])
+    alerts = tuple(ordered(judgement.evaluator.watch.log))
+    payloads = tuple(_payloads(bag, topics, settings))
+    return Recording(settings, bag, topics, judgement, maker.track(), maker, alerts, payloads)
+
+
+def _payloads(bag: Bag, topics: Topics, settings: Settings) -> list[tuple[int, Payload]]:
+    found = [(-1, settings.robot.payload)]
+    if topics.payload is None:
+        return found
+    for batch in bag.batches(Topics(None, None, topics.payload)):
+        for part in batch.payload:
+            for when, mass, com in zip(part.log_time, part.mass, part.com, strict=True):
+                load = payload_from(settings.robot, float(mass), com.tolist(), part.frame_id)
+                found += [(int(when), load)] if load else []
+    return sorted(found, key=lambda entry: entry[0])
+
+
+def _numbers(row: np.ndarray[Any, Any]) -> tuple[float, ...]:
+    return tuple(row.tolist())
+
+
+@dataclass(slots=True)
+class RecordingFeed:
+    """Plays a recording; `now` reads a clock (s) that never goes back."""
+
+    recording: Recording
+    now: Any = time.monotonic
+    settings: Settings = field(init=False)
+    head: Playhead = field(init=False)
+    _then: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.settings = self.recording.settings
+        self.head = Playhead(self.recording.bag.duration_s)
+        self._then = self.now()
+
+    def describe(self) -> dict[str, Any]:
+        """Return the recording's name and its timeline."""
+        title = ', '.join(Path(path).name for path in self.recording.bag.paths)
+        return {'source': 'bag', 'title': title, 'timeline': self.recording.timeline()}
+
+    def snapshot(self) -> Snapshot:
+        """Return the snapshot where the playhead is now."""
+        now = self.now()
+        self.head.advance(now - self._then)
+        self._then = now
+        start = self.recording.bag.start_ns
+        return self.recording.snapshot_at(start + round(self.head.position * 1e9))
+
+    def extra(self) -> dict[str, Any]:
+        """Return where the playhead is."""
+        head = self.head
+        return {
+            'playback': {
+                'position_s': round(head.position, 3),
+                'playing': head.playing,
+                'speed': head.speed,
+            }
+        }
+
+    def command(self, do: str, values: dict[str, Any]) -> str:
+        """Play, pause, seek (`to_s`) or change the `speed`."""
+        head = self.head
+        if do == 'play':
+            head.play()
+        elif do == 'pause':
+            head.pause()
+        elif do == 'seek':
+            head.seek(number_in(values, 'to_s'))
+        elif do == 'speed':
+            speed = number_in(values, 'speed')
+            if speed not in SPEEDS:
+                raise BadSample(f'speed: expected one of {SPEEDS}, got {speed}')
+            head.speed = speed
+        else:
+            raise BadSample(f'a recording cannot do {do!r}')
+        return do

@@ -1,0 +1,149 @@
+"""The safe map of two joints: where the robot could bring them, all else as it is now."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.console.frame import Plain, number
+from ugv_acceptance.console.snapshot import Snapshot
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.bilinear import Grid, grid_of
+from ugv_acceptance.model.maps import (
+    CAUTION,
+    FAILURE,
+    classes,
+    rollover_map,
+    torque_forms,
+    utilisation_map,
+)
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.stability import SIDES, stability
+from ugv_acceptance.model.statics import static_torque
+
+# What a cell says; the page's colours and hatches follow this order.
+SAFE_CELL, CAUTION_CELL, TORQUE_CELL, TIP_CELL, BOTH_CELL = range(5)
+CELLS = 73
+# Changes smaller than this (rad, m; m/s2; kg) do not make a new map.
+_STEP = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class MapKey:
+    """What a map depends on, rounded so that noise makes no new one."""
+
+    axes: tuple[str, str]
+    numbers: tuple[float, ...]
+
+
+def axes_of(settings: Settings, wanted: tuple[str, str] | None = None) -> tuple[str, str]:
+    """Return the two joints of a map: those wanted, else the first two with a torque limit.
+
+    Raises BadSample where a wanted joint is not one of the robot's, or both are the same.
+    """
+    names = settings.robot.joint_names
+    if wanted is not None:
+        if len(set(wanted)) != 2 or not set(wanted) <= set(names):
+            raise BadSample(f'map: expected two of {", ".join(names)}, got {" and ".join(wanted)}')
+        return wanted
+    limited = [n for n, limit in zip(names, settings.limits.torque, strict=True) if limit < np.inf]
+    first, second, *_ = [*limited, *(n for n in names if n not in limited), *names[:1]]
+    return first, second
+
+
+def key_of(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> MapKey | None:
+    """Return what the map of a snapshot depends on; None where that is not known."""
+    others = [
+        q
+        for name, q in zip(settings.robot.joint_names, snapshot.q, strict=False)
+        if name not in axes
+    ]
+    load = snapshot.payload
+    numbers = (*snapshot.gravity, *others, load.mass, *load.cog)
+    if not snapshot.q or not all(map(math.isfinite, numbers)):
+        return None
+    steps = (5 * _STEP,) * 3 + (_STEP,) * (len(numbers) - 3)
+    rounded = [round(x / step) * step for x, step in zip(numbers, steps, strict=True)]
+    return MapKey(axes, tuple(rounded))
+
+
+def safe_map(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Plain:
+    """Return the map as JSON: ranges (rad; m) and one digit a cell, rows of the first joint."""
+    grid = _grid(snapshot, settings, axes)
+    cells = _cells(snapshot, settings, grid)
+    return {
+        'x': axes[0],
+        'y': axes[1],
+        'x_range': [float(grid.x[0]), float(grid.x[-1])],
+        'y_range': [float(grid.y[0]), float(grid.y[-1])],
+        'rows': len(grid.x),
+        'columns': len(grid.y),
+        'cells': (cells + ord('0')).tobytes().decode('ascii'),
+    }
+
+
+def probe(
+    snapshot: Snapshot, settings: Settings, axes: tuple[str, str], at: tuple[float, float]
+) -> Plain:
+    """Return what would be if the two joints stood `at` (rad; m): margins of that posture.
+
+    Raises BadSample where the rest of the posture is not known or `at` is not two numbers.
+    """
+    if key_of(snapshot, settings, axes) is None or not all(map(math.isfinite, at)):
+        raise BadSample('map: expected a known posture and two numbers')
+    robot, load = settings.robot, snapshot.payload
+    q = list(snapshot.q)
+    for name, value in zip(axes, at, strict=True):
+        q[robot.joint_names.index(name)] = value
+    torque = static_torque(robot, q, snapshot.gravity, load)
+    angle: Any = [float(a) for a in stability(robot, q, snapshot.gravity, load).angle]
+    known = [(a, side) for a, side in zip(angle, SIDES, strict=True) if math.isfinite(a)]
+    least, side = min(known, default=(math.nan, ''))
+    limits = settings.limits.torque
+    uses = [
+        (abs(float(tau)) / limit, name)
+        for name, tau, limit in zip(robot.joint_names, torque, limits, strict=True)
+        if limit < np.inf
+    ]
+    use, joint = max(uses, default=(math.nan, ''))
+    return {
+        'at': [number(x) for x in at],
+        'tilt_deg': number(math.degrees(least)),
+        'side': side,
+        'use': number(use),
+        'joint': joint,
+    }
+
+
+def _grid(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Grid:
+    ranges = [_range(settings.robot, name) for name in axes]
+    q = np.nan_to_num(np.array(snapshot.q))
+    return grid_of(settings.robot, axes, ranges, (CELLS, CELLS), q)
+
+
+def _range(robot: Robot, name: str) -> tuple[float, float]:
+    joint = robot.joint(name)
+    if math.isfinite(joint.lower) and math.isfinite(joint.upper):
+        return joint.lower, joint.upper
+    return (-1.0, 1.0) if joint.kind == 'prismatic' else (-math.pi, math.pi)
+
+
+def _cells(snapshot: Snapshot, settings: Settings, grid: Grid) -> NDArray[np.uint8]:
+    robot, limits, load = settings.robot, settings.limits, snapshot.payload
+    gravity = snapshot.gravity
+    forms = torque_forms(robot, grid, gravity, load)
+    used = utilisation_map(robot, grid, forms, np.array(limits.torque))
+    torque = classes(-used, -limits.torque_warn, -limits.torque_error)
+    if robot.contacts:
+        tilt = rollover_map(robot, grid, gravity, load, workers=1).angle
+        tip = classes(tilt, limits.tip_warn, limits.tip_error)
+    else:
+        tip = np.zeros_like(torque)
+    cells = np.where((torque == CAUTION) | (tip == CAUTION), CAUTION_CELL, SAFE_CELL)
+    cells[torque == FAILURE] = TORQUE_CELL
+    cells[tip == FAILURE] = TIP_CELL
+    cells[(torque == FAILURE) & (tip == FAILURE)] = BOTH_CELL
+    return cells.astype(np.uint8)

@@ -1,0 +1,112 @@
+"""The console's web server: one page, its files, and one WebSocket."""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.responses import FileResponse
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from ugv_acceptance import BadConfig, BadSample
+from ugv_acceptance.console.hub import Hub
+from ugv_acceptance.console.security import App, Guard, check_address, guarded
+
+STATIC = Path(__file__).parent / 'static'
+# Bytes of a command; more is no command.
+LONGEST_COMMAND = 4096
+# A socket's send buffer (bytes): old frames are dropped here, not kept in the kernel.
+_BUFFER = 65536
+
+
+def application(hub: Hub, guard: Guard) -> App:
+    """Return the console as an ASGI application behind its checks."""
+
+    async def page(_: object) -> FileResponse:
+        return FileResponse(STATIC / 'index.html')
+
+    async def live(websocket: WebSocket) -> None:
+        await websocket.accept()
+        await _converse(hub, websocket)
+
+    @contextlib.asynccontextmanager
+    async def running(_: object) -> AsyncIterator[None]:
+        task = asyncio.create_task(hub.run())
+        yield
+        task.cancel()
+
+    routes = [
+        Route('/', page),
+        WebSocketRoute('/live', live),
+        Mount('/static', StaticFiles(directory=STATIC)),
+    ]
+    return guarded(Starlette(routes=routes, lifespan=running), guard)
+
+
+async def _converse(hub: Hub, websocket: WebSocket) -> None:
+    try:
+        client = hub.join()
+    except BadSample as error:
+        await websocket.close(1013, str(error))
+        return
+    sending = asyncio.create_task(hub.serve(client, websocket.send_text))
+    try:
+        while True:
+            asked = asyncio.create_task(websocket.receive_text())
+            done, _ = await asyncio.wait({asked, sending}, return_when=asyncio.FIRST_COMPLETED)
+            if sending in done:
+                asked.cancel()
+                break
+            hub.ask(client, asked.result())
+    except (WebSocketDisconnect, KeyError):
+        # A KeyError: the client sent bytes where text is expected.
+        pass
+    finally:
+        hub.clients.discard(client)
+        sending.cancel()
+        with contextlib.suppress(BaseException):
+            await sending
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):
+            await websocket.close()
+
+
+def serve(
+    hub: Hub,
+    host: str = '127.0.0.1',
+    port: int = 0,
+    token: str | None = None,
+    ready: Callable[[str], None] = lambda _: None,
+) -> None:
+    """Serve until SIGINT or SIGTERM; `ready` takes the page's address once the port is open.
+
+    Port 0 takes a free one. BadConfig where the address cannot be had, or must not be had.
+    """
+    check_address(host, token)
+    family = socket.AF_INET6 if ':' in host else socket.AF_INET
+    with socket.socket(family) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _BUFFER)
+        try:
+            listener.bind((host, port))
+        except (OSError, OverflowError) as error:
+            text = f'console: expected a free address, {host}:{port} is not: {error}'
+            raise BadConfig(text) from None
+        listener.listen(64)
+        config = uvicorn.Config(
+            application(hub, Guard(host, token)),
+            log_level='warning',
+            access_log=False,
+            server_header=False,
+            ws_max_size=LONGEST_COMMAND,
+            ws_max_queue=8,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+        )
+        name = f'[{host}]' if ':' in host else host
+        ready(f'http://{name}:{listener.getsockname()[1]}/')
+        uvicorn.Server(config).run(sockets=[listener])

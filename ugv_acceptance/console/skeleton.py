@@ -1,0 +1,139 @@
+"""A robot in its posture as points to draw: limbs, body, support polygon, centre of gravity."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ugv_acceptance.model.expressions import add, cross, dot, rotate, scale, subtract
+from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
+from ugv_acceptance.model.robot import Payload, Robot, Vector
+from ugv_acceptance.model.support import support_of
+from ugv_acceptance.model.tree import Tree, point_of, pose_of
+
+# Points of one body closer than this (m) are drawn as one.
+_SAME = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A straight part that moves with `joint`: from it to the next one, or to its end (m)."""
+
+    joint: str
+    start: Vector
+    end: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figure:
+    """What of a drawing does not move: ends of limbs (body, point in its axes), the box (m)."""
+
+    mechanics: Mechanics
+    tips: tuple[tuple[int, Vector], ...]
+    box: tuple[Vector, Vector]
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Points in `base_link` (m). `polygon` is counter-clockwise from above; empty: there is none.
+
+    `body` are the lower and the upper corner of a box that stands for the body. `plumb` is where
+    the line through the centre of gravity along gravity meets the plane of the polygon: the robot
+    stands while it is inside. None where gravity or the polygon are not known.
+    """
+
+    limbs: tuple[Limb, ...]
+    body: tuple[Vector, Vector]
+    contacts: tuple[Vector, ...]
+    polygon: tuple[Vector, ...]
+    cog: Vector
+    plumb: Vector | None
+    load: Vector | None
+
+
+def figure_of(robot: Robot) -> Figure:
+    """Return the drawing of a robot, to be made once."""
+    mechanics = mechanics_of(robot)
+    return Figure(mechanics, _tips(robot, mechanics.tree), _box(robot, mechanics.tree))
+
+
+def skeleton_of(
+    figure: Figure, q: Sequence[float], gravity: Vector, payload: Payload
+) -> Skeleton | None:
+    """Return the points of a posture; None where a position is not known."""
+    mechanics, robot = figure.mechanics, figure.mechanics.robot
+    if len(q) != len(robot.joint_names) or not all(map(math.isfinite, q)):
+        return None
+    posture = posture_of(mechanics, tuple(q), payload.mass, payload.cog)
+    contacts: Any = posture.contacts
+    cog: Any = posture.cog
+    support = support_of(robot, contacts, cog)
+    polygon = tuple(contacts[k] for k in support.polygon)
+    tree = mechanics.tree
+    pose: Any = pose_of(tree, [q[robot.joint_names.index(b.joint)] for b in tree.bodies[1:]])
+    limbs = tuple(
+        Limb(
+            tree.bodies[body].joint,
+            pose.origin[body],
+            _numbers(add(pose.origin[body], rotate(pose.rotation[body], tip))),
+        )
+        for body, tip in figure.tips
+    )
+    load: Any = None
+    if robot.payload_link is not None and payload.mass > 0.0:
+        _, load = point_of(tree, pose, robot.payload_link, payload.cog)
+    return Skeleton(
+        limbs, figure.box, tuple(contacts), polygon, cog, _plumb(cog, gravity, polygon), load
+    )
+
+
+def _tips(robot: Robot, tree: Tree) -> tuple[tuple[int, Vector], ...]:
+    """Return (body, end in its axes) of every limb: to child joints, links and contacts."""
+    found: list[tuple[int, Any]] = []
+    for body in range(1, len(tree.bodies)):
+        ends: list[Any] = [b.offset for b in tree.bodies if b.parent == body]
+        ends += [at for owner, _, at in tree.frames.values() if owner == body]
+        for contact in robot.contacts:
+            owner, rotation, xyz = tree.frames[contact.link]
+            if owner == body:
+                ends.append(add(xyz, rotate(rotation, contact.position)))
+        kept: list[Any] = []
+        for end in ends:
+            apart = all(math.dist(end, other) > _SAME for other in [(0.0, 0.0, 0.0), *kept])
+            kept += [end] if apart else []
+        found += [(body, end) for end in kept]
+    return tuple(found)
+
+
+def _box(robot: Robot, tree: Tree) -> tuple[Vector, Vector]:
+    """Return a box about the base's contact points, as high as the joints that hang on it."""
+    roots = [b.offset for b in tree.bodies[1:] if b.parent == 0]
+    points: list[Any] = [*roots]
+    for contact in robot.contacts:
+        owner, rotation, xyz = tree.frames[contact.link]
+        if owner == 0:
+            points.append(add(xyz, rotate(rotation, contact.position)))
+    if not points:
+        return (-0.1, -0.1, 0.0), (0.1, 0.1, 0.1)
+    x, y, z = zip(*points, strict=True)
+    low = min(robot.ground, *z) if len(z) > 1 else robot.ground
+    return (min(x), min(y), low), (max(x), max(y), max(z))
+
+
+def _plumb(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector | None:
+    if len(polygon) < 3 or not all(map(math.isfinite, gravity)):
+        return None
+    a, b, c = polygon[:3]
+    normal = cross(subtract(b, a), subtract(c, a))
+    down: Any = dot(normal, gravity)
+    # Gravity along the ground, or from below: the plumb line does not meet it.
+    if not down < 0.0:
+        return None
+    way: Any = dot(normal, subtract(a, cog)) / down
+    return _numbers(add(cog, scale(gravity, way)))
+
+
+def _numbers(v: Sequence[Any]) -> Vector:
+    """Return a vector of numbers: with numbers in, the model's formulas give numbers."""
+    x, y, z = v
+    return float(x), float(y), float(z)

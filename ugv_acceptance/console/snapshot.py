@@ -1,0 +1,70 @@
+"""What a console shows of one moment, whoever knows it: the live robot or a recording."""
+
+import math
+from dataclasses import dataclass
+
+from ugv_acceptance.evaluation.alerts import STALE
+from ugv_acceptance.evaluation.imu import NOWHERE, Vector
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import SIDES, UNKNOWN
+
+NOTHING = (math.nan,) * len(SIDES)
+NO_LOAD = Payload()
+
+
+@dataclass(frozen=True, slots=True)
+class AlertRow:
+    """One alert as it stands: `state` in words, times in ns, `offers` what one may do with it.
+
+    `key` is the same for the same alert in all snapshots. `unseen`: nobody acknowledged it.
+    """
+
+    key: str
+    code: str
+    subject: str
+    level: int
+    state: str
+    text: str
+    advice: str
+    start: int
+    end: int | None = None
+    unseen: bool = False
+    offers: tuple[str, ...] = ()
+    note: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class InputRow:
+    """How an input is: `rate` Hz, `age` s (NaN: none), who publishes it, what is wrong with it."""
+
+    name: str
+    topic: str
+    level: int
+    rate: float
+    age: float
+    publishers: tuple[str, ...] = ()
+    text: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One moment at `time` (ns). SI and radians; joints in the order of `robot.joint_names`.
+
+    `level` is that of the verdict. Where the margins are not `known`, `problem` may say why and the
+    numbers are NaN. `torque` (N m; N), `angle` (rad) the tilt left to each of SIDES, `state` a
+    number in STATES, `effort` what the motors measure.
+    """
+
+    time: int
+    level: int = STALE
+    problem: str = ''
+    known: bool = False
+    q: tuple[float, ...] = ()
+    effort: tuple[float, ...] = ()
+    gravity: Vector = NOWHERE
+    torque: tuple[float, ...] = ()
+    angle: tuple[float, ...] = NOTHING
+    state: int = UNKNOWN
+    payload: Payload = NO_LOAD
+    alerts: tuple[AlertRow, ...] = ()
+    inputs: tuple[InputRow, ...] = ()

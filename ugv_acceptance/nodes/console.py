@@ -1,0 +1,288 @@
+"""The console's live feed: the monitor's word on the robot, and the inputs it speaks of.
+
+The verdict and the alerts are the monitor's: if it falls silent there are NO DATA. What is drawn is
+computed here from the same inputs by the same code, so that a page costs the monitor nothing.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import InertiaStamped
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.config import Config
+from ugv_acceptance.console.alert_book import AlertBook
+from ugv_acceptance.console.numbers import number_in
+from ugv_acceptance.console.snapshot import NO_LOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
+from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.nodes.faults import what_to_do
+from ugv_acceptance.nodes.inputs import Inputs, qos_of
+from ugv_acceptance.nodes.outputs import LATCHED
+from ugv_acceptance.nodes.running import Stop, ros, spin
+from ugv_acceptance.nodes.session import Session
+
+MONITOR = 'acceptance_monitor'
+PERIOD = 0.05
+# Seconds without a verdict (it comes each second), without margins while inputs arrive, without a
+# snapshot of our own, after which nothing that was said counts any more.
+VERDICT_SILENCE = 2.5
+MARGIN_SILENCE = 0.5
+OWN_SILENCE = 0.5
+_DEPTH = 100
+
+
+@dataclass(slots=True)
+class Heartbeat:
+    """How regularly something is heard; `last` and `period` in seconds of a monotonic clock."""
+
+    last: float | None = None
+    period: float = 0.0
+
+    def beat(self, now: float) -> None:
+        """Take one."""
+        if self.last is not None:
+            self.period += 0.1 * (min(now - self.last, 1.0) - self.period)
+        self.last = now
+
+    def silent(self, now: float, least: float) -> bool:
+        """Return whether it was heard before, and not for `least` s and five of its periods."""
+        return self.last is not None and now - self.last > max(least, 5.0 * self.period)
+
+
+class ConsoleNode(Node):
+    """Listens to a robot and its monitor. `latest` is replaced, never changed."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__('acceptance_console')
+        self.config, self.settings = config, config.settings
+        self.book = AlertBook()
+        self.verdict: DiagnosticStatus | None = None
+        self.heard, self.margins = Heartbeat(), Heartbeat()
+        self.session = Session(
+            self.settings, lambda _stamp, _margins: None, self._take_own, self._complain
+        )
+        self._inputs = Inputs(self, config.topics, self.session, _DEPTH)
+        self._asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._load: InertiaStamped | None = None
+        self._load_out: Any = None
+        self._known_since: float | None = None
+        self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
+        self.create_subscription(DiagnosticArray, f'{MONITOR}/alerts', self._on_alerts, 50)
+        self.create_subscription(
+            JointState, f'{MONITOR}/stability', lambda _: self._beat(), 10, raw=True
+        )
+        self._callers = {
+            do: self.create_client(Trigger, f'{MONITOR}/{do}') for do in ('acknowledge', 'reset')
+        }
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(PERIOD, self._every_frame, clock=steady)
+        self.create_timer(1.0, self._every_second, clock=steady)
+        self.latest: tuple[float, Snapshot] = (time.monotonic(), Snapshot(time.time_ns()))
+
+    # The feed, called from the server's thread
+
+    def describe(self) -> dict[str, Any]:
+        """Return where the numbers come from."""
+        where = self.get_namespace()
+        return {'source': 'live', 'title': 'live' if where == '/' else f'live {where}'}
+
+    def extra(self) -> dict[str, Any]:
+        """Return nothing: a live robot adds nothing to a frame."""
+        return {}
+
+    def snapshot(self) -> Snapshot:
+        """Return the newest snapshot; NO DATA where our own thread stands still."""
+        made, found = self.latest
+        if time.monotonic() - made <= OWN_SILENCE:
+            return found
+        return Snapshot(
+            time.time_ns(), problem='the console no longer hears ROS', alerts=found.alerts
+        )
+
+    def command(self, do: str, values: dict[str, Any]) -> str:
+        """Acknowledge, reset, or declare a payload. Raises BadSample for anything else."""
+        if do in self._callers:
+            if values.get('key') is not None:
+                raise BadSample('this monitor acknowledges all alerts at once')
+            note = ', '.join(str(values.get(k) or '') for k in ('by', 'note')).strip(', ')
+            self._asked.put(lambda: self._call(do, note[:200]))
+            return f'asked the monitor: {do}'
+        if do == 'payload':
+            return self._declare(values)
+        raise BadSample(f'a live robot cannot do {do!r}')
+
+    def _declare(self, values: dict[str, Any]) -> str:
+        cog = values.get('cog_m')
+        if not isinstance(cog, list) or len(cog) != 3:
+            raise BadSample(f'cog_m: expected three numbers, got {cog!r}')
+        numbers = dict(zip('xyz', cog, strict=True))
+        mass, com = number_in(values, 'mass_kg'), [number_in(numbers, k) for k in 'xyz']
+        link = self.settings.robot.payload_link or ''
+        if payload_from(self.settings.robot, mass, com, link) is None:
+            raise BadSample(f'expected a mass in kg from 0 on, in reach of {link}, got {mass}')
+        message = InertiaStamped()
+        message.header.frame_id = link
+        message.inertia.m = mass
+        message.inertia.com.x, message.inertia.com.y, message.inertia.com.z = com
+        self._asked.put(lambda: self._carry(message))
+        return f'declared {mass:g} kg'
+
+    # In the node's own thread
+
+    def _carry(self, message: InertiaStamped) -> None:
+        topic = self.config.topics.payload
+        if self._load_out is None:
+            self._load_out = self.create_publisher(
+                InertiaStamped, topic.name, qos_of(topic, topic.depth)
+            )
+        self._load = message
+        self._say_load()
+
+    def _say_load(self) -> None:
+        """Say it each second: who comes later hears it too."""
+        if self._load is not None:
+            self._load.header.stamp = self.get_clock().now().to_msg()
+            self._load_out.publish(self._load)
+
+    def _call(self, do: str, note: str) -> None:
+        if self._callers[do].service_is_ready():
+            self.book.annotate(note)
+            self._callers[do].call_async(Trigger.Request())
+
+    def _beat(self) -> None:
+        self.margins.beat(time.monotonic())
+
+    def _on_verdict(self, status: DiagnosticStatus) -> None:
+        self.verdict = status
+        self.heard.beat(time.monotonic())
+        values = {pair.key: pair.value for pair in status.values}
+        if values.get('alerts_active') == '0' and 'code' not in values:
+            self.book.clear()
+
+    def _on_alerts(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            self.book.take(values, status.message)
+
+    def _take_own(self) -> None:
+        self.session.follower.take()
+
+    def _complain(self, text: str) -> None:
+        self.get_logger().warning(text, throttle_duration_sec=5.0)
+
+    def _every_second(self) -> None:
+        self._inputs.look_around([])
+        self.session.measure_rates()
+        self._say_load()
+
+    def _every_frame(self) -> None:
+        try:
+            while True:
+                self._asked.get_nowait()()
+        except Empty:
+            pass
+        self.session.tick()
+        now = time.monotonic()
+        self.latest = (now, self._look(now))
+
+    def _problem(self, now: float) -> str:
+        """Return why nothing may be believed; '' where the monitor is heard."""
+        margins = self.session.evaluator.margins
+        if margins is None:
+            self._known_since = None
+        elif self._known_since is None:
+            self._known_since = now
+        if self.verdict is None:
+            return 'no monitor is heard: start `ugv-acceptance monitor`'
+        since = now - (self.heard.last or 0.0)
+        if since > VERDICT_SILENCE:
+            return f'the monitor has been silent for {since:.0f} s'
+        arriving = self._known_since is not None and now - self._known_since > MARGIN_SILENCE
+        if arriving and self.margins.silent(now, MARGIN_SILENCE):
+            return 'the monitor is silent although its inputs arrive'
+        level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
+        return self.verdict.message if level == STALE or margins is None else ''
+
+    def _look(self, now: float) -> Snapshot:
+        evaluator, problem = self.session.evaluator, self._problem(now)
+        margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
+        own = [*evaluator.watch.active, *self.session.faults.active]
+        inputs = tuple(self._input(name, own) for name in ('joint_states', 'imu', 'payload'))
+        alerts = self.book.also(self._row(alert) for alert in own)
+        told = () if problem and self.verdict is None else alerts
+        moment = self.session.clock.now()
+        if margins is None or problem or self.verdict is None:
+            q = tuple(joints.q)
+            load = evaluator.payload or NO_LOAD
+            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=inputs)
+        return Snapshot(
+            moment,
+            self.verdict.level[0],
+            '',
+            known=True,
+            q=margins.q,
+            effort=tuple(joints.effort),
+            gravity=margins.gravity,
+            torque=margins.torque,
+            angle=tuple(float(a) for a in margins.stability.angle),
+            state=int(margins.stability.state),
+            payload=evaluator.payload,
+            alerts=told,
+            inputs=inputs,
+        )
+
+    def _row(self, alert: Alert) -> AlertRow:
+        rule = alert.rule
+        return AlertRow(
+            f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}',
+            rule.code,
+            rule.subject,
+            rule.level,
+            'active, seen by this console only',
+            self.session.faults.sentence(alert, self.settings),
+            what_to_do(rule.code),
+            alert.start,
+        )
+
+    def _input(self, name: str, active: list[Alert]) -> InputRow:
+        count, now = self.session.counts[name], self.session.clock.now()
+        mine = [a for a in active if a.rule.subject == name]
+        silent = STALE if not count.taken and name != 'payload' else OK
+        sentences = [self.session.faults.sentence(a, self.settings) for a in mine]
+        optional = 'optional; none was declared' if name == 'payload' and not count.taken else ''
+        return InputRow(
+            name,
+            self._inputs.subscriptions[name].topic_name,
+            max([a.rule.level for a in mine], default=silent),
+            self.session.rates.get(name, 0.0),
+            (now - count.last) / 1e9 if count.taken else float('nan'),
+            tuple(self._inputs.publishers.get(name, ())),
+            '; '.join(sentences) or optional,
+        )
+
+
+@contextmanager
+def live_feed(config: Config, args: list[str] | None = None) -> Iterator[ConsoleNode]:
+    """Run the console's node in a thread of its own."""
+    with ros(args):
+        node, stop = ConsoleNode(config), Stop()
+        thread = Thread(target=spin, args=(node, stop), name='ros')
+        thread.start()
+        try:
+            yield node
+        finally:
+            stop.asked = True
+            thread.join()
+            node.destroy_node()
