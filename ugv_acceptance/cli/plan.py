@@ -8,6 +8,9 @@ import typer
 if TYPE_CHECKING:
     from ugv_acceptance.plan.plan import Plan
 
+# Columns of the table where the output is no terminal.
+_WIDE = 160
+
 
 def plan(
     *,
@@ -93,6 +96,8 @@ def _print(made: 'Plan') -> None:
             ', '.join(step.alerts.must),
         )
     console = Console(highlight=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, width=_WIDE)
     console.print(table)
     minutes = duration(made) / 60.0
     console.print(f'{len(made.steps)} steps, {minutes:.0f} min of motion and holding')

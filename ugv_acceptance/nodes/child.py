@@ -1,6 +1,6 @@
 """A node in a process of its own that ends when its parent does, even one that was killed.
 
-`python -m ugv_acceptance.nodes.child simulator --ros-args ...`: standard input is the parent's pipe.
+`python -m ugv_acceptance.nodes.child simulator --ros-args ...`; its input is the parent's pipe.
 """
 
 import os
@@ -39,7 +39,8 @@ def child(
 
 
 def _end_with_parent() -> None:
-    while sys.stdin.buffer.read(1024):
+    # Not sys.stdin: its lock would be held when the interpreter ends.
+    while os.read(0, 1024):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
 

@@ -88,7 +88,8 @@ class Guard(Node):
         rows: list[tuple[Any, str, str, Any, Qos, Callable[[bytes], None]]] = [
             (JointState, topics.joint_states.name, 'sensor_msgs/msg/JointState',
              qos_of(topics.joint_states, 1000), sensor, self._on_joints()),
-            (Imu, topics.imu.name, 'sensor_msgs/msg/Imu', qos_of(topics.imu, 1000), sensor, _nothing),
+            (Imu, topics.imu.name, 'sensor_msgs/msg/Imu',
+             qos_of(topics.imu, 1000), sensor, _nothing),
             (InertiaStamped, topics.payload.name, 'geometry_msgs/msg/InertiaStamped',
              qos_of(topics.payload, 10), Qos(), _nothing),
             (DiagnosticArray, f'{MONITOR}/alerts', 'diagnostic_msgs/msg/DiagnosticArray',

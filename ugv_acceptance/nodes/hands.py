@@ -13,7 +13,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ugv_acceptance.model.orientations import ORIENTATIONS
 from ugv_acceptance.nodes.guard import Guard
-from ugv_acceptance.plan.plan import Posture, Step
+from ugv_acceptance.plan.plan import Step
 
 SIM, ROBOT, OPERATOR = 'sim', 'robot', 'operator'
 SIMULATOR = 'packbot_simulator'
@@ -36,7 +36,7 @@ class Hands:
     guard: Guard
     mode: str
     ask: Ask
-    wait: Wait
+    wait: Wait = time.sleep
 
     def __post_init__(self) -> None:
         guard = self.guard
@@ -85,7 +85,7 @@ class Hands:
         return message
 
     def move(self, posture: Mapping[str, float], speed: float, step: Step | None = None) -> float:
-        """Start a motion to `posture` (rad) at a peak `speed` (rad/s); return how long it takes (s).
+        """Start a motion to `posture` (rad) at a peak `speed` (rad/s); return its length (s).
 
         In mode operator a person is told what to do and the time is unknown: infinite.
         """
@@ -134,8 +134,3 @@ class Hands:
         self._tilt = 0.0
         self.declare(0.0)
         self.wait(REST)
-
-
-def text_of(posture: Posture) -> str:
-    """Return a posture (deg) as people read it."""
-    return ', '.join(f'{name} {angle:g}' for name, angle in posture.items())

@@ -5,46 +5,45 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.task import Future
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config
 from ugv_acceptance.nodes.guard import Guard
 from ugv_acceptance.nodes.hands import OPERATOR, SIM, Hands
 from ugv_acceptance.nodes.running import PATIENCE, Stop
 from ugv_acceptance.plan.plan import SIMULATION, Posture, Step, radians_of
 from ugv_acceptance.run.folder import RunFolder
-from ugv_acceptance.run.verdicts import INCONCLUSIVE, SKIPPED, Done, Seen, judge_step
+from ugv_acceptance.run.verdicts import INCONCLUSIVE, SKIPPED, Done, judge_step
 
 # Seconds: between two looks, for a motion beyond its time, for a person, for alerts to be over.
 LOOK, GRACE, PERSON, CALM = 0.02, 3.0, 600.0, 6.0
+# Times a step is tried.
+ATTEMPTS = 2
 # Unwanted in every motion between steps.
 ALWAYS = ('ERROR', 'STALE')
 # Speed (rad/s) of motions to and from home.
 HOME_SPEED = math.radians(35.0)
 
-Say = Callable[[str], None]
-
 
 @dataclass(slots=True)
 class Runner:
-    """Does the steps of a plan one after the other; `stop.asked` ends it after freezing.
-
-    `seen` gathers the margins of all steps done, for the coverage.
-    """
+    """Does the steps of a plan one after the other; `stop.asked` freezes and ends it."""
 
     config: Config
     folder: RunFolder
     guard: Guard
     hands: Hands
     stop: Stop
-    say: Say
-    seen: list[Seen] = field(default_factory=list)
     _setup: Any = None
     _lying: bool = True
+
+    def __post_init__(self) -> None:
+        self.hands.wait = self.pause
 
     @property
     def going(self) -> bool:
@@ -52,32 +51,40 @@ class Runner:
         return not (self.stop.asked or self.guard.watched.stopped)
 
     def run(self, step: Step) -> dict[str, Any] | None:
-        """Do one step and return its result, which is written; None if the run was interrupted."""
+        """Do one step and return its result, which is written; None if the run was interrupted.
+
+        A step that showed nothing because messages were missing is done again, once.
+        """
         refused = self._refused(step)
         if refused:
             return self._finish(step, {'verdict': SKIPPED, 'reasons': [refused]})
+        result: dict[str, Any] | None = None
+        for _ in range(ATTEMPTS):
+            result = self._attempt(step)
+            if result is None or result['verdict'] != INCONCLUSIVE or self.guard.watched.dead:
+                break
+        return None if result is None else self._finish(step, result)
+
+    def _attempt(self, step: Step) -> dict[str, Any] | None:
         try:
             problem = self._prepare(step)
             if problem:
-                if self.stop.asked:
-                    return None
                 self._lying = True
-                return self._finish(step, {'verdict': INCONCLUSIVE, 'reasons': [problem]})
+                return None if self.stop.asked else {'verdict': INCONCLUSIVE, 'reasons': [problem]}
             recording = self.folder.recording(step)
             self.guard.record(recording)
             self.hands.declare(step.payload_kg)
-            self._wait(0.3)
+            self.pause(0.3)
             done = self._perform(step)
         finally:
             self.guard.disarm()
             self.guard.stop_recording()
         if self.stop.asked:
+            self.guard.freeze()
             return None
         # After what cannot be held, or was stopped, the robot is set up from the start.
         self._lying = step.where == SIMULATION or bool(done.stopped or done.fault)
-        result, seen = judge_step(step, recording, self.config, done)
-        self.seen.append(seen)
-        return self._finish(step, result)
+        return judge_step(step, recording, self.config, done)
 
     def _refused(self, step: Step) -> str:
         if step.action == 'pull' and self.hands.mode == SIM:
@@ -92,6 +99,13 @@ class Runner:
         return result
 
     # Before a step
+
+    def wait_for_all(self, seconds: float) -> None:
+        """Wait until robot and monitor are there; BadConfig says which of them was not."""
+        there = self._until(lambda: bool(self.guard.position) and self.guard.heard > 0.0, seconds)
+        if not there and not self.stop.asked:
+            missing = 'the monitor' if self.guard.position else 'joint states of the robot'
+            raise BadConfig(f'expected {missing} within {seconds:g} s, got nothing')
 
     def _prepare(self, step: Step) -> str:
         """Bring the robot home and set it up where anything changes; return what was wrong."""
@@ -136,12 +150,12 @@ class Runner:
             if not self._go(posture, slow, step.alerts.must_not, step):
                 return self._done(begin, time.time_ns(), reached=False)
         if step.action == 'sweep':
-            self._wait(0.5)
+            self.pause(0.5)
             hold = time.time_ns()
             reached = self._go(step.posture_deg, speed, step.alerts.must_not, step)
         else:
             reached = self._go(step.posture_deg, speed, step.alerts.must_not, step)
-            self._wait(self._settle)
+            self.pause(self._settle)
             hold = time.time_ns()
         self._act(step)
         return self._done(begin, hold, reached=reached or not _holds(step))
@@ -159,13 +173,15 @@ class Runner:
                     speed = math.radians(step.speed_degps)
                     if not self._go(posture, speed, step.alerts.must_not, step):
                         return
-                    self._wait(min(1.0, max(end - time.monotonic(), 0.0)))
+                    self.pause(min(1.0, max(end - time.monotonic(), 0.0)))
         else:
-            self._wait(step.hold_s)
+            self.pause(step.hold_s)
 
     def _done(self, begin: int, hold: int, *, reached: bool) -> Done:
         stopped = self.guard.watched.stopped
-        fault = stopped if self.guard.watched.dead else ''
+        # Missing data neither passes nor fails.
+        missing = self.guard.watched.dead or stopped.startswith('STALE')
+        fault = stopped if missing else ''
         return Done(begin, hold, time.time_ns(), reached, '' if fault else stopped, fault)
 
     @property
@@ -185,11 +201,11 @@ class Runner:
         target = radians_of(posture)
         seconds = self.hands.move(target, speed, step)
         if step is not None and not _holds(step):
-            self._wait(seconds if self.hands.mode != OPERATOR else 0.0)
+            self.pause(seconds if self.hands.mode != OPERATOR else 0.0)
             return self.going
         limit = PERSON if self.hands.mode == OPERATOR else seconds + GRACE
         if math.isfinite(seconds):
-            self._wait(0.9 * seconds)
+            self.pause(0.9 * seconds)
         return self._until(lambda: self._there(target) or not self.going, limit) and self.going
 
     def _there(self, target: dict[str, float]) -> bool:
@@ -207,7 +223,8 @@ class Runner:
             time.sleep(LOOK)
         return True
 
-    def _wait(self, seconds: float) -> None:
+    def pause(self, seconds: float) -> None:
+        """Let seconds pass, fewer when something stops the step in hand."""
         end = time.monotonic() + seconds
         while time.monotonic() < end and self.going:
             time.sleep(LOOK)

@@ -19,13 +19,14 @@ from geometry_msgs.msg import Inertia, Twist, Vector3
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from ugv_acceptance import BadSample
+from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.nodes.inputs import qos_of
@@ -64,7 +65,11 @@ class Simulator(Node):
         )
         self._tick = 1.0 / rates[1]
         self._count = 0
-        start = tuple((n, q) for n, q in STOWED if n in robot.joint_names)
+        stowed = dict(STOWED)
+        home = list(self._value('home') or ()) or [stowed.get(n, 0.0) for n in robot.joint_names]
+        if len(home) != len(robot.joint_names):
+            raise BadConfig(f'home: expected {len(robot.joint_names)} positions, got {len(home)}')
+        start = tuple(zip(robot.joint_names, home, strict=True))
         self.remote = RemoteRobot(
             weakened(robot, faults), build_of(config), start, overload(faults)
         )
@@ -96,6 +101,8 @@ class Simulator(Node):
         declare('clock', False, described('publish /clock; stamps are then simulated time'))
         declare('joint_rate', 100.0, described('joint states a second', 1.0, 1000.0))
         declare('imu_rate', 200.0, described('IMU messages a second', 1.0, 1000.0))
+        what = 'positions (rad) at the start, in the order of the configuration; empty: stowed'
+        declare('home', Parameter.Type.DOUBLE_ARRAY, described(what))
         declare('faults', [''], described('KIND[:SUBJECT][=AMOUNT][@START[-END]], as of simulate'))
 
     def _subscribe(self) -> None:

@@ -11,11 +11,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
+from ugv_acceptance.model.maps import Levels
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, look, roles_of
 from ugv_acceptance.report.regions import (
-    Levels,
     degree_axes,
     draw_regions,
     figure,
@@ -43,7 +43,7 @@ LEVELS = (
     ('STALE', 'margins are not known', 'stop: nothing protects the robot now'),
 )
 # Steps (deg) of the map; a joint's range in it.
-MAP_STEP, MAP_RANGE = 3.0, (-90.0, 180.0)
+MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.orientations import ORIENTATIONS
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
-from ugv_acceptance.plan.order import ordered
+from ugv_acceptance.plan.order import distance, ordered
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, Found, Mask, look, roles_of, safe, safe_way, spread_out
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
@@ -24,6 +24,9 @@ SPARE = 0.05
 # Use of the torque limit just inside and just outside; tilt left (deg) inside, beyond, tipping.
 INSIDE, OUTSIDE = (0.90, 0.97), (1.04, 1.15)
 TILT_INSIDE, TILT_BEYOND, TILT_OVER = (6.0, 9.0), (1.0, 4.0), (-8.0, -2.5)
+
+# Speed (deg/s) of a demonstration: just below the rate to which the static model holds.
+QUICK = 35.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,7 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
         *endurance_steps(arm, home, wanted.endurance),
     ]
     if wanted.short:
-        steps = _few(steps)
+        steps = _few(steps, place)
     routed = _routed(arm, ordered([_refused(arm, s) for s in steps], place), home)
     final = ordered(routed, place)
     return Plan(
@@ -239,25 +242,23 @@ def _vector(arm: Arm, home: Floats, posture: Posture) -> Floats:
     return q
 
 
-def _few(steps: Sequence[Step]) -> list[Step]:
-    """Return one step of each kind, as a demonstration wants it."""
+def _few(steps: Sequence[Step], home: Posture) -> list[Step]:
+    """Return one step of each kind, near home and quick, as a demonstration wants it."""
     wanted = (
         ('torque boundary', ROBOT, 'hold'),
-        ('torque boundary', SIMULATION, 'hold'),
         ('rollover boundary', ROBOT, 'hold'),
         ('speed', ROBOT, 'sweep'),
         ('rollover boundary', SIMULATION, 'tip'),
     )
+    quick = {'hold_s': 1.5, 'speed_degps': QUICK}
     found = []
-    for group, where, action in wanted:
-        of = [s for s in steps if (s.group, s.where, s.action) == (group, where, action)]
-        found += of[-1:]
-    return [
-        s.model_copy(update={'hold_s': min(s.hold_s, 2.0), 'speed_degps': 35.0})
-        if s.action != 'sweep'
-        else s
-        for s in found
-    ]
+    for kind in wanted:
+        of = [s for s in steps if (s.group, s.where, s.action) == kind]
+        if of:
+            nearest = min(of, key=lambda s: (not s.alerts.must, distance(home, s.posture_deg)))
+            sweeps = nearest.action == 'sweep'
+            found.append(nearest if sweeps else nearest.model_copy(update=quick))
+    return found
 
 
 def _numbered(steps: Sequence[Step]) -> list[Step]:

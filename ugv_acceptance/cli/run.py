@@ -1,0 +1,75 @@
+"""`ugv-acceptance run`: a test plan done on a simulated or a real robot, recorded and judged."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+
+__all__ = ['CONTEXT', 'run']
+
+
+def run(
+    context: typer.Context,
+    plan: Annotated[Path, typer.Argument(help='A plan made by `ugv-acceptance plan`.')],
+    *,
+    sim: Annotated[bool, typer.Option('--sim', help='Start a simulated robot and use it.')] = False,
+    robot: Annotated[
+        bool, typer.Option('--robot', help='Send trajectories to the arm controller of a robot.')
+    ] = False,
+    operator: Annotated[
+        bool, typer.Option('--operator', help='A person moves the robot and is told how.')
+    ] = False,
+    out: Annotated[
+        Path, typer.Option('--out', '-o', help='New folder for recordings and results.')
+    ] = Path('run'),
+    resume: Annotated[
+        bool, typer.Option('--resume', help='Continue an interrupted run in that folder.')
+    ] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(help='Only this step or group; may be given several times.')
+    ] = None,
+    skip: Annotated[
+        list[str] | None, typer.Option(help='Not this step or group; may be given several times.')
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
+    ] = None,
+    seed: Annotated[int, typer.Option(help='Seed of the simulated sensors.')] = 1,
+    fault: Annotated[
+        list[str] | None, typer.Option(help='A fault of the simulated robot, as of simulate.')
+    ] = None,
+) -> None:
+    """Do a plan's steps: move, hold, record, and judge each by its recording.
+
+    Motion freezes at any alert a step does not expect, and when the monitor falls silent. The exit
+    code is 0 for PASS, 1 for FAIL, 2 for bad input, 3 for INCONCLUSIVE or interrupted.
+
+    \b
+    Examples:
+      ugv-acceptance run plan.yaml --sim --out out/sim --skip endurance
+      ugv-acceptance run plan.yaml --robot --out runs/robot7
+      ugv-acceptance run plan.yaml --operator --out runs/robot7 --resume
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    modes = [name for name, on in (('sim', sim), ('robot', robot), ('operator', operator)) if on]
+    if len(modes) != 1:
+        raise typer.BadParameter(
+            f'expected one of --sim, --robot, --operator, got {modes or "none"}'
+        )
+    from ugv_acceptance.cli.running_plan import Asked, execute
+
+    asked = Asked(
+        plan=plan,
+        mode=modes[0],
+        out=out,
+        resume=resume,
+        only=tuple(only or ()),
+        skip=tuple(skip or ()),
+        config=config,
+        seed=seed,
+        faults=tuple(fault or ()),
+        ros_args=tuple(ros_arguments(context)),
+    )
+    raise typer.Exit(execute(asked))

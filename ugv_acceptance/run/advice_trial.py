@@ -1,0 +1,131 @@
+"""Advice tried out: the simulated robot does as it was told, and its margins are taken anew."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ugv_acceptance.evaluation.advice import Advice, advise
+from ugv_acceptance.evaluation.candidates import TURN_RATE
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.attitude import up_from_orientation
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.robot import IDENTITY, Payload
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
+from ugv_acceptance.simulation.scenario import Command
+from ugv_acceptance.simulation.simulation import Simulation
+from ugv_acceptance.simulation.tip_cases import TipCase, random_cases
+
+# Time (s) after which a motion that has ended has calmed down.
+CALM = 0.8
+STEEPEST = 0.5
+# A case begins with at least this margin (rad), so that the robot stands until it can be told, and
+# with motors that give what the model says (N m; N): else the arm leans on the ground or the body.
+STANDS, LEANS = math.radians(2.0), 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """Advice that was followed: the margin it was for, in the simulation before and after.
+
+    In rad of tilt, or N m (N) between limit and what the motor was measured to give.
+    """
+
+    case: TipCase
+    advice: Advice
+    before: float
+    after: float
+
+    @property
+    def helped(self) -> bool:
+        """Whether the margin is larger than before."""
+        return self.after > self.before
+
+
+def trials(settings: Settings, count: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Trial]:
+    """Yield `count` trials of the best advice of these kinds (joint, turn, payload).
+
+    Random postures, loads and slopes in which a margin is below its warning limit and the robot
+    still stands.
+    """
+    found, offset = 0, 0
+    while found < count:
+        for case in random_cases(settings.robot, 50, seed + offset, steepest=STEEPEST):
+            trial = _trial(settings, case, kinds) if _stands(settings, case) else None
+            if trial is not None:
+                found += 1
+                yield trial
+            if found == count:
+                return
+        offset += 1
+
+
+def _stands(settings: Settings, case: TipCase) -> bool:
+    """Return whether the robot stands on its tracks and holds its arm, with a margin to tell it."""
+    s, c = math.sin(case.tilt), math.cos(case.tilt)
+    across = (s * math.cos(case.heading), s * math.sin(case.heading), -c)
+    down = settings.robot.gravity * np.array(across)
+    now = margins(settings.robot, case.q, down, case.payload)
+    if now.state != 0 or not (now.angle > STANDS).all():
+        return False
+    holds = np.abs(now.torque) < 0.95 * np.array(settings.limits.torque)
+    return bool(holds.all() and advise(settings, case.q, down.tolist(), case.payload))
+
+
+def _trial(settings: Settings, case: TipCase, kinds: tuple[str, ...]) -> Trial | None:
+    start = tuple(zip(settings.robot.joint_names, case.q, strict=True))
+    simulation = Simulation(settings.robot, start, (case.tilt, case.heading), case.payload)
+    q, down, effort = _state(simulation)
+    model = margins(settings.robot, q, down, case.payload).torque
+    if np.abs(effort - model).max() > LEANS:
+        return None
+    told = advise(settings, q.tolist(), down.tolist(), case.payload)
+    advice = next((a for a in told if a.kind in kinds), None)
+    if advice is None:
+        return None
+    before = _margin(settings, simulation, advice, case.payload)
+    load = _follow(simulation, advice, case.payload)
+    return Trial(case, advice, before, _margin(settings, simulation, advice, load))
+
+
+def _follow(simulation: Simulation, advice: Advice, payload: Payload) -> Payload:
+    """Do what the advice says; return the payload that is carried then."""
+    now = simulation.time
+    if advice.kind == 'payload':
+        payload = Payload(0.0, payload.cog)
+        simulation.apply(Command(now, payload=payload))
+    elif advice.kind == 'turn':
+        simulation.apply(Command(now, drive=(0.0, math.copysign(TURN_RATE, advice.amount))))
+        simulation.advance(round(advice.seconds, 2))
+        simulation.apply(Command(now, drive=(0.0, 0.0)))
+    else:
+        j = simulation.robot.joint_names.index(advice.subject)
+        target = float(simulation.joints()[0][j]) + advice.amount
+        speed = abs(advice.amount) / advice.seconds
+        simulation.apply(Command(now, ((advice.subject, target),), speed))
+        # A smooth motion of that peak speed takes pi / 2 as long as one at that speed throughout.
+        simulation.advance(round(advice.seconds * math.pi / 2.0, 2))
+    simulation.advance(CALM)
+    return payload
+
+
+def _state(simulation: Simulation) -> tuple[Floats, Floats, Floats]:
+    """Return positions, gravity (m/s2, `base_link`) and motor forces as the robot measures them."""
+    q, _, effort = simulation.joints()
+    orientation, _, _ = simulation.imu()
+    x, y, z, w = orientation.tolist()
+    up = np.array(up_from_orientation(x, y, z, w, IDENTITY))
+    return q.copy(), -simulation.robot.gravity * up, effort.copy()
+
+
+def _margin(settings: Settings, simulation: Simulation, advice: Advice, load: Payload) -> float:
+    """Return the margin the advice is for: tilt left there, or what the motor has left."""
+    q, down, effort = _state(simulation)
+    if advice.margin not in SIDES:
+        j = settings.robot.joint_names.index(advice.margin)
+        return settings.limits.torque[j] - abs(float(effort[j]))
+    now = margins(settings.robot, q, down, load)
+    if int(now.state) >= NO_CONTACT:
+        return -math.inf
+    return float(now.angle[SIDES.index(advice.margin)])
