@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_reading import floor, make
+from bench_reading import floor, make  # type: ignore[import-not-found]
 
 from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.reader import choose_topics, open_bag
@@ -29,7 +29,8 @@ LIVE_MESSAGES = 40_000
 
 def unpack(folder: Path) -> Stage:
     """Read and unpack every chunk, nothing else."""
-    return floor(next(folder.glob('*.mcap')))
+    run: Stage = floor(next(folder.glob('*.mcap')))
+    return run
 
 
 def columns(folder: Path) -> Stage:

@@ -6,6 +6,7 @@ the same data give the same alerts whether they come one at a time or as runs of
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,7 +122,7 @@ class Signal:
 
 
 def runs(
-    rule: Rule, values: NDArray[np.float64], *, raw: bool
+    rule: Rule, values: NDArray[Any], *, raw: bool
 ) -> Iterator[tuple[int, int, bool]]:
     """Yield (first row, row after the last, bad) for every run of `values` on one side.
 
@@ -139,11 +140,11 @@ def runs(
             yield first, last, bool(sides[k])
 
 
-def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[np.float64]) -> None:
-    """Give a signal many samples at once: the same alerts as `step` for each."""
+def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[Any]) -> None:
+    """Give a signal many samples (numbers, or whether it is bad): the alerts of `step` for each."""
     if not len(values):
         return
-    if signal.quiet and not np.fmax.reduce(values) >= signal.on:
+    if signal.quiet and not (values >= signal.on).any():
         return
     for first, last, bad in runs(signal.rule, values, raw=signal.raw):
         if bad:

@@ -133,14 +133,13 @@ class RecordedEvaluator:
         return limits
 
     def _watch_inputs(self, joints: JointRows, limits: Times, imu: ImuRows) -> None:
-        feed(self.watch.joints.invalid, joints.time, joints.unusable.astype(np.float64))
-        late = (joints.time - joints.oldest > limits).astype(np.float64)
-        feed(self.watch.missing, joints.time, late)
+        feed(self.watch.joints.invalid, joints.time, joints.unusable)
+        feed(self.watch.missing, joints.time, joints.time - joints.oldest > limits)
         for signal, rate in zip(self.watch.speed, joints.qd.T, strict=True):
             if signal.on < np.inf:
                 feed(signal, joints.time, np.abs(rate))
         feed(self.watch.strange, imu.time, imu.strange)
-        feed(self.watch.imu.invalid, imu.time, imu.unusable.astype(np.float64))
+        feed(self.watch.imu.invalid, imu.time, imu.unusable)
 
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
@@ -245,7 +244,7 @@ class RecordedEvaluator:
             feed(warn, time, worse)
             feed(error, time, worse)
         state = rows.state if all_known else rows.state[rows.known]
-        feed(self.watch.support, time, (state >= NO_CONTACT).astype(np.float64))
+        feed(self.watch.support, time, state >= NO_CONTACT)
 
 
 def _product(lever: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

@@ -24,7 +24,7 @@ class Extreme:
 
     def see(self, values: NDArray[np.float64], times: NDArray[np.int64]) -> None:
         """Take many values (NaN: unknown)."""
-        if np.fmax.reduce(values) > self.value:
+        if (values > self.value).any():
             k = int(np.nanargmax(values))
             self.value, self.time = float(values[k]), int(times[k])
 
