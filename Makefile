@@ -22,10 +22,10 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # are no type stubs.
 ifdef ROS_DISTRO
 ROS := -c requirements/jazzy.txt
-EXTRAS := fast,sim,test
+EXTRAS := console,fast,sim,test
 else
 ROS := -r requirements/ros.txt
-EXTRAS := fast,lint,sim,test
+EXTRAS := console,fast,lint,sim,test
 endif
 PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
@@ -55,7 +55,7 @@ venv: .venv/.installed
 	@echo 'Installing what is needed into .venv312: about a minute.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
-	    -e '.[fast,sim,test]' colcon-common-extensions
+	    -e '.[console,fast,sim,test]' colcon-common-extensions
 	touch $@
 
 demo: venv

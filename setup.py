@@ -27,6 +27,7 @@ REQUIRES = [
     'zstandard',
 ]
 SIMULATION = ['mujoco']
+CONSOLE = ['starlette', 'textual', 'uvicorn', 'websockets']
 PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
 TABLE = ['pyarrow']
 TEST = [
@@ -39,6 +40,7 @@ TEST = [
     'pytest-xdist',
     'setuptools<80',
     'wheel',
+    *CONSOLE,
     *PDF,
     *SIMULATION,
     *TABLE,
@@ -92,6 +94,7 @@ setup(
         NAME: ['py.typed'],
         f'{NAME}.report': ['templates/*'],
         f'{NAME}.plan': ['templates/*'],
+        f'{NAME}.console': ['static/*'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
@@ -100,10 +103,14 @@ setup(
         *share('schema'),
         *share('urdf'),
         *share('launch'),
+        *share('rviz'),
+        *share('layouts'),
+        *share('config'),
         *share('bags'),
     ],
     install_requires=REQUIRES,
     extras_require={
+        'console': CONSOLE,
         'sim': SIMULATION,
         'fast': ['isal'],
         'pdf': PDF,

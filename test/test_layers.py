@@ -25,14 +25,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     'bag': {'model', 'evaluation'},
     'simulation': {'model'},
     'report': {'model', 'evaluation'},
-    'console': {'model', 'evaluation'},
+    'console': {'model', 'evaluation', 'bag', 'config'},
     'plan': {'model', 'evaluation', 'config', 'report'},
     'run': BELOW_RUN,
     'nodes': BELOW_NODES,
     'cli': BELOW_NODES | {'nodes'},
 }
 # Every start of the command loads every module of cli, so they import these inside a verb.
-HEAVY = {'rclpy', 'mujoco', 'matplotlib', 'starlette'}
+HEAVY = {'rclpy', 'mujoco', 'matplotlib', 'starlette', 'textual', 'uvicorn'}
 
 # The layers that may import a foreign library.
 HOME_OF = {
@@ -49,7 +49,9 @@ HOME_OF = {
     'rich': {'cli'},
     'typer': {'cli'},
     'starlette': {'console'},
+    'textual': {'console'},
     'uvicorn': {'console'},
+    'websockets': {'console'},
 }
 # The pure part takes time, files and settings as arguments.
 PURE = {'model', 'evaluation'}
