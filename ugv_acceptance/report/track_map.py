@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.strips import Strips
 from ugv_acceptance.model.bilinear import Grid
-from ugv_acceptance.model.maps import rollover_map, torque_forms, utilisation_map
+from ugv_acceptance.model.maps import Levels, rollover_map, torque_forms, utilisation_map
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.report.regions import Levels, draw_regions, figure, legend
+from ugv_acceptance.report.regions import draw_regions, figure, legend
 from ugv_acceptance.report.run_charts import Json, judged_joints, plain
 
 CELLS = 121
@@ -49,7 +49,8 @@ def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None
         axes.set_title(words)
         axes.set_xlabel(_axis_name(settings, pair[0]))
     left.set_ylabel(_axis_name(settings, pair[1]))
-    legend(made, loc='outside lower center', ncols=3)
+    areas = ('within limits', 'caution', 'beyond limits')
+    legend(made, areas, loc='outside lower center', ncols=3)
     return made
 
 
