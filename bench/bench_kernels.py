@@ -10,16 +10,19 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 
 from ugv_acceptance.config import load
+from ugv_acceptance.model.blocks import in_blocks
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.planar import PAPER, planar_dynamics
-from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.stability import stability_of, stances_of
+from ugv_acceptance.model.statics import torque_of
 
 ROUNDS = 3
 LOOPS = 20_000  # postures a loop is timed with; its cost a posture does not depend on their number
@@ -79,6 +82,24 @@ def mujoco_loop(path: str, q: np.ndarray, g: np.ndarray) -> Callable[[], object]
     return run
 
 
+def all_margins(robot: Robot, q: np.ndarray, g: np.ndarray, workers: int) -> np.ndarray:
+    """Return every torque and every side's margins, (..., j + 13)."""
+    mechanics, load, n = mechanics_of(robot), robot.payload, q.shape[-1]
+
+    def margins(*columns: Any) -> list[Any]:  # noqa: ANN401 - floats or arrays
+        posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
+        table = np.empty((13, len(columns[0])))
+        for rows, stance in stances_of(mechanics, posture, len(columns[0])):
+            gx, gy, gz = (x[rows] for x in columns[n:])
+            found = stability_of(stance, (gx, gy, gz))
+            values = (*found.angle, *found.moment, *found.energy, found.zmp)
+            for line, value in zip(table, values, strict=True):
+                line[rows] = value
+        return [*torque_of(posture, columns[n:]), *table]
+
+    return in_blocks(margins, n + 13, q, g, workers=workers)
+
+
 def main(count: int = 1_000_000) -> None:
     """Print the table."""
     config = load()
@@ -90,11 +111,7 @@ def main(count: int = 1_000_000) -> None:
     arm = rng.uniform(-math.pi, math.pi, (3, count, 2))
 
     def ours(postures: np.ndarray, workers: int) -> Callable[[], object]:
-        def run() -> None:
-            static_torque(robot, postures, g, workers=workers)
-            stability(robot, postures, g, Payload(4.0), workers)
-
-        return run
+        return lambda: all_margins(robot, postures, g, workers)
 
     ways: dict[str, tuple[int, Callable[[], object]]] = {
         'ours, torques + edges, 2 threads': (count, ours(q, 2)),
