@@ -205,6 +205,7 @@ class DelaysSection(Section):
     torque_on: Time = _DELAYS.torque_on
     fault_on: Time = _DELAYS.fault_on
     off: Time = _DELAYS.off
+    tip_off: Time = _DELAYS.tip_off
     stale_after: Time = _DELAYS.stale_after
     stale_periods: Annotated[float, Field(ge=1), _number()] = _DELAYS.stale_periods
     tick: Annotated[Positive, _number('time')] = _DELAYS.tick

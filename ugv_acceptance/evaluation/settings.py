@@ -66,14 +66,16 @@ class Limits:
 class Delays:
     """Seconds a level must last before an alert is raised (on) and must be gone to clear it (off).
 
-    An input is stale when `stale_periods` of its own periods, but at least `stale_after`, have
-    passed without a message; silence is judged every `tick`.
+    A tilt is noisy and swings, so tip-over has an `off` of its own (bench/bench_chatter.py says how
+    long it must be). An input is stale when `stale_periods` of its own periods, but at least
+    `stale_after`, have passed without a message; silence is judged every `tick`.
     """
 
     tip_on: float = 0.1
     torque_on: float = 0.1
     fault_on: float = 0.0
     off: float = 1.0
+    tip_off: float = 5.0
     stale_after: float = 0.1
     stale_periods: float = 3.0
     tick: float = 0.05

@@ -64,7 +64,8 @@ class Watch:
     def _signal(
         self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
     ) -> Signal:
-        off = int(self.settings.delays.off * 1e9)
+        delays = self.settings.delays
+        off = int((delays.tip_off if code == 'TIP_OVER' else delays.off) * 1e9)
         return Signal(Rule(code, subject, level, *at, int(on_delay * 1e9), off), self.log)
 
     def _torque(self, joint: str, level: int, limit: float) -> Signal:

@@ -74,6 +74,9 @@ _TABLE: dict[str, tuple[str, str, float, float, float, str]] = {
     'delays.torque_on_s': ('delays', 'torque_on', 1.0, 0.0, 10.0, 'how long before a torque alert'),
     'delays.fault_on_s': ('delays', 'fault_on', 1.0, 0.0, 10.0, 'how long before an input alert'),
     'delays.off_s': ('delays', 'off', 1.0, 0.0, 60.0, 'how long good before an alert clears, s'),
+    'delays.tip_off_s': (
+        'delays', 'tip_off', 1.0, 0.0, 60.0, 'how long good before a tip-over alert clears, s',
+    ),
     'delays.stale_after_s': (
         'delays', 'stale_after', 1.0, 0.001, 60.0, 'shortest silence that is stale, s',
     ),

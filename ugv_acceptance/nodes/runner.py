@@ -23,7 +23,7 @@ from ugv_acceptance.run.verdicts import INCONCLUSIVE, SKIPPED, Done, judge_step
 # Seconds: between two looks, for a motion beyond its time, for a person, for alerts to be over.
 LOOK, GRACE, PERSON, CALM = 0.02, 3.0, 600.0, 6.0
 # Times a step is tried.
-ATTEMPTS = 2
+ATTEMPTS = 3
 # Unwanted in every motion between steps.
 ALWAYS = ('ERROR', 'STALE')
 # Speed (rad/s) of motions to and from home.
@@ -188,7 +188,7 @@ class Runner:
     def _settle(self) -> float:
         """Seconds after which alerts of the way are over."""
         delays = self.config.settings.delays
-        return delays.off + max(delays.tip_on, delays.torque_on) + 0.2
+        return max(delays.off, delays.tip_off) + max(delays.tip_on, delays.torque_on) + 0.2
 
     def _go(
         self, posture: Posture, speed: float, unwanted: tuple[str, ...], step: Step | None = None

@@ -1,0 +1,69 @@
+"""Does the advice help? Random cases in which a margin is too small, and the robot does as told.
+
+The share of cases in which the margin the advice is for is larger afterwards, in the simulation;
+how far the gain came out as promised; and what it costs to find the advice.
+
+    python bench/bench_advice.py [trials of each kind]
+"""
+
+import math
+import sys
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.advice import advise
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.run.advice_trial import Trial, trials
+from ugv_acceptance.simulation.tip_cases import random_cases
+from ugv_acceptance.simulation.vehicle import gravity_on_slope
+
+SEED = 41
+
+
+def main() -> None:
+    """Print the table."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 150
+    settings = load().settings
+    print('advice    trials  margin larger   tip: promised, came   torque: promised, came')
+    for kind in ('joint', 'turn', 'payload'):
+        found = list(trials(settings, count, SEED, (kind,)))
+        helped = sum(trial.helped for trial in found)
+        print(
+            f'{kind:8} {count:7} {helped:7} ({helped / count:.1%})'
+            f'   {gains(found, tips=True):>17}   {gains(found, tips=False):>20}'
+        )
+        for trial in found:
+            if not trial.helped:
+                print(f'    not: {trial.advice.sentence}; {trial.before:.3f} -> {trial.after:.3f}')
+    print(f'one advice: {cost(settings):.1f} ms (median)')
+
+
+def gains(found: Sequence[Trial], *, tips: bool) -> str:
+    """Return the median gain that was promised, and that came."""
+    chosen = [t for t in found if (t.advice.margin in SIDES) is tips]
+    if not chosen:
+        return '-'
+    promised = float(np.median([t.advice.gain for t in chosen]))
+    came = float(np.median([t.after - t.before for t in chosen]))
+    if tips:
+        return f'{math.degrees(promised):.1f}, {math.degrees(came):.1f} deg'
+    return f'{promised:.1f}, {came:.1f} N m'
+
+
+def cost(settings: Settings) -> float:
+    """Return the time one advice takes (ms), the median of random cases that need one."""
+    times = []
+    for case in random_cases(settings.robot, 200, SEED, steepest=0.5):
+        down = gravity_on_slope(settings.robot.gravity, case.tilt, case.heading).tolist()
+        start = time.perf_counter()
+        if advise(settings, case.q, down, case.payload):
+            times.append(1e3 * (time.perf_counter() - start))
+    return float(np.median(times))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,225 @@
+"""What to do about the smallest margin: which joint to move which way, turn, or set the load down.
+
+Each candidate is a path, followed step by step with the compiled model: it is left where another
+margin falls below its warning limit, where a motor would have to lift more than it can, or where
+the robot would come to stand on other points. Of the paths that bring the margin back the fastest
+comes first, then the others by what they gain.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ugv_acceptance.evaluation.candidates import Path, joint_paths, turn_paths
+from ugv_acceptance.evaluation.instructions import joint_words, load_words, turn_words
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
+from ugv_acceptance.model.statics import payload_capacity
+
+# Slack of comparisons; a path that gains less than this share of the way from ERROR to WARN is
+# none.
+SLACK, LEAST_GAIN = 1e-6, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """One thing to do. `kind` is joint, turn or payload; `amount` in rad (m where prismatic) or kg.
+
+    It takes `seconds`; the `margin`, a side or a joint, then gains `gain` (rad of tilt; N m or N of
+    torque), which is enough to end the warning where `enough`. `sentence` says it in plain words.
+    """
+
+    kind: str
+    subject: str
+    amount: float
+    seconds: float
+    margin: str
+    gain: float
+    enough: bool
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """The situation: scores (m,) of all margins, the smallest one, its score that is enough."""
+
+    settings: Settings
+    q: Floats
+    gravity: Floats
+    payload: Payload
+    scores: Floats
+    torque: Floats
+    state: int
+    worst: int
+    enough: float
+
+    @property
+    def subject(self) -> str:
+        """Name of the smallest margin."""
+        return margin_names(self.settings)[self.worst]
+
+    @property
+    def tips(self) -> bool:
+        """Whether the smallest margin is one of tip-over."""
+        return self.worst < len(SIDES)
+
+
+def margin_names(settings: Settings) -> tuple[str, ...]:
+    """Return what the scores are of: the sides, then the joints."""
+    return (*SIDES, *settings.robot.joint_names)
+
+
+def scores_of(settings: Settings, torque: Floats, angle: Floats) -> Floats:
+    """Return each margin (..., 4 + j) so that WARN begins at 1 and ERROR at 0; unjudged: infinite.
+
+    `torque` (..., j) in N m (N), `angle` (..., 4) in rad.
+    """
+    limits = settings.limits
+    tip, torque_span = _spans(settings)
+    tilt = (angle - limits.tip_error) / tip
+    use = np.abs(torque) / np.array(limits.torque)
+    found: Floats = np.concatenate((tilt, (limits.torque_error - use) / torque_span), axis=-1)
+    judged = np.isfinite(np.array((0.0,) * len(SIDES) + limits.torque))
+    found[..., ~judged] = np.inf
+    return found
+
+
+def _spans(settings: Settings) -> tuple[float, float]:
+    """Return how far WARN is from ERROR: in rad of tilt, and as a share of the torque's limit."""
+    limits = settings.limits
+    tip = max(limits.tip_warn - limits.tip_error, math.radians(0.5))
+    return tip, max(limits.torque_error - limits.torque_warn, 0.02)
+
+
+def advise(
+    settings: Settings, q: Sequence[float], gravity: Sequence[float], payload: Payload
+) -> tuple[Advice, ...]:
+    """Return what to do, the best first; nothing where no margin is below its warning limit.
+
+    `q` (j,), `gravity` (3,) m/s2 in `base_link`. Nothing too where no margin is known.
+    """
+    case = _case_of(settings, q, gravity, payload)
+    if case is None or not case.scores[case.worst] < 1.0:
+        return ()
+    found = [*_moves(case), *_turns(case), *_load(case)]
+    return tuple(sorted(found, key=lambda a: (not a.enough, a.seconds if a.enough else -a.gain)))
+
+
+def _case_of(
+    settings: Settings, q: Sequence[float], gravity: Sequence[float], payload: Payload
+) -> _Case | None:
+    at, down = np.array(q, dtype=np.float64), np.array(gravity, dtype=np.float64)
+    if not (np.isfinite(at).all() and np.isfinite(down).all()):
+        return None
+    now = margins(settings.robot, at, down, payload)
+    state = int(now.state)
+    if state >= NO_CONTACT:
+        return None
+    scores = scores_of(settings, now.torque, now.angle)
+    worst = int(np.argmin(scores))
+    limits, (tip, span) = settings.limits, _spans(settings)
+    if worst < len(SIDES):
+        reserve = limits.tip_deadband / tip
+    else:
+        reserve = limits.torque_deadband / limits.torque[worst - len(SIDES)] / span
+    return _Case(
+        settings, at, down, payload, scores, now.torque, state, worst, 1.0 + reserve + SLACK
+    )
+
+
+def _follow(case: _Case, path: Path) -> tuple[int, float, bool] | None:
+    """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
+    found = margins(case.settings.robot, path.q, path.gravity, case.payload)
+    scores = scores_of(case.settings, found.torque, found.angle)
+    floor = np.minimum(case.scores, 1.0)
+    floor[case.worst] = case.scores[case.worst]
+    bad = ~(scores >= floor - SLACK).all(axis=-1) | (found.state != case.state) | path.forbidden
+    last = int(np.argmax(bad)) if bad.any() else len(bad)
+    mine = scores[:last, case.worst]
+    reached = np.flatnonzero(mine >= case.enough)
+    if len(reached):
+        return int(reached[0]), float(mine[reached[0]]), True
+    if not last or not mine.max() > case.scores[case.worst] + LEAST_GAIN:
+        return None
+    # Stop where nearly all that can be gained is gained.
+    gained = mine - case.scores[case.worst]
+    k = int(np.argmax(gained >= 0.95 * gained.max()))
+    return k, float(mine[k]), False
+
+
+def _gain(case: _Case, score: float) -> float:
+    """Return a score's gain in rad of tilt, N m or N."""
+    tip, span = _spans(case.settings)
+    more = score - float(case.scores[case.worst])
+    if case.tips:
+        return more * tip
+    return more * span * case.settings.limits.torque[case.worst - len(SIDES)]
+
+
+def _moves(case: _Case) -> Iterator[Advice]:
+    for path in joint_paths(case.settings, case.q, case.gravity, case.torque):
+        end = _follow(case, path)
+        if end is None:
+            continue
+        k, score, enough = end
+        gain, seconds = _gain(case, score), float(path.seconds[k])
+        words = joint_words(case.settings.robot, path, k, case.payload)
+        yield Advice(
+            'joint',
+            path.subject,
+            float(path.amount[k]),
+            seconds,
+            case.subject,
+            gain,
+            enough,
+            f'{words}: {_gain_words(case, gain)} in {seconds:.1f} s',
+        )
+
+
+def _turns(case: _Case) -> Iterator[Advice]:
+    """Turning on the spot helps against tipping on a slope."""
+    for path in turn_paths(case.q, case.gravity) if case.tips else ():
+        end = _follow(case, path)
+        if end is None:
+            continue
+        k, score, enough = end
+        gain, seconds = _gain(case, score), float(path.seconds[k])
+        words = turn_words(float(path.amount[k]), path.gravity[k])
+        sentence = f'{words}: {_gain_words(case, gain)} in {seconds:.1f} s'
+        amount = float(path.amount[k])
+        yield Advice('turn', 'robot', amount, seconds, case.subject, gain, enough, sentence)
+
+
+def _load(case: _Case) -> Iterator[Advice]:
+    """Setting the load down: how much of it is too much, and what is gained without it."""
+    mass = case.payload.mass
+    if mass <= 0.0:
+        return
+    empty = Payload(0.0, case.payload.cog)
+    found = margins(case.settings.robot, case.q, case.gravity, empty)
+    score = float(scores_of(case.settings, found.torque, found.angle)[case.worst])
+    if not score > case.scores[case.worst] + LEAST_GAIN:
+        return
+    gain, enough = _gain(case, score), score >= 1.0
+    holds = None if case.tips else _holds(case)
+    words = f'{load_words(mass, holds)}: {_gain_words(case, gain)}'
+    # Nobody sets a load down as fast as a joint moves: it comes after what moves in time.
+    yield Advice('payload', 'payload', -mass, 10.0, case.subject, gain, enough, words)
+
+
+def _holds(case: _Case) -> float:
+    """Return the mass (kg) that no joint's warning limit forbids in this posture."""
+    limits = case.settings.limits
+    torque = limits.torque_warn * np.array(limits.torque)
+    return max(float(payload_capacity(case.settings.robot, case.q, case.gravity, torque)), 0.0)
+
+
+def _gain_words(case: _Case, gain: float) -> str:
+    if case.tips:
+        return f'+{math.degrees(gain):.0f} deg of tilt to the {case.subject}'
+    unit = 'N' if case.settings.robot.joint(case.subject).kind == 'prismatic' else 'N m'
+    return f'{gain:.0f} {unit} less on the {case.subject.removesuffix("_joint")}'

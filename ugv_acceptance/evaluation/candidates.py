@@ -1,0 +1,104 @@
+"""Paths that an operator could follow: one joint moved one way, or the robot turned on the spot."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.capacity import gripper_point
+from ugv_acceptance.model.robot import Joint, Robot
+
+# A path is followed this long (s), in so many steps; a joint that moves contact points in finer
+# ones (rad), since a point counts only while it is within the ground's tolerance.
+HORIZON, STEPS, FINE = 4.0, 16, 0.01
+# Speed of a joint (rad/s; m/s) whose speed is not known, and the share of a known one to be used.
+CAREFUL, SHARE = 0.3, 0.9
+# Turning on the spot: rate and step (rad/s, rad), and the slope (as sin) from which it matters.
+TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(15.0)), 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Postures `q` (n, j) and gravity (n, 3) step by step after now; `amount` (n,) in rad or m.
+
+    `seconds` (n,) is the time each step is reached; `forbidden` (n,) is where it must not lead.
+    """
+
+    subject: str
+    q: Floats
+    gravity: Floats
+    amount: Floats
+    seconds: Floats
+    forbidden: NDArray[np.bool_]
+
+
+def joint_speed(settings: Settings, j: int) -> float:
+    """Return a speed (rad/s; m/s) at which joint j can move and the static model holds."""
+    robot, speeds = settings.robot, settings.limits.speed
+    known = [robot.joint(robot.joint_names[j]).velocity, speeds[j] if speeds else np.inf]
+    least = min(known)
+    return SHARE * least if np.isfinite(least) else CAREFUL
+
+
+def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) -> Iterator[Path]:
+    """Yield a path a joint and direction; none against a load that the motor does not hold."""
+    robot = settings.robot
+    for j, name in enumerate(robot.joint_names):
+        joint, speed = robot.joint(name), joint_speed(settings, j)
+        for way in (1.0, -1.0):
+            if abs(torque[j]) >= settings.limits.torque[j] and torque[j] * way > 0.0:
+                continue
+            amount = _amounts(robot, joint, float(q[j]), way * speed * HORIZON)
+            if not len(amount):
+                continue
+            path = np.tile(q, (len(amount), 1))
+            path[:, j] += amount
+            down = np.broadcast_to(gravity, (len(amount), 3))
+            blocked = _below_ground(robot, q, path)
+            yield Path(name, path, down, amount, np.abs(amount) / speed, blocked)
+
+
+def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
+    """Return the steps of a joint's path, which ends where the joint does."""
+    end = float(np.clip(start + reach, joint.lower, joint.upper)) - start
+    if end * reach <= 0.0:
+        return np.empty(0)
+    fine = _moves_contacts(robot, joint.child)
+    count = max(STEPS, int(abs(end) / FINE)) if fine else STEPS
+    steps: Floats = np.linspace(0.0, end, count + 1)[1:]
+    return steps
+
+
+def _moves_contacts(robot: Robot, link: str) -> bool:
+    """Return whether a contact point is on `link` or on what it carries."""
+    carried = [j.child for j in robot.joints if j.parent == link]
+    here = any(contact.link == link for contact in robot.contacts)
+    return here or any(_moves_contacts(robot, child) for child in carried)
+
+
+def _below_ground(robot: Robot, q: Floats, path: Floats) -> NDArray[np.bool_]:
+    """Return whether the gripper goes further down than the ground (and than it is now)."""
+    if robot.payload_link is None:
+        return np.zeros(len(path), dtype=bool)
+    height = gripper_point(robot, path)[:, 2]
+    low = min(robot.ground, float(gripper_point(robot, q)[2])) - 1e-6
+    return np.asarray(height < low)
+
+
+def turn_paths(q: Floats, gravity: Floats) -> Iterator[Path]:
+    """Yield a path to the left and one to the right, half a turn each; none on level ground."""
+    across = float(np.hypot(gravity[0], gravity[1]))
+    if across < LEVEL * float(np.linalg.norm(gravity)):
+        return
+    for way in (1.0, -1.0):
+        amount = way * np.arange(TURN_STEP, np.pi + 1e-9, TURN_STEP)
+        c, s = np.cos(amount), np.sin(amount)
+        # Seen from a robot that turns left, gravity turns right.
+        x, y = c * gravity[0] + s * gravity[1], c * gravity[1] - s * gravity[0]
+        down = np.column_stack((x, y, np.full(len(amount), gravity[2])))
+        path = np.tile(q, (len(amount), 1))
+        free = np.zeros(len(amount), dtype=bool)
+        yield Path('robot', path, down, amount, np.abs(amount) / TURN_RATE, free)
