@@ -1,0 +1,124 @@
+"""Does it warn in time? Labelled runs on both cores: `python bench/bench_scenarios.py`.
+
+Prints recall of critical events, warning time before them by kind (p5, p50), critical alerts for
+nothing an hour of quiet work, the same for predictions, and how fast the simulation was.
+"""
+
+import argparse
+import json
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.run.catalogue import Case
+from ugv_acceptance.run.labelled import Event, Labelled, cases, label, work_cases
+
+
+@cache
+def config() -> Config:
+    """Return the configuration that ships, once a process."""
+    return load()
+
+
+def one(task: tuple[str, int, Case]) -> Labelled:
+    """Label one case."""
+    return label(config(), *task)
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--runs', type=int, default=200, help='runs in which something may happen')
+    parser.add_argument('--hours', type=float, default=1.0, help='simulated hours of quiet work')
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--workers', type=int, default=2)
+    parser.add_argument('--json', type=Path, help='write every run to this file')
+    asked = parser.parse_args()
+    tasks = [*cases(config(), asked.runs, asked.seed)]
+    quiet = [*work_cases(config(), asked.hours, asked.seed)] if asked.hours else []
+    with ProcessPoolExecutor(asked.workers, mp_context=get_context('spawn')) as pool:
+        list(pool.map(one, tasks[: asked.workers]))  # starts the processes, compiles the formulas
+        found, speed = timed(pool, tasks)
+        work, work_speed = timed(pool, quiet)
+    print(f'{len(found)} runs, {speed:.0f} x real time on {asked.workers} processes')
+    table(found)
+    early(found)
+    if work:
+        silence(work, work_speed)
+    if asked.json:
+        asked.json.write_text(json.dumps([asdict(r) for r in found + work], default=float))
+
+
+def timed(
+    pool: ProcessPoolExecutor, tasks: list[tuple[str, int, Case]]
+) -> tuple[list[Labelled], float]:
+    """Return the labelled runs and simulated seconds a second."""
+    began = time.perf_counter()
+    found = list(pool.map(one, tasks))
+    taken = time.perf_counter() - began
+    return found, sum(r.seconds for r in found) / max(taken, 1e-9)
+
+
+def table(found: list[Labelled]) -> None:
+    """Print recall and warning times by kind of run and event."""
+    head = ('run', 'event', 'n', 'warned', 'alarmed', 'WARN p5', 'p50', 'ERROR p5', 'p50',
+            'predicted', 'p5', 'p50')  # fmt: skip
+    widths = (28, 11, 4, 7, 8, 8, 6, 9, 6, 10, 6, 6)
+    print(''.join(f'{h:>{w}}' for h, w in zip(head, widths, strict=True)))
+    kinds = sorted({(r.kind, e.kind) for r in found for e in r.events}, key=lambda k: (k[1], k[0]))
+    for kind, event in [*kinds, ('all', 'tip-over'), ('all', 'saturation')]:
+        of = [e for r in found for e in r.events if e.kind == event and kind in ('all', r.kind)]
+        cells = (kind, event, len(of), *seen(of))
+        print(''.join(f'{c!s:>{w}}' for c, w in zip(cells, widths, strict=True)))
+
+
+def seen(events: list[Event]) -> list[str]:
+    """Return shares and percentiles of warning times (s) as texts."""
+    texts = []
+    of = {n: np.array([e.time - getattr(e, n) for e in events]) for n in
+          ('warned', 'alarmed', 'predicted')}  # fmt: skip
+    shares = {name: np.isfinite(left).mean() for name, left in of.items()}
+    texts += [f'{shares["warned"]:.0%}', f'{shares["alarmed"]:.0%}']
+    texts += [*percentiles(of['warned']), *percentiles(of['alarmed'])]
+    return [*texts, f'{shares["predicted"]:.0%}', *percentiles(of['predicted'])]
+
+
+def percentiles(left: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list[str]:
+    """Return p5 and p50; an event without a warning counts as minus infinity."""
+    if not len(left):
+        return ['', '']
+    return [f'{x:.2f}' for x in np.percentile(left, [5, 50], method='lower')]
+
+
+def early(found: list[Labelled]) -> None:
+    """Print critical alerts of runs meant to be critical in which nothing happened after all."""
+    calm = [r for r in found if not r.events]
+    alerts = Counter(code for r in calm for _, code, _ in r.for_nothing)
+    told = ', '.join(f'{n} {code}' for code, n in alerts.most_common()) or 'none'
+    print(f'{len(calm)} of these runs came to nothing; critical alerts in them: {told}')
+
+
+def silence(work: list[Labelled], speed: float) -> None:
+    """Print what was said for nothing in quiet work."""
+    hours = sum(r.seconds for r in work) / 3600.0
+    events = sum(len(r.events) for r in work)
+    alerts = [a for r in work for a in r.for_nothing]
+    told = sum(r.predictions_for_nothing for r in work)
+    print(f'quiet work: {hours:.2f} h simulated at {speed:.0f} x real time, {events} true events')
+    # No alert in T hours bounds the rate by 3/T at 95 %.
+    bound = f' (95 %: at most {3.0 / hours:.2f})' if not alerts else ''
+    print(f'critical alerts for nothing: {len(alerts)}, {len(alerts) / hours:.2f} an hour{bound}')
+    for alert, count in Counter(alerts).most_common(8):
+        print(f'  {count} {" ".join(alert)}')
+    print(f'predictions for nothing: {told}, {told / hours:.2f} an hour')
+
+
+if __name__ == '__main__':
+    main()
