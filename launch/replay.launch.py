@@ -49,6 +49,8 @@ def generate_launch_description() -> LaunchDescription:
                         'bag': ParameterValue(LaunchConfiguration('bag'), value_type=str),
                         'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
                         'loop': ParameterValue(LaunchConfiguration('loop'), value_type=bool),
+                        # The monitor compares header stamps with its clock.
+                        'restamp': True,
                     }
                 ],
             ),

@@ -4,8 +4,9 @@ import math
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,26 +19,16 @@ from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts import Alert
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.settings import Settings
 
 NS = 1_000_000_000
 SECONDS = 6.0
 # Alerts may begin and end this much later live (ns): transport and a busy machine.
-LATE = 250_000_000
-
-
-@pytest.fixture(scope='module', autouse=True)
-def _ros() -> Iterator[None]:
-    with ros_context():
-        yield
-
-
-@pytest.fixture
-def live() -> Iterator[Live]:
-    """Return an executor for the nodes of one test."""
-    with live_nodes() as nodes:
-        yield nodes
+LATE = 400_000_000
+# Silence (s) that is stale: shorter than the gap in the run, longer than a machine stands still.
+PATIENCE = 0.5
 
 
 def write_run(folder: Path) -> Path:
@@ -79,19 +70,31 @@ def imu_message(t: float, stamp: int, rng: np.random.Generator) -> bytes:
     return imu_cdr(stamp, 'imu_link', orientation, (0.2, 0.0, 0.0), force)
 
 
-def recorded(path: Path) -> tuple[dict[Any, Any], list[Alert], int]:
-    """Return margins by (joint positions, gravity), alerts, and the start (ns) of the recording."""
-    bag = open_bag(path)
-    evaluator = RecordedEvaluator(load().settings, detail=True)
-    evaluator.start(bag.start_ns)
-    margins = {}
-    for batch in bag.batches(choose_topics(bag)):
-        rows = evaluator.batch(batch)
-        for k in np.flatnonzero(rows.known):
-            key = (tuple(rows.q[k].tolist()), tuple(rows.gravity[k].tolist()))
-            margins[key] = numbers_of(rows.torque[k], rows.angle[k], rows.moment[k], rows.energy[k])
-    evaluator.finish(bag.end_ns)
-    return margins, list(evaluator.watch.log), bag.start_ns
+@dataclass
+class Evaluated:
+    """Margins by (joint positions, gravity), and alerts."""
+
+    margins: dict[Any, Any]
+    alerts: list[Alert]
+
+
+@dataclass
+class Played:
+    """One playing of `run`: what came live; in `heard` what was heard, by its receipt times."""
+
+    run: Path
+    heard: Path
+    live: Evaluated
+    started: int
+    began: int
+    ended: int
+    counts: dict[str, int]
+
+
+def policy() -> Settings:
+    """Return the PackBot's settings, with patience for a busy machine that holds messages up."""
+    settings = load().settings
+    return replace(settings, delays=replace(settings.delays, stale_after=PATIENCE))
 
 
 def numbers_of(*parts: Any) -> np.ndarray:
@@ -99,40 +102,81 @@ def numbers_of(*parts: Any) -> np.ndarray:
     return np.concatenate([np.asarray(part, np.float64) for part in parts])
 
 
-def played(live: Live, path: Path) -> tuple[dict[Any, Any], list[Alert], Any, int]:
-    """Play the recording by the player in a process of its own into a monitor in this one."""
-    monitor = live.monitor(publish_rate=0.0)
-    found = {}
+def recorded(path: Path, start: int | None = None, end: int | None = None) -> Evaluated:
+    """Evaluate a recording from `start` to `end` (ns; None: its own)."""
+    bag = open_bag(path)
+    evaluator = RecordedEvaluator(policy(), detail=True)
+    evaluator.start(bag.start_ns if start is None else start)
+    margins = {}
+    for batch in bag.batches(choose_topics(bag)):
+        rows = evaluator.batch(batch)
+        for k in np.flatnonzero(rows.known):
+            key = (tuple(rows.q[k].tolist()), tuple(rows.gravity[k].tolist()))
+            margins[key] = numbers_of(rows.torque[k], rows.angle[k], rows.moment[k], rows.energy[k])
+    evaluator.finish(bag.end_ns if end is None else end)
+    return Evaluated(margins, list(evaluator.watch.log))
+
+
+@contextmanager
+def written_down(path: Path) -> Iterator[None]:
+    """Record what every live evaluator takes, with the time of receipt that it was told."""
+    joint_state, imu = LiveEvaluator.joint_state, LiveEvaluator.imu
+    with BagWriter(path) as writer, pytest.MonkeyPatch.context() as patch:
+        writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState', Qos())
+        writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu', Qos())
+
+        def take_joints(self: Any, now: int, stamp: int, names: Any, *arrays: Any) -> Any:
+            writer.write('/joint_states', now, joint_state_cdr(stamp, '', names, *arrays))
+            return joint_state(self, now, stamp, names, *arrays)
+
+        def take_imu(self: Any, now: int, stamp: int, q: Any, first: float, *v: Any) -> Any:
+            covariances = ((first, *(0.0,) * 8), (0.0,) * 9, (0.0,) * 9)
+            writer.write('/imu/data', now, imu_cdr(stamp, '', q, v[0], v[1], covariances))
+            return imu(self, now, stamp, q, first, *v)
+
+        patch.setattr(LiveEvaluator, 'joint_state', take_joints)
+        patch.setattr(LiveEvaluator, 'imu', take_imu)
+        yield
+
+
+def play(live: Live, run: Path, heard: Path) -> Played:
+    """Play a run by the player in a process of its own into a monitor in this one."""
+    monitor = live.monitor(publish_rate=0.0, delays__stale_after_s=PATIENCE)
+    session, found = session_of(monitor), {}
 
     def take(_: int, margins: Margins) -> None:
         tip = margins.stability
         key = (margins.q, margins.gravity)
         found[key] = numbers_of(margins.torque, tip.angle, tip.moment, tip.energy)
 
-    session_of(monitor).on_margins = take
+    session.on_margins = take
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     code = 'from ugv_acceptance.cli import main; main()'
-    process = subprocess.Popen(
-        [sys.executable, '-c', code, 'replay', str(path), '--restamp'],
-        env=environment,
-        stdout=subprocess.DEVNULL,
-    )
-    try:
-        live.until(lambda: session_of(monitor).counts['imu'].taken > 0)
-        began = session_of(monitor).clock.now()
-        strangers = [
-            len(monitor.get_publishers_info_by_topic(t)) for t in ('/joint_states', '/imu/data')
-        ]
-        assert strangers == [1, 1], 'somebody else publishes here'
-        end = time.monotonic() + SECONDS - 0.5
-        live.until(lambda: time.monotonic() > end)
+    command = [sys.executable, '-c', code, 'replay', str(run), '--restamp']
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
+        live.until(lambda: session.counts['imu'].taken > 0)
+        began = session.clock.now()
+        topics = ('/joint_states', '/imu/data')
+        publishers = [len(monitor.get_publishers_info_by_topic(topic)) for topic in topics]
+        assert publishers == [1, 1], 'somebody else publishes here'
         live.until(lambda: process.poll() is not None)
-    finally:
-        process.kill()
-        process.wait()
-    assert process.returncode == 0
-    session = session_of(monitor)
-    return found, list(session.evaluator.watch.log), session, began
+    ended = session.clock.now()
+    session.evaluator.tick(ended)
+    counts = {name: count.taken for name, count in session.counts.items()}
+    alerts = list(session.evaluator.watch.log)
+    started = session.evaluator._fresh[0].started
+    return Played(run, heard, Evaluated(found, alerts), started, began, ended, counts)
+
+
+@pytest.fixture(scope='module')
+def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
+    """Play the run once for all tests."""
+    folder = tmp_path_factory.mktemp('live')
+    run, heard = write_run(folder), folder / 'heard'
+    with ros_context(), live_nodes() as live:
+        with written_down(heard):
+            found = play(live, run, heard)
+        yield found
 
 
 def kind_of(alert: Alert) -> tuple[str, str, int]:
@@ -145,32 +189,51 @@ def ordered(alerts: list[Alert]) -> list[Alert]:
     return sorted(alerts, key=lambda alert: (kind_of(alert), alert.start))
 
 
-def test_live_equals_bag(live: Live, tmp_path: Path) -> None:
-    """Equal margins (1e-12) for equal pairs of messages, and the same alerts at the same times."""
-    path = write_run(tmp_path)
-    bag_margins, bag_alerts, start = recorded(path)
-    live_margins, live_alerts, session, began = played(live, path)
-    joints, imus = session.counts['joint_states'], session.counts['imu']
-    counts = open_bag(path).topics
-    assert (joints.taken, imus.taken) == (counts['/joint_states'].count, counts['/imu/data'].count)
+def test_no_message_is_lost(played: Played) -> None:
+    """The monitor takes every message of the recording."""
+    topics = open_bag(played.run).topics
+    assert played.counts['joint_states'] == topics['/joint_states'].count
+    assert played.counts['imu'] == topics['/imu/data'].count
 
-    both = bag_margins.keys() & live_margins.keys()
-    assert len(both) > 0.5 * len(bag_margins)
+
+def test_equal_pairs_have_equal_margins(played: Played) -> None:
+    """A pair of messages gives the same margins live and from the recording, to 1e-12."""
+    bag = recorded(played.run).margins
+    both = bag.keys() & played.live.margins.keys()
+    assert len(both) > 0.5 * len(bag)
     for key in both:
-        np.testing.assert_allclose(live_margins[key], bag_margins[key], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(played.live.margins[key], bag[key], rtol=1e-12, atol=1e-12)
 
+
+def test_what_was_heard_gives_the_same_margins_from_a_bag(played: Played) -> None:
+    """A recording of what the monitor heard gives all its margins, none more and none fewer."""
+    bag = recorded(played.heard, played.started, played.ended).margins
+    assert bag.keys() == played.live.margins.keys()
+    for key, numbers in bag.items():
+        np.testing.assert_allclose(played.live.margins[key], numbers, rtol=1e-12, atol=1e-12)
+
+
+def test_what_was_heard_gives_the_same_alerts_from_a_bag(played: Played) -> None:
+    """A recording of what the monitor heard gives its alerts: kind, start, end and peak."""
+    ours = ordered(played.live.alerts)
+    theirs = ordered(recorded(played.heard, played.started, played.ended).alerts)
+    assert [kind_of(a) for a in ours] == [kind_of(a) for a in theirs]
+    assert [(a.start, a.end) for a in ours] == [(a.start, a.end) for a in theirs]
+    np.testing.assert_allclose([a.peak for a in ours], [a.peak for a in theirs], rtol=1e-12)
+
+
+def test_the_recording_gives_the_same_alerts(played: Played) -> None:
+    """The recording that was played gives the alerts that came live, as late as transport is."""
+    theirs, start = ordered(recorded(played.run).alerts), open_bag(played.run).start_ns
     # Before the player began and after it ended nothing came: true, but not in the recording.
-    during = [a for a in live_alerts if a.start > began - NS // 10]
-    during = [a for a in during if a.rule.code != 'INPUT_STALE' or a.start < joints.last]
-    assert [kind_of(a) for a in ordered(during)] == [kind_of(a) for a in ordered(bag_alerts)]
-    for ours, theirs in zip(ordered(during), ordered(bag_alerts), strict=True):
-        assert abs((ours.start - began) - (theirs.start - start)) < LATE
-        if ours.end is not None and theirs.end is not None:
-            assert abs((ours.end - began) - (theirs.end - start)) < LATE
+    during = [a for a in played.live.alerts if a.start > played.began - NS // 10]
+    ours = ordered([a for a in during if a.start < played.began + SECONDS * NS])
+    assert [kind_of(a) for a in ours] == [kind_of(a) for a in theirs]
+    for live, bag in zip(ours, theirs, strict=True):
+        assert abs((live.start - played.began) - (bag.start - start)) < LATE
 
 
-def test_the_run_has_what_makes_it_hard(tmp_path: Path) -> None:
-    """The run above raises alerts of every kind that the comparison is about."""
-    _, alerts, _ = recorded(write_run(tmp_path))
-    hard = {'TORQUE_LIMIT', 'TIP_OVER', 'INPUT_STALE', 'INPUT_INVALID'}
-    assert hard <= {alert.rule.code for alert in alerts}
+def test_the_run_has_what_makes_it_hard(played: Played) -> None:
+    """The run raises alerts of every kind that the comparison is about."""
+    hard = {'TORQUE_LIMIT', 'TIP_OVER', 'INPUT_STALE', 'INPUT_INVALID', 'INPUT_INCOMPLETE'}
+    assert hard <= {alert.rule.code for alert in recorded(played.run).alerts}

@@ -71,7 +71,7 @@ class Monitor(LifecycleNode):
         what = 'queue of each input; what comes while the processor is busy waits in it'
         declare('depth', 1000, described_integer(what, 1, 100_000))
         what = 'margin messages a second; 0: one for every input message'
-        declare('publish_rate', 50.0, described(what, 0.0, 10_000.0))
+        declare('publish_rate', 25.0, described(what, 0.0, 10_000.0))
         what = 'nodes that may publish the inputs, such as /driver; empty: any, but only one'
         declare('allowed_publishers', [''], described(what))
 
