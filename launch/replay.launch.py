@@ -31,6 +31,11 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 'loop', default_value='false', description='start again at the end'
             ),
+            DeclareLaunchArgument(
+                'restamp',
+                default_value='true',
+                description='move header stamps to now: the monitor compares them with its clock',
+            ),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(monitor),
                 launch_arguments={
@@ -49,8 +54,9 @@ def generate_launch_description() -> LaunchDescription:
                         'bag': ParameterValue(LaunchConfiguration('bag'), value_type=str),
                         'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
                         'loop': ParameterValue(LaunchConfiguration('loop'), value_type=bool),
-                        # The monitor compares header stamps with its clock.
-                        'restamp': True,
+                        'restamp': ParameterValue(
+                            LaunchConfiguration('restamp'), value_type=bool
+                        ),
                     }
                 ],
             ),
