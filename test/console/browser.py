@@ -81,6 +81,7 @@ class Page:
             self.call(f'{domain}.enable')
         self.resize(width, height, touch=touch)
         self.call('Page.navigate', url=url)
+        self.wait('location.href !== "about:blank" && document.readyState === "complete"')
 
     def resize(self, width: int, height: int, *, touch: bool = False) -> None:
         """Give the page another screen."""

@@ -178,16 +178,15 @@ def _posture(skeleton: Skeleton) -> Plain:
 
 
 def _attitude(snapshot: Snapshot) -> Plain | None:
-    gravity = snapshot.gravity
-    if not all(map(math.isfinite, gravity)) or not any(gravity):
+    x, y, z = gravity = snapshot.gravity
+    # Neither unknown nor next to nothing: something that shows where down is.
+    if not 1e-6 < math.hypot(x, y, z) < 1e6:
         return None
-    x, y, z = gravity
     roll, pitch = roll_pitch((-x, -y, -z))
-    size = math.sqrt(x * x + y * y + z * z)
     return {
         'roll_deg': number(math.degrees(roll)),
         'pitch_deg': number(math.degrees(pitch)),
-        'slope_deg': number(math.degrees(math.acos(max(-1.0, min(1.0, -z / size))))),
+        'slope_deg': number(math.degrees(math.atan2(math.hypot(x, y), -z))),
         'gravity': numbers(gravity),
     }
 

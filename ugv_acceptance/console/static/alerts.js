@@ -30,7 +30,7 @@ export class Alerts {
     });
     $('no-alerts').hidden = frame.alerts.length > 0;
     text($('alert-count'), frame.alerts.length ? `(${frame.alerts.length}${hidden > 0 ? `, +${hidden} more` : ''})` : '');
-    const open = frame.alerts.some((a) => a.offers.includes('acknowledge'));
+    const open = frame.alerts.some((a) => a.unseen);
     $('acknowledge-all').disabled = !open;
   }
 

@@ -26,7 +26,7 @@ export class Strips {
   }
 
   chart(id, key, names, limits, low, high, unit) {
-    const { c, width, height } = brush($(id)), left = 44, top = 18, bottom = height - 4;
+    const { c, width, height } = brush($(id)), left = 54, top = 18, bottom = height - 4;
     const end = this.rows.at(-1)?.t ?? 0;
     const x = (t) => left + ((t - end + SECONDS) / SECONDS) * (width - left - 4);
     const y = (v) => bottom - ((Math.min(Math.max(v, low), high) - low) / (high - low)) * (bottom - top);

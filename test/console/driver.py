@@ -1,0 +1,62 @@
+"""A robot's driver in a process of its own: publishes both inputs, takes postures from its stdin.
+
+A line is four joint positions and the roll (rad), or `silent` or `speak` for the IMU.
+"""
+
+import math
+import sys
+import threading
+import time
+from dataclasses import dataclass
+
+import rclpy
+from sensor_msgs.msg import Imu, JointState
+
+from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
+
+NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
+PERIOD = 0.02
+
+
+@dataclass
+class Robot:
+    """How the robot stands now."""
+
+    q: tuple[float, ...] = (0.0, 2.0, -2.5, 2.0)
+    roll: float = 0.0
+    silent: bool = False
+
+
+def listen(robot: Robot) -> None:
+    """Take postures until the input ends."""
+    for line in sys.stdin:
+        word = line.strip()
+        if word in {'silent', 'speak'}:
+            robot.silent = word == 'silent'
+        else:
+            *q, robot.roll = (float(x) for x in word.split())
+            robot.q = tuple(q)
+
+
+def main() -> None:
+    """Publish until the input ends."""
+    rclpy.init()
+    node = rclpy.create_node('driver')
+    joints = node.create_publisher(JointState, 'joint_states', 100)
+    imu = node.create_publisher(Imu, 'imu/data', 100)
+    robot = Robot()
+    listening = threading.Thread(target=listen, args=(robot,), daemon=True)
+    listening.start()
+    while listening.is_alive():
+        now, half = time.time_ns(), robot.roll / 2
+        joints.publish(joint_state_cdr(now, '', NAMES, robot.q, (0.0,) * 4, (0.0,) * 4))
+        if not robot.silent:
+            force = (0.0, 9.81 * math.sin(robot.roll), 9.81 * math.cos(robot.roll))
+            orientation = (math.sin(half), 0.0, 0.0, math.cos(half))
+            imu.publish(imu_cdr(now, 'imu_link', orientation, (0.0, 0.0, 0.0), force))
+        time.sleep(PERIOD)
+    rclpy.shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,143 @@
+"""The frame: strict JSON of a snapshot that never says more than is known."""
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.config import load
+from ugv_acceptance.console.frame import describe_robot, frame_of
+from ugv_acceptance.console.skeleton import figure_of
+from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE, WARN
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import STANDING
+
+SETTINGS = load().settings
+FIGURE = figure_of(SETTINGS.robot)
+FINE = Snapshot(
+    5_000_000_000,
+    OK,
+    known=True,
+    q=(0.0, 2.0, -2.5, 2.0),
+    effort=(0.0, 10.0, math.nan, 0.0),
+    gravity=(0.0, 0.0, -9.81),
+    torque=(0.0, -20.0, 5.0, 0.1),
+    angle=(0.5, 0.6, math.inf, 0.4),
+    state=STANDING,
+    payload=Payload(2.0, (0.0, 0.0, 0.0)),
+)
+any_float = st.floats()
+four = st.tuples(any_float, any_float, any_float, any_float)
+
+
+def frame(snapshot: Snapshot) -> dict[str, Any]:
+    """Return a frame as a page reads it."""
+    made = frame_of(snapshot, SETTINGS, FIGURE)
+    read: dict[str, Any] = json.loads(json.dumps(made, allow_nan=False))
+    return read
+
+
+def alert(code: str = 'TIP_OVER', subject: str = 'front', **changes: Any) -> AlertRow:
+    """Return an active, unseen alert."""
+    row = AlertRow(
+        f'{code}-{subject}',
+        code,
+        subject,
+        ERROR,
+        'active',
+        f'{code} it is',
+        'do that',
+        1,
+        unseen=True,
+    )
+    return replace(row, **changes)
+
+
+@given(four, four, four, st.tuples(any_float, any_float, any_float), st.integers(0, 3))
+def test_every_frame_is_strict_json(
+    q: tuple[float, ...],
+    torque: tuple[float, ...],
+    angle: tuple[float, ...],
+    gravity: tuple[float, float, float],
+    level: int,
+) -> None:
+    """Whatever numbers come, a frame has no NaN or infinity in it."""
+    strange = replace(FINE, q=q, torque=torque, angle=angle, gravity=gravity, level=level)
+    frame(strange)
+
+
+@given(st.integers(0, 3))
+def test_what_is_not_known_is_no_data(level: int) -> None:
+    """Where margins are not known the word is NO DATA, whatever level is claimed."""
+    found = frame(replace(FINE, level=level, known=False))
+    assert (found['word'], found['left']) == ('NO DATA', '')
+
+
+def test_a_fine_robot_is_ok() -> None:
+    """Nothing wrong: OK, and what is left in words."""
+    found = frame(FINE)
+    assert (found['word'], found['cause'], found['advice']) == ('OK', 'all margins kept', '')
+    assert (
+        found['left']
+        == '22.9 degrees of tilt left to the right, shoulder_joint at 40% of its limit'
+    )
+
+
+def test_degrees_stand_at_the_edge() -> None:
+    """Tilt left is in degrees, null where no edge lies on a side."""
+    tilt = {row['side']: row['left_deg'] for row in frame(FINE)['tilt']}
+    assert tilt['rear'] is None
+    assert tilt['front'] == pytest.approx(math.degrees(0.5), abs=1e-5)
+
+
+def test_roll_and_pitch_have_their_signs() -> None:
+    """Gravity to the robot's right and front: right side down is positive roll, nose down pitch."""
+    found = frame(replace(FINE, gravity=(0.0, -9.81 * math.sin(0.1), -9.81 * math.cos(0.1))))
+    assert found['attitude']['roll_deg'] == pytest.approx(math.degrees(0.1), abs=1e-5)
+    found = frame(replace(FINE, gravity=(9.81 * math.sin(0.2), 0.0, -9.81 * math.cos(0.2))))
+    assert found['attitude']['pitch_deg'] == pytest.approx(math.degrees(0.2), abs=1e-5)
+
+
+def test_tipping_comes_before_a_motor() -> None:
+    """Of two alerts of one level, the one about tipping is the cause; the other is counted."""
+    rows = (alert('TORQUE_LIMIT', 'elbow', start=9), alert())
+    found = frame(replace(FINE, level=ERROR, alerts=rows))
+    assert (found['word'], found['cause']) == ('DANGER', 'TIP_OVER it is (and 1 more)')
+    assert found['advice'] == 'do that'
+
+
+def test_a_caution_under_its_danger_is_left_out() -> None:
+    """The warning of a limit whose error is active says nothing new."""
+    rows = (alert(key='w', level=WARN), alert(key='e'))
+    assert [row['key'] for row in frame(replace(FINE, alerts=rows))['alerts']] == ['e']
+
+
+def test_what_is_over_and_unseen_is_said() -> None:
+    """An alert that is over stays the cause until somebody acknowledges it."""
+    found = frame(replace(FINE, level=WARN, alerts=(alert(end=2),)))
+    assert found['cause'] == 'over now, not acknowledged: TIP_OVER it is'
+
+
+def test_a_problem_comes_before_old_alerts() -> None:
+    """A silent monitor is the cause, not what it said before."""
+    silent = replace(FINE, level=STALE, known=False, problem='the monitor is silent')
+    found = frame(replace(silent, alerts=(alert(),)))
+    assert found['cause'] == 'the monitor is silent'
+
+
+def test_inputs_are_passed_on() -> None:
+    """An input's row holds its age, null where nothing came."""
+    rows = (InputRow('imu', '/imu/data', STALE, 0.0, math.nan, ('/driver',), 'silent'),)
+    (found,) = frame(replace(FINE, inputs=rows))['inputs']
+    assert (found['age_s'], found['level'], found['publishers']) == (None, 'STALE', ['/driver'])
+
+
+def test_the_robot_is_described_once() -> None:
+    """Limits that are not known are null, not infinite."""
+    found = json.loads(json.dumps(describe_robot(SETTINGS), allow_nan=False))
+    assert [joint['limit'] for joint in found['joints']] == [None, 50.0, 50.0, None]

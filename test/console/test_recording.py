@@ -1,0 +1,141 @@
+"""A recording's frames against the live evaluator fed with the same messages."""
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.config import load
+from ugv_acceptance.console.recording import Recording, RecordingFeed, judge_for_console
+from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE
+from ugv_acceptance.evaluation.live import LiveEvaluator
+
+SETTINGS = load().settings
+BAGS = Path(__file__).parents[2] / 'bags'
+
+
+def judged(name: str) -> Recording:
+    """Return one of the recordings that ship."""
+    bag = open_bag(BAGS / name)
+    return judge_for_console(bag, choose_topics(bag), SETTINGS)
+
+
+@pytest.fixture(scope='module')
+def fail() -> Recording:
+    """Return the run that tips over."""
+    return judged('packbot_fail')
+
+
+def test_frames_are_those_of_the_live_evaluator(fail: Recording) -> None:
+    """At every row of the track the live evaluator, fed message by message, knows the same."""
+    bag, live = fail.bag, LiveEvaluator(SETTINGS)
+    live.start(bag.start_ns)
+    wanted = {int(t): k for k, t in enumerate(fail.track.time)}
+    compared = 0
+    for when, kind, row in messages(fail):
+        if kind == 'joints':
+            live.joint_state(when, *row)
+        elif kind == 'imu':
+            live.imu(when, *row)
+        else:
+            live.carry(when, *row)
+        k = wanted.get(when)
+        if k is None or live.margins is None or live.margins.time != when:
+            continue
+        compared += 1
+        shown = fail.snapshot_at(when)
+        assert shown.torque == pytest.approx(live.margins.torque, abs=1e-9)
+        assert shown.angle == pytest.approx(live.margins.stability.angle, abs=1e-9)
+        assert shown.q == live.margins.q
+        assert shown.payload == live.payload
+    assert compared > 500
+
+
+def messages(recording: Recording) -> list[tuple[int, str, tuple[object, ...]]]:
+    """Return a recording's messages one by one, in order of receipt."""
+    found: list[tuple[int, str, tuple[object, ...]]] = []
+    for batch in recording.bag.batches(recording.topics):
+        for p in batch.payload:
+            for k, when in enumerate(p.log_time.tolist()):
+                found.append((when, 'load', (float(p.mass[k]), p.com[k].tolist(), p.frame_id)))
+        for j in batch.joints:
+            rows = zip(
+                j.log_time.tolist(),
+                j.stamp.tolist(),
+                j.position.tolist(),
+                j.velocity.tolist(),
+                j.effort.tolist(),
+                strict=True,
+            )
+            found += [(t, 'joints', (stamp, j.names, *rest)) for t, stamp, *rest in rows]
+        for i in batch.imu:
+            columns = zip(
+                i.log_time.tolist(),
+                i.stamp.tolist(),
+                i.orientation.tolist(),
+                i.orientation_covariance_0.tolist(),
+                i.angular_velocity.tolist(),
+                i.linear_acceleration.tolist(),
+                strict=True,
+            )
+            found += [(t, 'imu', tuple(rest)) for t, *rest in columns]
+    return sorted(found, key=lambda m: m[0])
+
+
+def test_the_level_follows_the_alerts(fail: Recording) -> None:
+    """Early in the run all is well, at its end it is not."""
+    start = fail.bag.start_ns
+    assert fail.snapshot_at(start + 1_500_000_000).level == OK
+    assert fail.snapshot_at(start + 28_000_000_000).level == ERROR
+
+
+def test_a_gap_is_no_data() -> None:
+    """While the IMU was silent there are no margins, and the input says so."""
+    gap = judged('packbot_gap')
+    shown = gap.snapshot_at(gap.bag.start_ns + 9_500_000_000)
+    assert (shown.level, shown.known, shown.torque) == (STALE, False, ())
+    assert [row.level for row in shown.inputs] == [OK, STALE]
+    assert gap.snapshot_at(gap.bag.start_ns + 13_000_000_000).known
+
+
+@settings(max_examples=60)
+@given(st.floats(-5.0, 40.0))
+def test_no_alert_tells_what_is_yet_to_come(fail: Recording, seconds: float) -> None:
+    """At any time an alert of tipping over tells the worst up to then, not later."""
+    when = fail.bag.start_ns + int(seconds * 1e9)
+    shown = fail.snapshot_at(when)
+    known = fail.track.angle[: fail.track.row(when) + 1].min(initial=math.inf)
+    for row in shown.alerts:
+        assert row.start <= when
+        if row.code == 'TIP_OVER' and 'before it tips' in row.text:
+            said = float(row.text.split(' degrees')[0])
+            assert said >= math.degrees(known) - 0.1
+
+
+def test_the_timeline_holds_every_alert_and_the_worst(fail: Recording) -> None:
+    """The timeline has the judgement's verdict, all its alerts, and the least tilt left."""
+    line, result = fail.timeline(), fail.judgement.result
+    assert line['verdict'] == result['verdict'] == 'FAIL'
+    assert len(line['alerts']) == len(result['alerts'])
+    least = min(x for x in line['tilt_deg'] if x is not None)
+    assert least == pytest.approx(result['stability']['min_angle_deg'], abs=1e-5)
+
+
+def test_commands_are_checked(fail: Recording) -> None:
+    """A recording plays, pauses, seeks; what it cannot do is refused with words."""
+    feed = RecordingFeed(fail, now=lambda: 0.0)
+    feed.command('seek', {'to_s': 7})
+    feed.command('pause', {})
+    assert feed.extra()['playback'] == {'position_s': 7.0, 'playing': False, 'speed': 1.0}
+    for do, values in (
+        ('seek', {'to_s': 'x'}),
+        ('seek', {'to_s': math.nan}),
+        ('speed', {'speed': 3}),
+        ('acknowledge', {}),
+    ):
+        with pytest.raises(BadSample):
+            feed.command(do, values)
