@@ -79,7 +79,7 @@ class Robot:
     payload: Payload = Payload()
     gravity: float = 9.81
     ground: float = 0.0
-    contact_tolerance: float = 0.005
+    contact_tolerance: float = 0.001
 
     @property
     def root(self) -> str:
