@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ugv_acceptance.model.planar import (
@@ -89,6 +89,7 @@ def test_no_theta2_loads_joint_1_more_than_the_worst(theta1: float) -> None:
     assert min(worst) == pytest.approx(max(worst))
 
 
+@example(theta1=3.1415926535897927, limit1=5.0, limit2=5.0, two_sided=False)
 @given(theta1=angles, limit1=limits, limit2=limits, two_sided=st.booleans())
 def test_the_safe_range_is_where_no_limit_is_passed(
     theta1: float, limit1: float, limit2: float, *, two_sided: bool

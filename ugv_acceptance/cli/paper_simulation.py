@@ -59,18 +59,19 @@ def _ends(values: Floats) -> str:
 
 def simulated_truth(robot: Robot, count: int, console: Console) -> list[list[str]]:
     """Return the confusion matrix of the rollover map against simulated tipping, as a table."""
-    from ugv_acceptance.simulation.tip_cases import judge_all, random_cases
+    from ugv_acceptance.simulation.tip_cases import confusion, judge_all, random_cases
 
     with console.status(f'Tilting the plane under the simulated robot, {count} cases'):
         judged = judge_all(robot, random_cases(robot, count, seed=1))
-    known = [case for case in judged if math.isfinite(case.margin)]
-    tips = [(case.margin <= 0.0, case.truth.tilt <= case.case.tilt) for case in known]
-    errors = np.degrees([abs(case.error) for case in judged if math.isfinite(case.error)])
-    worst = f'{errors.max():.2f}°' if len(errors) else 'none'
-    half = f'{np.median(errors):.2f}°' if len(errors) else 'none'
+    found = confusion(judged)
+    left = np.abs(np.degrees([case.left for case in judged]))
+    left = left[np.isfinite(left)]
+    spread = [f'{np.percentile(left, share):.2f}°' for share in (50, 95, 100)] if len(left) else []
     return [
-        [f'{len(known)} random cases', 'MuJoCo: stands', 'MuJoCo: tips'],
-        ['map: stands', str(tips.count((False, False))), str(tips.count((False, True)))],
-        ['map: tips', str(tips.count((True, False))), str(tips.count((True, True)))],
-        ['tilt at which it tips, map less MuJoCo', f'median {half}', f'largest {worst}'],
+        [f'{count} random cases', 'MuJoCo: stands', 'MuJoCo: tips'],
+        ['model: stands', str(found.both_stand), str(found.only_truth)],
+        ['model: tips', str(found.only_model), str(found.both_tip)],
+        ['no margin to compare', str(found.no_margin), ''],
+        [f'differ, and over {math.degrees(found.band):.0f}° from the boundary', str(found.far), ''],
+        ['margin the model shows as MuJoCo tips: median, 95 %, largest', ', '.join(spread), ''],
     ]

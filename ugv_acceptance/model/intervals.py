@@ -11,9 +11,16 @@ def where_cosine_between(lower: float, upper: float, shift: float = 0.0) -> Inte
     """Return where lower <= cos(x - shift) <= upper, as intervals of x in [0, 2 pi] (rad)."""
     if upper < -1.0 or lower > 1.0 or upper < lower:
         return ()
+    if lower <= -1.0 and upper >= 1.0:
+        return ((0.0, TURN),)
     near, far = math.acos(min(upper, 1.0)), math.acos(max(lower, -1.0))
+    arcs = [(near, far), (TURN - far, TURN - near)]
+    if lower <= -1.0:  # one arc through half a turn, or through 0: no seam in its middle
+        arcs = [(near, TURN - near)]
+    elif upper >= 1.0:
+        arcs = [(-far, far)]
     parts: list[tuple[float, float]] = []
-    for start, end in ((near, far), (TURN - far, TURN - near)):
+    for start, end in arcs:
         parts += wrap(start + shift, end + shift)
     return merge(parts)
 
