@@ -216,7 +216,7 @@ def _limit_of(reading: _Reading, side: str, given: Given, signal: str, of: str) 
         kind = kinds[1] if reading.settings.robot.joint(of).kind == 'prismatic' else kinds[0]
     if given.kind not in (None, kind):
         example = EXAMPLES.get(kind, 'a bare number')
-        raise reading.refuse(side, f'expected {example} for {signal}, got a {given.kind}')
+        raise reading.refuse(side, f'expected {example} for {signal}, got a unit of {given.kind}')
     return given.value
 
 
