@@ -54,9 +54,7 @@ def generate_launch_description() -> LaunchDescription:
                         'bag': ParameterValue(LaunchConfiguration('bag'), value_type=str),
                         'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
                         'loop': ParameterValue(LaunchConfiguration('loop'), value_type=bool),
-                        'restamp': ParameterValue(
-                            LaunchConfiguration('restamp'), value_type=bool
-                        ),
+                        'restamp': ParameterValue(LaunchConfiguration('restamp'), value_type=bool),
                     }
                 ],
             ),

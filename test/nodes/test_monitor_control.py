@@ -152,6 +152,7 @@ def test_reset_begins_a_new_evaluation(live: Live) -> None:
     live.until(lambda: driver.verdicts[-1].message.startswith('over now'), driver.send)
     assert live.call(Trigger, '/acceptance_monitor/reset').success
     assert monitor.verdict().level == STALE
+    live.until(lambda: any(a.values[0].value == 'reset' for a in driver.alerts), driver.send)
     live.until(lambda: driver.verdicts[-1].level[0] == OK, driver.send)
 
 

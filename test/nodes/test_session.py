@@ -17,7 +17,7 @@ from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE, Alert, Rule
 from ugv_acceptance.nodes.conversions import JointStateBytes
 from ugv_acceptance.nodes.faults import WORDS
 from ugv_acceptance.nodes.following import KEPT, Follower
-from ugv_acceptance.nodes.parameters import knobs_of
+from ugv_acceptance.nodes.parameters import knobs_of, unknown
 from ugv_acceptance.nodes.receipt import RESHIFT, ReceiptClock
 from ugv_acceptance.nodes.session import Session
 
@@ -207,6 +207,13 @@ def test_a_parameter_reads_what_was_put(knob: Any) -> None:
         other = knob.lower + 0.25 * (min(knob.upper, 100.0) - knob.lower)
         assert knob.get(knob.put(settings, other)) == pytest.approx(other)
         assert knob.lower <= value <= knob.upper
+
+
+def test_a_misspelt_parameter_is_said() -> None:
+    """A parameter that does not exist is a warning that names the nearest one."""
+    (text,) = unknown(['limits.tip_wran_deg'], knobs_of(CONFIG.settings))
+    assert 'limits.tip_wran_deg' in text
+    assert 'limits.tip_warn_deg' in text
 
 
 @pytest.mark.parametrize('code', WORDS)

@@ -6,7 +6,6 @@ subscribed as raw bytes on activation, so an inactive monitor costs nothing.
 
 import sys
 from collections.abc import Callable
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +19,18 @@ from std_srvs.srv import Trigger
 
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config, load
+from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.nodes.inputs import Inputs
 from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
-from ugv_acceptance.nodes.parameters import Knob, changed, described, described_integer, knobs_of
+from ugv_acceptance.nodes.parameters import (
+    Knob,
+    changed,
+    described,
+    described_integer,
+    knobs_of,
+    unknown,
+)
 from ugv_acceptance.nodes.receipt import ReceiptClock
 from ugv_acceptance.nodes.running import run
 from ugv_acceptance.nodes.session import Session
@@ -120,18 +127,14 @@ class Monitor(LifecycleNode):
     def _configure(self) -> None:
         urdf = self._value('urdf')
         self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
-        for warning in self.config.warnings:
-            self.get_logger().warning(warning)
         defaults = self.config.settings
         knobs = knobs_of(defaults)
         for knob in knobs:
             if not self.has_parameter(knob.name):
                 self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
-        for name in sorted(self._parameter_overrides):
-            if not self.has_parameter(name):
-                near = get_close_matches(name, [knob.name for knob in knobs], 1)
-                hint = f'; did you mean {near[0]}?' if near else ''
-                self.get_logger().warning(f'parameter {name} is not known and not used{hint}')
+        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        for warning in [*self.config.warnings, *unknown(given, knobs)]:
+            self.get_logger().warning(warning)
         values = {knob.name: self._value(knob.name) for knob in knobs}
         self._settings, self.knobs = changed(defaults, knobs, values), knobs
         self.output.hardware_id = self.config.serial or self.config.name
@@ -158,6 +161,8 @@ class Monitor(LifecycleNode):
         )
 
     def _deactivate(self) -> None:
+        if self.session is not None:
+            self._tell_all('reset', [*self.session.follower.latched, *self.session.follower.open])
         if self._inputs is not None:
             self._inputs.destroy()
         if self._tick is not None:
@@ -218,9 +223,14 @@ class Monitor(LifecycleNode):
         session = self.session
         if session is None:
             return
-        found = session.follower.take()
-        self._tell([alert_status(a, how, session.settings, session.faults) for a, how in found])
+        told = (session.settings, session.faults)
+        self._tell([alert_status(a, how, *told) for a, how in session.follower.take()])
         self.say()
+
+    def _tell_all(self, how: str, alerts: list[Alert]) -> None:
+        if self.session is not None:
+            told = (self.session.settings, self.session.faults)
+            self._tell([alert_status(alert, how, *told) for alert in alerts])
 
     def _tell(self, statuses: list[Status]) -> None:
         if statuses:
@@ -231,13 +241,11 @@ class Monitor(LifecycleNode):
     # Services and parameters
 
     def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        session = self.session
-        response.success = session is not None
+        response.success = self.session is not None
         response.message = 'the monitor is not active'
-        if session is not None:
-            seen = session.follower.acknowledge()
-            told = (session.settings, session.faults)
-            self._tell([alert_status(alert, 'acknowledged', *told) for alert in seen])
+        if self.session is not None:
+            seen = self.session.follower.acknowledge()
+            self._tell_all('acknowledged', seen)
             response.message = f'acknowledged {len(seen)} alerts'
             self.say()
         return response

@@ -7,6 +7,7 @@ or wholly refused; several values that belong together go into one set_parameter
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -167,6 +168,16 @@ _CHOICES = (
         lambda s, v: replace(s, imu=replace(s.imu, specific_force=bool(v))),
     ),
 )
+
+
+def unknown(names: Sequence[str], knobs: Sequence[Knob]) -> list[str]:
+    """Return a warning for each given parameter that the node does not have."""
+    found = []
+    for name in sorted(names):
+        near = get_close_matches(name, [knob.name for knob in knobs], 1)
+        hint = f'; did you mean {near[0]}?' if near else ''
+        found.append(f'parameter {name} is not known and not used{hint}')
+    return found
 
 
 def changed(settings: Settings, knobs: Sequence[Knob], values: Mapping[str, Any]) -> Settings:

@@ -82,7 +82,7 @@ def _severity(alert: Alert) -> tuple[int, bool]:
 
 
 def alert_status(alert: Alert, state: str, settings: Settings, faults: Faults) -> Status:
-    """Return a change of an alert: `state` is raised, cleared or acknowledged."""
+    """Return a change of an alert: `state` is raised, cleared, acknowledged or reset."""
     rule = alert.rule
     values: dict[str, object] = {
         'state': state,
@@ -94,7 +94,7 @@ def alert_status(alert: Alert, state: str, settings: Settings, faults: Faults) -
         'peak': float(alert.peak),
         'do': what_to_do(rule.code),
     }
-    level = OK if state == 'cleared' else rule.level
+    level = OK if state in {'cleared', 'reset'} else rule.level
     sentence = faults.sentence(alert, settings)
     return Status(level, f'{rule.code} {rule.subject}', f'{state}: {sentence}', values)
 
