@@ -3,7 +3,7 @@
 from enum import Enum
 
 
-class Source(Enum):
+class FailureSource(Enum):
     """A leaf of the taxonomy of failures (Carlson and Murphy); the value is the text people see."""
 
     EFFECTOR = 'effector'
@@ -25,4 +25,20 @@ class Source(Enum):
         return f'{"physical" if self.physical else "human"} / {self.value}'
 
 
-HUMAN = frozenset({Source.DESIGN, Source.INTERACTION})
+HUMAN = frozenset({FailureSource.DESIGN, FailureSource.INTERACTION})
+
+# Alert code -> where to look first. An alert shows an effect, so this is a suspicion, no verdict:
+# a robot that tips was most often led there, an input that is silent most often lost its way.
+FIRST_SUSPECT = {
+    'TORQUE_LIMIT': FailureSource.EFFECTOR,
+    'TIP_OVER': FailureSource.INTERACTION,
+    'NO_SUPPORT': FailureSource.INTERACTION,
+    'STATIC_MODEL': FailureSource.INTERACTION,
+    'INPUT_STALE': FailureSource.COMMUNICATIONS,
+    'INPUT_INCOMPLETE': FailureSource.SENSOR,
+    'INPUT_INVALID': FailureSource.SENSOR,
+    'CLOCK': FailureSource.CONTROL_SYSTEM,
+    'IMU_GRAVITY': FailureSource.SENSOR,
+    'IMU_INCONSISTENT': FailureSource.SENSOR,
+    'PAYLOAD_INVALID': FailureSource.INTERACTION,
+}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ugv_acceptance.evaluation.taxonomy import HUMAN, Source
+from ugv_acceptance.evaluation.taxonomy import HUMAN, FailureSource
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.model.robot import Robot
@@ -72,8 +72,8 @@ Built = tuple[Section, Extra]
 
 def taxonomy(_: Subject) -> Built:
     """Return Figure 1."""
-    physical = [s.value for s in Source if s not in HUMAN]
-    human = [s.value for s in Source if s in HUMAN]
+    physical = [s.value for s in FailureSource if s not in HUMAN]
+    human = [s.value for s in FailureSource if s in HUMAN]
     table = [
         ['source', 'categories'],
         ['physical', ', '.join(physical)],
