@@ -1,0 +1,150 @@
+"""A derived plan against the model, posture by posture and way by way."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.evaluation.wording import WORDS
+from ugv_acceptance.model.orientations import ORIENTATIONS
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import stability
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.plan.card import card_of
+from ugv_acceptance.plan.derive import Wanted, derive
+from ugv_acceptance.plan.order import distance, way
+from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Step, read_plan, vector_of
+
+CONFIG: Config = load()
+PLAN: Plan = derive(CONFIG)
+LIMITS = np.array(CONFIG.settings.limits.torque)
+HELD = [s for s in PLAN.steps if s.action in {'hold', 'tip'}]
+
+
+def margins_of(step: Step, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return use (n,) and tilt left (n,) deg of postures (n, j) in a step's set-up."""
+    robot = CONFIG.settings.robot
+    load_ = Payload(step.payload_kg, robot.payload.cog)
+    gravity = step.gravity(robot.gravity)
+    use = (np.abs(static_torque(robot, q, gravity, load_)) / LIMITS).max(axis=-1)
+    left = np.degrees(np.min(np.array(stability(robot, q, gravity, load_).angle), axis=0))
+    return use, left
+
+
+def vector(posture: dict[str, float]) -> np.ndarray:
+    """Return the positions of a posture, the others at home."""
+    return np.array(vector_of(CONFIG.settings.robot, PLAN.home_deg, posture))
+
+
+def ways() -> Iterator[tuple[Step, np.ndarray]]:
+    """Yield the postures (n, j) that each robot's step passes, from the step before or home."""
+    before, setup = PLAN.home_deg, None
+    for step in PLAN.steps:
+        if step.where == ROBOT and step.action == 'hold':
+            start = before if setup == (step.ground, step.payload_kg) else PLAN.home_deg
+            stops = [vector(p) for p in (start, *step.via_deg, step.posture_deg)]
+            parts = [a + np.linspace(0.0, 1.0, 181)[:, None] * (b - a) for a, b in pairwise(stops)]
+            yield step, np.concatenate(parts)
+        before, setup = step.posture_deg, (step.ground, step.payload_kg)
+
+
+@pytest.mark.parametrize(('step', 'path'), list(ways()), ids=lambda x: getattr(x, 'id', ''))
+def test_no_way_of_the_robot_passes_a_limit(step: Step, path: np.ndarray) -> None:
+    """From the posture before, by the postures between, every margin is kept."""
+    use, left = margins_of(step, path)
+    assert use.max() < CONFIG.settings.limits.torque_error
+    assert left.min() > math.degrees(CONFIG.settings.limits.tip_error)
+
+
+@pytest.mark.parametrize('step', HELD, ids=lambda s: s.id)
+def test_the_margins_a_step_expects_are_those_of_its_posture(step: Step) -> None:
+    """What the plan tells the reader is what torque and stability give."""
+    use, left = margins_of(step, vector(step.posture_deg)[None, :])
+    assert step.expected['use'] == pytest.approx(float(use[0]), abs=2e-3)
+    assert step.expected['tilt_left_deg'] == pytest.approx(float(left[0]), abs=0.05)
+
+
+def test_both_sides_of_the_torque_boundary_are_there() -> None:
+    """Just inside goes to the robot, just outside to the simulation only."""
+    use = {s.id: s.expected['use'] for s in PLAN.steps if s.group == 'torque boundary'}
+    inside = [u for u in use.values() if u < 1.0]
+    outside = [u for u in use.values() if u > 1.0]
+    assert len(inside) >= 3
+    assert len(outside) >= 3
+    assert max(inside) > 0.9
+    assert min(outside) < 1.15
+
+
+def test_both_sides_of_the_rollover_boundary_are_there() -> None:
+    """Inside, beyond the limit, and beyond the tip-over itself."""
+    left = [s.expected['tilt_left_deg'] for s in PLAN.steps if s.group == 'rollover boundary']
+    assert any(5.0 < x < 10.0 for x in left)
+    assert any(0.0 < x < 5.0 for x in left)
+    assert any(x < 0.0 for x in left)
+
+
+def test_nothing_that_fails_is_run_on_the_robot() -> None:
+    """Only the simulation may be asked for a critical alert."""
+    asked = [p for s in PLAN.steps if s.where == ROBOT for p in s.alerts.must]
+    assert not [p for p in asked if p.startswith(('ERROR', 'STALE'))]
+
+
+def test_every_orientation_is_there() -> None:
+    """All of Figure 6 but level ground, which most steps have."""
+    found = {s.ground.orientation for s in PLAN.steps if s.group == 'orientations'}
+    assert found == set(ORIENTATIONS) - {'level'}
+
+
+def test_lifts_are_below_and_above_the_largest_load() -> None:
+    """At the largest load the first margin is used up: 90 % keeps it, 112 % does not."""
+    for step in (s for s in PLAN.steps if s.group == 'lift'):
+        use, left = margins_of(step, vector(step.posture_deg)[None, :])
+        kept = bool(use[0] < 1.0 and left[0] > 0.0)
+        assert kept is (step.where == ROBOT), step.id
+
+
+def test_speeds_are_below_and_above_the_static_limit() -> None:
+    """The limit of 36 deg/s has a motion on either side, for each judged joint."""
+    speeds = [s.speed_degps for s in PLAN.steps if s.action == 'sweep']
+    assert sum(v < 36.0 for v in speeds) == sum(v > 36.0 for v in speeds) == 2
+
+
+def test_the_robot_comes_before_the_simulation() -> None:
+    """What is simulated only is last, so a person can stop reading there."""
+    where = [s.where for s in PLAN.steps]
+    assert where == sorted(where)
+
+
+def test_the_greedy_order_is_shorter_than_by_title() -> None:
+    """Within one set-up the arm goes to the nearest posture next."""
+    setup = [s for s in PLAN.steps if s.group == 'torque boundary' and s.where == SIMULATION]
+    by_title = sorted(setup, key=lambda s: s.title)
+    assert way(setup, PLAN.home_deg) <= way(by_title, PLAN.home_deg)
+    assert distance(PLAN.home_deg, setup[0].posture_deg) > 0.0
+
+
+def test_the_same_robot_gives_the_same_plan() -> None:
+    """Nothing is left to chance."""
+    assert derive(CONFIG).sha256 == PLAN.sha256
+
+
+def test_the_short_plan_that_ships_is_the_one_derived(repository: Path) -> None:
+    """`ugv-acceptance plan --short` gives bags/packbot_short_plan.yaml."""
+    shipped = read_plan(repository / 'bags' / 'packbot_short_plan.yaml', CONFIG.settings.robot)
+    assert shipped.steps == derive(CONFIG, Wanted(short=True)).steps
+
+
+def test_the_card_shows_every_step_and_loads_nothing() -> None:
+    """One file: every step, the hash, what the alerts mean; no address to fetch from."""
+    card = card_of(PLAN, CONFIG)
+    assert all(f'{step.id}:' in card for step in PLAN.steps)
+    assert PLAN.sha256 in card
+    assert 'src=' not in card
+    assert '<link' not in card
+    used = {p.split()[1] for s in PLAN.steps for p in s.alerts.must}
+    assert used <= set(WORDS)
+    assert all(f'<code>{code}</code>' in card for code in used)

@@ -1,0 +1,99 @@
+"""A plan as a file: what is written is read, what is wrong is said with file and line."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config import load
+from ugv_acceptance.plan.plan import Plan, matches, read_plan, write_plan
+
+STEP = {'id': 'one', 'group': 'g', 'title': 't', 'purpose': 'p', 'posture_deg': {'elbow_joint': 9}}
+PLAN = {
+    'plan': 'small',
+    'robot': 'packbot',
+    'config_sha256': '0',
+    'home_deg': {'elbow_joint': 0},
+    'steps': [STEP],
+}
+
+
+def written(folder: Path, text: str) -> Path:
+    """Return a plan file with this text."""
+    path = folder / 'plan.yaml'
+    path.write_text(text, 'utf-8')
+    return path
+
+
+def test_a_plan_that_is_written_is_read_again(tmp_path: Path) -> None:
+    """Writing and reading keeps everything, so the hash too."""
+    plan = Plan.model_validate(PLAN)
+    write_plan(plan, tmp_path / 'plan.yaml')
+    assert read_plan(tmp_path / 'plan.yaml') == plan
+
+
+def test_comments_and_the_order_of_keys_do_not_change_the_hash(tmp_path: Path) -> None:
+    """The hash is that of what the plan says."""
+    turned = dict(reversed(PLAN.items()))
+    text = '# edited by hand\n' + yaml.safe_dump(turned, sort_keys=False)
+    assert read_plan(written(tmp_path, text)).sha256 == Plan.model_validate(PLAN).sha256
+
+
+@pytest.mark.parametrize('change', [{'hold_s': 9.0}, {'payload_kg': 1.0}, {'title': 'other'}])
+def test_any_change_of_a_step_changes_the_hash(change: dict[str, object]) -> None:
+    """A result names the plan it was made with, to the last word."""
+    changed = {**PLAN, 'steps': [{**STEP, **change}]}
+    assert Plan.model_validate(changed).sha256 != Plan.model_validate(PLAN).sha256
+
+
+@pytest.mark.parametrize(
+    ('change', 'said'),
+    [
+        ({'colour': 'red'}, r'plan.yaml:\d+: steps.0.colour'),
+        ({'hold_s': -1}, r'plan.yaml:\d+: steps.0.hold_s: expected .*greater than 0, got -1'),
+        ({'hold_s': float('nan')}, r'steps.0.hold_s: expected a finite number'),
+        ({'alerts': {'must': ['ERROR TIPS']}}, 'expected LEVEL .*got .ERROR TIPS'),
+        ({'ground': {'orientation': 'up'}}, 'expected one of level, right'),
+        ({'action': 'drive'}, 'expected drive'),
+        ({'action': 'fly'}, 'steps.0.action'),
+        ({'posture_deg': {'wing': 3}}, 'expected joints of packbot, got wing'),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_line_and_field(
+    tmp_path: Path, change: dict[str, object], said: str
+) -> None:
+    """One line: where, what was expected, what came."""
+    text = yaml.safe_dump({**PLAN, 'steps': [{**STEP, **change}]}, sort_keys=False)
+    path = written(tmp_path, text)
+    with pytest.raises(BadConfig) as error:
+        read_plan(path, load().settings.robot)
+    assert re.search(said, str(error.value)), str(error.value)
+    assert '\n' not in str(error.value)
+
+
+@pytest.mark.parametrize('text', ['', '[]', 'plan: 3', ': :', '\x00', 'a: &a [*a]'])
+def test_text_that_is_no_plan_is_refused(tmp_path: Path, text: str) -> None:
+    """Whatever is in the file, BadConfig names it."""
+    with pytest.raises(BadConfig, match=re.escape('plan.yaml')):
+        read_plan(written(tmp_path, text))
+
+
+def test_two_steps_of_one_id_are_refused(tmp_path: Path) -> None:
+    """Recordings and results are filed by id."""
+    text = yaml.safe_dump({**PLAN, 'steps': [STEP, STEP]})
+    with pytest.raises(BadConfig, match='expected a different id for every step, got one twice'):
+        read_plan(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ('pattern', 'found'),
+    [('ERROR', True), ('ERROR TIP_OVER', True), ('ERROR TIP_OVER left', True),
+     ('WARN', False), ('ERROR TORQUE_LIMIT', False), ('ERROR TIP_OVER right', False)],
+)  # fmt: skip
+def test_a_pattern_names_level_code_and_subject_as_far_as_it_goes(
+    pattern: str, *, found: bool
+) -> None:
+    """What a pattern leaves out may be anything."""
+    assert matches(pattern, 'ERROR', 'TIP_OVER', 'left') is found

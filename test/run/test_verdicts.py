@@ -1,0 +1,154 @@
+"""The verdict on a step from its alerts, and the folder that holds a run."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config import load
+from ugv_acceptance.plan.derive import Wanted, derive
+from ugv_acceptance.plan.plan import Step, write_plan
+from ugv_acceptance.run.catalogue import case_of
+from ugv_acceptance.run.coverage import cells, coverage_of
+from ugv_acceptance.run.folder import open_folder
+from ugv_acceptance.run.record import record
+from ugv_acceptance.run.verdicts import Done, decide, judge_step, seen_in, whole
+
+CONFIG = load()
+PLAN = derive(CONFIG, Wanted(short=True))
+WINDOW = (0.0, 5.0, 8.0)
+DONE = Done(0, 5, 8)
+
+
+def step(must: tuple[str, ...] = (), must_not: tuple[str, ...] = ('ERROR', 'STALE')) -> Step:
+    """Return a step that expects these alerts."""
+    return Step.model_validate(
+        {'id': 'a', 'group': 'g', 'title': 't', 'purpose': 'p', 'posture_deg': {},
+         'alerts': {'must': must, 'must_not': must_not}}
+    )  # fmt: skip
+
+
+def alert(text: str, start: float, end: float | None) -> dict[str, Any]:
+    """Return an alert of a result."""
+    level, code, subject = text.split()
+    return {'level': level, 'code': code, 'subject': subject, 'start_s': start, 'end_s': end,
+            'message': 'm'}  # fmt: skip
+
+
+ERROR = 'ERROR TIP_OVER left'
+
+
+@pytest.mark.parametrize(
+    ('asked', 'alerts', 'expected'),
+    [
+        (step(), [], 'PASS'),
+        (step(), [alert(ERROR, 6.0, None)], 'FAIL'),
+        (step(), [alert(ERROR, 1.0, 4.9)], 'PASS'),
+        (step(), [alert(ERROR, 1.0, 5.1)], 'FAIL'),
+        (step(), [alert('WARN TIP_OVER left', 6.0, None)], 'PASS'),
+        (step((ERROR,), ()), [], 'FAIL'),
+        (step((ERROR,), ()), [alert(ERROR, 1.0, 2.0)], 'PASS'),
+        (step((ERROR,), ()), [alert('ERROR TIP_OVER right', 1.0, 2.0)], 'FAIL'),
+        (step(('ERROR TIP_OVER',), ()), [alert(ERROR, 8.5, None)], 'FAIL'),
+    ],
+)
+def test_a_step_passes_if_its_alerts_are_those_it_expects(
+    asked: Step, alerts: list[dict[str, Any]], expected: str
+) -> None:
+    """What must be raised was, from the motion on; what must not was not active in the hold."""
+    assert decide(asked, alerts, WINDOW, DONE, 1.0)[0] == expected
+
+
+@pytest.mark.parametrize(
+    ('done', 'share', 'expected'),
+    [
+        (Done(0, 5, 8, stopped='ERROR TIP_OVER left'), 1.0, 'FAIL'),
+        (Done(0, 5, 8, fault='the monitor has said nothing'), 1.0, 'INCONCLUSIVE'),
+        (Done(0, 5, 8, reached=False), 1.0, 'FAIL'),
+        (DONE, 0.9, 'INCONCLUSIVE'),
+    ],
+)
+def test_what_was_stopped_or_not_seen_never_passes(done: Done, share: float, expected: str) -> None:
+    """A frozen motion fails; missing data is inconclusive."""
+    assert decide(step(), [], WINDOW, done, share)[0] == expected
+
+
+def test_a_run_is_as_good_as_its_worst_step() -> None:
+    """A step left out leaves the whole inconclusive."""
+    passed, failed, skipped = ({'verdict': v} for v in ('PASS', 'FAIL', 'SKIPPED'))
+    assert whole([passed, passed]) == 'PASS'
+    assert whole([passed, skipped]) == 'INCONCLUSIVE'
+    assert whole([passed, skipped, failed]) == 'FAIL'
+
+
+def test_a_recording_is_judged_in_its_window(tmp_path: Path) -> None:
+    """A run on level ground at rest passes, with its margins and full coverage of the hold."""
+    record(CONFIG, case_of('gentle', CONFIG.settings.robot, 1, 3.0), 1, tmp_path / 'run')
+    start = int(seen_in(tmp_path / 'run', CONFIG).joined()[0][0])
+    done = Done(start, start + 1_000_000_000, start + 2_500_000_000)
+    result = judge_step(step(), tmp_path / 'run', CONFIG, done)
+    assert result['verdict'] == 'PASS'
+    assert result['covered'] > 0.99
+    assert 30.0 < result['measured']['tilt_left_deg'] < 70.0
+
+
+def test_coverage_counts_the_cells_that_were_visited(tmp_path: Path) -> None:
+    """A robot that stands still visits one cell, well inside both limits."""
+    record(CONFIG, case_of('gentle', CONFIG.settings.robot, 1, 1.0), 1, tmp_path / 'run')
+    found = coverage_of(CONFIG, [seen_in(tmp_path / 'run', CONFIG)])
+    assert found['cells_visited'] <= 2  # noise may cross the line between two
+    assert found['torque_limit']['outside'] is None
+    assert found['torque_limit']['inside'] > 0.3
+
+
+def test_cells_do_not_see_whole_turns() -> None:
+    """A posture and the same posture a turn further are one cell; unknown positions are none."""
+    q = np.radians([[12.0, -170.0], [372.0, 190.0], [np.nan, 0.0]])
+    assert len(cells(q)) == 1
+
+
+def opened(path: Path, plan_file: Path, *, resume: bool = False, mode: str = 'sim') -> Any:
+    """Open a run's folder."""
+    write_plan(PLAN, plan_file)
+    return open_folder(path, PLAN, plan_file, mode, CONFIG, resume=resume)
+
+
+def test_a_run_is_continued_only_when_asked(tmp_path: Path) -> None:
+    """A folder with a run in it is never written over."""
+    opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    with pytest.raises(BadConfig, match='--resume continues'):
+        opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    opened(tmp_path / 'out', tmp_path / 'plan.yaml', resume=True)
+
+
+def test_a_run_of_another_mode_is_not_continued(tmp_path: Path) -> None:
+    """Results of a robot and of a simulation never stand in one folder."""
+    opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    with pytest.raises(BadConfig, match='mode: expected robot, got sim'):
+        opened(tmp_path / 'out', tmp_path / 'plan.yaml', resume=True, mode='robot')
+
+
+def test_what_an_interruption_left_is_kept(tmp_path: Path) -> None:
+    """The recording of a step that was not finished moves aside; nothing recorded is lost."""
+    folder = opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    first = PLAN.steps[0]
+    for number in (1, 2):
+        place = folder.recording(first)
+        place.mkdir()
+        (place / 'data').write_text(str(number))
+    aside = folder.path / 'steps' / f'{first.id}.interrupted-1' / 'data'
+    assert aside.read_text() == '1'
+
+
+def test_the_result_names_the_plan_and_every_step(tmp_path: Path) -> None:
+    """Steps that were not done are there as skipped, so the run is inconclusive."""
+    folder = opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    folder.finish_step(PLAN.steps[0], {'id': PLAN.steps[0].id, 'title': 't', 'verdict': 'PASS',
+                                       'reasons': []})  # fmt: skip
+    result = folder.finish(CONFIG, coverage_of(CONFIG, []))
+    assert result['plan']['sha256'] == PLAN.sha256
+    assert [s['id'] for s in result['steps']] == [s.id for s in PLAN.steps]
+    assert result['verdict'] == 'INCONCLUSIVE'
+    assert PLAN.sha256 in (folder.path / 'report.txt').read_text()
