@@ -34,7 +34,7 @@ from ugv_acceptance.nodes.parameters import (
 from ugv_acceptance.nodes.receipt import ReceiptClock
 from ugv_acceptance.nodes.running import run
 from ugv_acceptance.nodes.session import Session
-from ugv_acceptance.nodes.status import Status, alert_status, verdict
+from ugv_acceptance.nodes.status import Status, alert_status, verdict_of
 from ugv_acceptance.nodes.supervision import diagnostics_of, unavailable
 
 NAME = 'acceptance_monitor'
@@ -200,17 +200,7 @@ class Monitor(LifecycleNode):
 
     def verdict(self) -> Status:
         """Return the verdict now: STALE in every state but active."""
-        session = self.session
-        if session is None:
-            return unavailable(self.problem)
-        active = [*session.evaluator.watch.active, *session.faults.active]
-        return verdict(
-            session.settings,
-            session.evaluator.margins,
-            session.level,
-            active,
-            (session.faults, session.follower),
-        )
+        return unavailable(self.problem) if self.session is None else verdict_of(self.session)
 
     def say(self) -> None:
         """Publish the verdict and the diagnostics."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
+from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.nodes.faults import Faults
@@ -63,6 +64,11 @@ class Session:
         self.take_joint_state = self._guard('joint_states', self._joint_states())
         self.take_imu = self._guard('imu', self._imu())
         self.take_payload = self._guard('payload', self._payload())
+
+    @property
+    def active(self) -> list[Alert]:
+        """The alerts that are active now, of the robot, its inputs and this node."""
+        return [*self.evaluator.watch.active, *self.faults.active]
 
     @property
     def level(self) -> int:

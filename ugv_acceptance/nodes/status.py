@@ -9,7 +9,7 @@ from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.nodes.faults import Faults, what_to_do
-from ugv_acceptance.nodes.following import Follower
+from ugv_acceptance.nodes.session import Session
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +44,10 @@ def what_is_left(margins: Margins, settings: Settings) -> str:
     return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
 
 
-def verdict(
-    settings: Settings,
-    margins: Margins | None,
-    level: int,
-    active: Sequence[Alert],
-    told: tuple[Faults, Follower],
-) -> Status:
+def verdict_of(session: Session) -> Status:
     """Return the one line an operator reads: the most severe cause, what is left, what to do."""
-    faults, follower = told
+    faults, follower, settings = session.faults, session.follower, session.settings
+    margins, active = session.evaluator.margins, session.active
     left = what_is_left(margins, settings) if margins else 'margins not known'
     values: dict[str, object] = {'left': left, 'alerts_active': len(active)}
     if active:
@@ -65,14 +60,14 @@ def verdict(
             'do': what_to_do(first.rule.code),
             'acknowledged': all(map(follower.acknowledged, active)),
         }
-        return Status(level, '', text, values)
+        return Status(session.level, '', text, values)
     if margins is None:
         return Status(STALE, '', 'waiting for joint_states and imu: no margins yet', values)
     if follower.latched:
         last = follower.latched[-1]
         text = f'over now, not acknowledged: {faults.sentence(last, settings)}; {left}'
         values |= {'code': last.rule.code, 'subject': last.rule.subject, 'do': 'acknowledge'}
-        return Status(max(level, WARN), '', text, values)
+        return Status(max(session.level, WARN), '', text, values)
     return Status(OK, '', f'all margins kept: {left}', values)
 
 

@@ -24,7 +24,7 @@ def diagnostics_of(
     """Return all statuses for /diagnostics; the first is the monitor itself."""
     statuses = [_monitor(verdict, config, session)]
     if session is not None:
-        active = [*session.evaluator.watch.active, *session.faults.active]
+        active = session.active
         statuses += margin_statuses(session.settings, session.evaluator.margins, active)
         statuses += [_input(name, session, inputs, active) for name in session.counts]
     return statuses
