@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.candidates import Path, joint_paths, turn_paths
 from ugv_acceptance.evaluation.instructions import joint_words, load_words, turn_words
@@ -105,7 +106,7 @@ def advise(
     case = _case_of(settings, q, gravity, payload)
     if case is None or not case.scores[case.worst] < 1.0:
         return ()
-    found = [*_moves(case), *_turns(case), *_load(case)]
+    found = [*_moves(case), *_load(case)]
     return tuple(sorted(found, key=lambda a: (not a.enough, a.seconds if a.enough else -a.gain)))
 
 
@@ -131,13 +132,31 @@ def _case_of(
     )
 
 
-def _follow(case: _Case, path: Path) -> tuple[int, float, bool] | None:
-    """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
-    found = margins(case.settings.robot, path.q, path.gravity, case.payload)
+def _ends(case: _Case) -> Iterator[tuple[Path, int, float, bool]]:
+    """Yield every path that gains something, and where to stop as `_end` says."""
+    paths = joint_paths(case.settings, case.q, case.gravity, case.torque)
+    # Turning helps against tipping on a slope, but shakes a robot that is past its ERROR limit.
+    paths += turn_paths(case.q, case.gravity) if case.tips and case.scores[case.worst] > 0.0 else ()
+    if not paths:
+        return
+    q, down = (np.vstack([getattr(p, name) for p in paths]) for name in ('q', 'gravity'))
+    found = margins(case.settings.robot, q, down, case.payload)
     scores = scores_of(case.settings, found.torque, found.angle)
+    cuts = np.cumsum([len(path.q) for path in paths])[:-1]
+    parts = np.split(scores, cuts), np.split(found.state, cuts)
+    for path, mine, states in zip(paths, *parts, strict=True):
+        end = _end(case, mine, path.forbidden | (states != case.state))
+        if end is not None:
+            yield path, *end
+
+
+def _end(
+    case: _Case, scores: Floats, forbidden: NDArray[np.bool_]
+) -> tuple[int, float, bool] | None:
+    """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
     floor = np.minimum(case.scores, 1.0)
     floor[case.worst] = case.scores[case.worst]
-    bad = ~(scores >= floor - SLACK).all(axis=-1) | (found.state != case.state) | path.forbidden
+    bad = ~(scores >= floor - SLACK).all(axis=-1) | forbidden
     last = int(np.argmax(bad)) if bad.any() else len(bad)
     mine = scores[:last, case.worst]
     reached = np.flatnonzero(mine >= case.enough)
@@ -161,37 +180,14 @@ def _gain(case: _Case, score: float) -> float:
 
 
 def _moves(case: _Case) -> Iterator[Advice]:
-    for path in joint_paths(case.settings, case.q, case.gravity, case.torque):
-        end = _follow(case, path)
-        if end is None:
-            continue
-        k, score, enough = end
-        gain, seconds = _gain(case, score), float(path.seconds[k])
-        words = joint_words(case.settings.robot, path, k, case.payload)
-        yield Advice(
-            'joint',
-            path.subject,
-            float(path.amount[k]),
-            seconds,
-            case.subject,
-            gain,
-            enough,
-            f'{words}: {_gain_words(case, gain)} in {seconds:.1f} s',
-        )
-
-
-def _turns(case: _Case) -> Iterator[Advice]:
-    """Turning on the spot helps against tipping on a slope."""
-    for path in turn_paths(case.q, case.gravity) if case.tips else ():
-        end = _follow(case, path)
-        if end is None:
-            continue
-        k, score, enough = end
-        gain, seconds = _gain(case, score), float(path.seconds[k])
-        words = turn_words(float(path.amount[k]), path.gravity[k])
+    for path, k, score, enough in _ends(case):
+        gain, seconds, amount = _gain(case, score), float(path.seconds[k]), float(path.amount[k])
+        if path.subject == 'robot':
+            kind, words = 'turn', turn_words(amount, path.gravity[k])
+        else:
+            kind, words = 'joint', joint_words(case.settings.robot, path, k, case.payload)
         sentence = f'{words}: {_gain_words(case, gain)} in {seconds:.1f} s'
-        amount = float(path.amount[k])
-        yield Advice('turn', 'robot', amount, seconds, case.subject, gain, enough, sentence)
+        yield Advice(kind, path.subject, amount, seconds, case.subject, gain, enough, sentence)
 
 
 def _load(case: _Case) -> Iterator[Advice]:

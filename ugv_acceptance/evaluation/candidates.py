@@ -1,7 +1,7 @@
 """Paths that an operator could follow: one joint moved one way, or the robot turned on the spot."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,22 +43,22 @@ def joint_speed(settings: Settings, j: int) -> float:
     return SHARE * least if np.isfinite(least) else CAREFUL
 
 
-def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) -> Iterator[Path]:
-    """Yield a path a joint and direction; none against a load that the motor does not hold."""
+def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) -> list[Path]:
+    """Return a path a joint and direction; none against a load that the motor does not hold."""
     robot = settings.robot
+    found: list[Path] = []
     for j, name in enumerate(robot.joint_names):
         joint, speed = robot.joint(name), joint_speed(settings, j)
         for way in (1.0, -1.0):
             if abs(torque[j]) >= settings.limits.torque[j] and torque[j] * way > 0.0:
                 continue
             amount = _amounts(robot, joint, float(q[j]), way * speed * HORIZON)
-            if not len(amount):
-                continue
             path = np.tile(q, (len(amount), 1))
             path[:, j] += amount
             down = np.broadcast_to(gravity, (len(amount), 3))
-            blocked = _below_ground(robot, q, path)
-            yield Path(name, path, down, amount, np.abs(amount) / speed, blocked)
+            free = np.zeros(len(amount), dtype=bool)
+            found.append(Path(name, path, down, amount, np.abs(amount) / speed, free))
+    return _above_ground(robot, q, [path for path in found if len(path.amount)])
 
 
 def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
@@ -79,13 +79,15 @@ def _moves_contacts(robot: Robot, link: str) -> bool:
     return here or any(_moves_contacts(robot, child) for child in carried)
 
 
-def _below_ground(robot: Robot, q: Floats, path: Floats) -> NDArray[np.bool_]:
-    """Return whether the gripper goes further down than the ground (and than it is now)."""
-    if robot.payload_link is None:
-        return np.zeros(len(path), dtype=bool)
-    height = gripper_point(robot, path)[:, 2]
-    low = min(robot.ground, float(gripper_point(robot, q)[2])) - 1e-6
-    return np.asarray(height < low)
+def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
+    """Return the paths, forbidden where the gripper goes below the ground (and where it is now)."""
+    if robot.payload_link is None or not paths:
+        return paths
+    height = gripper_point(robot, np.vstack((q, *(path.q for path in paths))))[:, 2]
+    below = height[1:] < min(robot.ground, float(height[0])) - 1e-6
+    ends = np.cumsum([len(path.q) for path in paths])[:-1]
+    parts = zip(paths, np.split(below, ends), strict=True)
+    return [replace(path, forbidden=part) for path, part in parts]
 
 
 def turn_paths(q: Floats, gravity: Floats) -> Iterator[Path]:

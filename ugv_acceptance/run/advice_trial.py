@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ugv_acceptance.evaluation.advice import Advice, advise
-from ugv_acceptance.evaluation.candidates import TURN_RATE
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import up_from_orientation
 from ugv_acceptance.model.blocks import Floats
@@ -20,6 +19,9 @@ from ugv_acceptance.simulation.tip_cases import TipCase, random_cases
 # Time (s) after which a motion that has ended has calmed down.
 CALM = 0.8
 STEEPEST = 0.5
+# Skid steering: what is asked for (rad/s), of which the ground leaves a part; how often (s) an
+# operator looks how far the robot has turned, and how often at most.
+YAW_RATE, TICK, LONGEST = 1.5, 0.05, 400
 # A case begins with at least this margin (rad), so that the robot stands until it can be told, and
 # with motors that give what the model says (N m; N): else the arm leans on the ground or the body.
 STANDS, LEANS = math.radians(2.0), 2.0
@@ -96,9 +98,7 @@ def _follow(simulation: Simulation, advice: Advice, payload: Payload) -> Payload
         payload = Payload(0.0, payload.cog)
         simulation.apply(Command(now, payload=payload))
     elif advice.kind == 'turn':
-        simulation.apply(Command(now, drive=(0.0, math.copysign(TURN_RATE, advice.amount))))
-        simulation.advance(round(advice.seconds, 2))
-        simulation.apply(Command(now, drive=(0.0, 0.0)))
+        _turn(simulation, advice.amount)
     else:
         j = simulation.robot.joint_names.index(advice.subject)
         target = float(simulation.joints()[0][j]) + advice.amount
@@ -108,6 +108,19 @@ def _follow(simulation: Simulation, advice: Advice, payload: Payload) -> Payload
         simulation.advance(round(advice.seconds * math.pi / 2.0, 2))
     simulation.advance(CALM)
     return payload
+
+
+def _turn(simulation: Simulation, amount: float) -> None:
+    """Turn on the spot until the robot faces another way by `amount` (rad), as an operator does."""
+    wanted = math.copysign(YAW_RATE, amount)
+    simulation.apply(Command(simulation.time, drive=(0.0, wanted)))
+    turned = 0.0
+    for _ in range(LONGEST):
+        simulation.advance(TICK)
+        turned += float(simulation.imu()[1][2]) * TICK
+        if turned * wanted >= amount * wanted:
+            break
+    simulation.apply(Command(simulation.time, drive=(0.0, 0.0)))
 
 
 def _state(simulation: Simulation) -> tuple[Floats, Floats, Floats]:
