@@ -33,7 +33,7 @@ def paper(
     \b
     Examples:
       ugv-acceptance paper
-      ugv-acceptance paper --out /tmp/paper --truth 500
+      ugv-acceptance paper --out pages/paper --truth 500
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     import json
 
