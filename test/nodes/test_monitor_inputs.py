@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 from nodes.live_case import ERROR, FOLDED, OK, STALE, Live, imu, joints, levels, session_of
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
 
 from ugv_acceptance.bag.encode import joint_state_cdr
 
@@ -190,3 +192,41 @@ def test_stamps_of_another_clock_are_a_clock_fault(live: Live) -> None:
 
     live.until(lambda: any('CLOCK' in a.name for a in driver.alerts), send)
     live.until(lambda: session_of(monitor).evaluator.margins is not None, send)
+
+
+def test_a_frozen_clock_disturbs_no_staleness(live: Live) -> None:
+    """With /clock frozen, running stamps raise CLOCK, and silence is STALE as ever."""
+    monitor = live.monitor(use_sim_time=True)
+    driver = live.driver()
+    clock = driver.create_publisher(Clock, '/clock', 10)
+    frozen = Clock()
+    frozen.clock.sec = 1000
+    began = time.monotonic_ns()
+
+    def send() -> None:
+        clock.publish(frozen)
+        now = 1000 * 1_000_000_000 + time.monotonic_ns() - began
+        driver.joints.publish(joints(stamp=now))
+        driver.imu.publish(imu(stamp=now))
+
+    live.until(lambda: session_of(monitor).evaluator.margins is not None, send)
+    live.until(lambda: any('CLOCK' in a.name for a in driver.alerts), send)
+    live.until(lambda: session_of(monitor).level == STALE, lambda: clock.publish(frozen))
+
+
+def test_a_quality_of_service_that_does_not_match_is_named(
+    live: Live, repository: Path, tmp_path: Path
+) -> None:
+    """A best-effort driver and a configuration that wants reliable: an ERROR that says so."""
+    text = (repository / 'msg_configs' / 'packbot.yaml').read_text(encoding='utf-8')
+    text = text.replace('../urdf', str(repository / 'urdf'))
+    config = tmp_path / 'reliable.yaml'
+    config.write_text(text.replace('reliability: best_effort', 'reliability: reliable'))
+    live.monitor(config=str(config))
+    driver = live.driver()
+    quick = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    quiet = driver.create_publisher(Imu, 'imu/data', quick)
+    live.until(
+        lambda: any('INPUT_QOS imu' in a.name for a in driver.alerts), lambda: quiet.publish(imu())
+    )
+    assert 'RELIABILITY' in next(a.message for a in driver.alerts if 'INPUT_QOS' in a.name)
