@@ -1,4 +1,4 @@
-"""A real Chromium, driven through its DevTools protocol: no driver program and no library needed."""
+"""A real Chromium, driven through its DevTools protocol: no driver program, no library."""
 
 import base64
 import json
@@ -148,23 +148,24 @@ class Page:
         return base64.b64decode(self.call('Page.captureScreenshot', format='png')['data'])
 
 
-@dataclass
+@dataclass(frozen=True)
 class Browser:
-    """A running Chromium; its pages are closed with it."""
+    """A running Chromium."""
 
     port: int
-    pages: list[Page] = field(default_factory=list)
 
-    def page(self) -> Page:
-        """Return a new tab."""
-        request = urllib.request.Request(  # noqa: S310 - the browser this test started
+    @contextmanager
+    def page(self) -> Iterator[Page]:
+        """Open a tab; it is closed at the end."""
+        request = urllib.request.Request(
             f'http://127.0.0.1:{self.port}/json/new?about:blank', method='PUT'
         )
-        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:  # noqa: S310 - as above
+        with urllib.request.urlopen(request, timeout=PATIENCE) as answer:  # noqa: S310 - our own
             address = json.load(answer)['webSocketDebuggerUrl']
-        page = Page(connect(address, max_size=None, compression=None))
-        self.pages.append(page)
-        return page
+        with connect(address, max_size=None, compression=None) as socket:
+            page = Page(socket)
+            yield page
+            page.call('Page.close')
 
 
 @contextmanager
@@ -179,10 +180,7 @@ def chromium() -> Iterator[Browser]:
             stderr=subprocess.DEVNULL,
         )
         try:
-            browser = Browser(_port(Path(profile, 'DevToolsActivePort'), process))
-            yield browser
-            for page in browser.pages:
-                page.socket.close()
+            yield Browser(_port(Path(profile, 'DevToolsActivePort'), process))
         finally:
             process.terminate()
             process.wait()

@@ -1,4 +1,4 @@
-"""A Chromium and consoles for the tests of the page; what is missing fails in CI, else is skipped."""
+"""A Chromium and consoles for the tests of the page; what is missing fails in CI."""
 
 import os
 import shutil
@@ -36,11 +36,8 @@ def chrome() -> Iterator[Browser]:
 @pytest.fixture
 def page(chrome: Browser) -> Iterator[Page]:
     """Return a new tab that is closed afterwards."""
-    tab = chrome.page()
-    yield tab
-    chrome.pages.remove(tab)
-    tab.call('Page.close')
-    tab.socket.close()
+    with chrome.page() as tab:
+        yield tab
 
 
 @pytest.fixture(scope='module')

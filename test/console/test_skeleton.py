@@ -51,7 +51,7 @@ def test_points_are_those_of_the_robot(a: float, b: float, c: float, d: float) -
 
 @given(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
 def test_the_plumb_line_meets_the_ground_below_the_centre(x: float, y: float) -> None:
-    """The plumb point lies in the plane of the polygon, along gravity from the centre of gravity."""
+    """The plumb point is in the plane of the polygon, along gravity from the centre."""
     gravity = (9.81 * math.sin(x), 9.81 * math.sin(y), -8.0)
     found = drawn((0.3, 0.5, 0.2, 2.0), gravity)
     assert found.plumb is not None

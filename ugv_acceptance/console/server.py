@@ -14,7 +14,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from ugv_acceptance import BadConfig, BadSample
-from ugv_acceptance.console.hub import Hub
+from ugv_acceptance.console.hub import Client, Hub
 from ugv_acceptance.console.security import App, Guard, check_address, guarded
 
 STATIC = Path(__file__).parent / 'static'
@@ -55,24 +55,24 @@ async def _converse(hub: Hub, websocket: WebSocket) -> None:
         await websocket.close(1013, str(error))
         return
     sending = asyncio.create_task(hub.serve(client, websocket.send_text))
+    listening = asyncio.create_task(_listen(hub, client, websocket))
     try:
-        while True:
-            asked = asyncio.create_task(websocket.receive_text())
-            done, _ = await asyncio.wait({asked, sending}, return_when=asyncio.FIRST_COMPLETED)
-            if sending in done:
-                asked.cancel()
-                break
-            hub.ask(client, asked.result())
-    except (WebSocketDisconnect, KeyError):
-        # A KeyError: the client sent bytes where text is expected.
-        pass
+        # Whoever is done first: the client went, sent what is no command, or takes nothing.
+        await asyncio.wait({listening, sending}, return_when=asyncio.FIRST_COMPLETED)
     finally:
         hub.clients.discard(client)
-        sending.cancel()
-        with contextlib.suppress(BaseException):
-            await sending
+        for task in (listening, sending):
+            task.cancel()
+        await asyncio.gather(listening, sending, return_exceptions=True)
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
-            await websocket.close()
+            await websocket.close(1008)
+
+
+async def _listen(hub: Hub, client: Client, websocket: WebSocket) -> None:
+    """Do what a client asks until it goes, or sends what is no text."""
+    while isinstance(text := (await websocket.receive()).get('text'), str):
+        hub.ask(client, text)
+
 
 
 def serve(

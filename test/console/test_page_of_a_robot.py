@@ -1,0 +1,150 @@
+"""The page in a real browser, with a live robot: driver, monitor and console are processes."""
+
+import re
+import signal
+
+import pytest
+from browser import Page
+from servers import Live
+
+FOLDED = (0.0, 2.0, -2.5, 2.0)
+STRETCHED = (0.0, 0.3, 0.2, 2.0)
+LEVEL = 'document.body.dataset.level'
+
+
+@pytest.fixture
+def shown(page: Page, robot: Live) -> Page:
+    """Return a page that shows a robot that stands well."""
+    robot.pose(*FOLDED)
+    page.open(robot.url)
+    calm(page, robot)
+    return page
+
+
+def calm(page: Page, robot: Live) -> None:
+    """Bring the robot back and acknowledge what was."""
+    robot.pose(*FOLDED)
+    page.wait('!!window.console_page?.hello')
+    page.wait(f'{LEVEL} !== "STALE" && {LEVEL} !== "ERROR"')
+    page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
+    page.wait(f'{LEVEL} === "OK" && console_page.frame.alerts.length === 0')
+
+
+def states(page: Page) -> list[str]:
+    """Return the states of the alerts in the list."""
+    found: list[str] = page.run(
+        '[...document.querySelectorAll("#alerts li")].map(x => x.dataset.state)'
+    )
+    return found
+
+
+def test_live_numbers_move(shown: Page, robot: Live) -> None:
+    """The page follows the robot's joints."""
+    before = shown.text('#torques')
+    robot.pose(0.0, 1.6, -2.0, 2.0)
+    shown.wait(f'document.getElementById("torques").textContent !== {before!r}')
+    shown.wait('Math.abs(console_page.frame.q[1] - 1.6) < 1e-6')
+
+
+def test_an_alert_appears_sounds_and_is_acknowledged(shown: Page, robot: Live) -> None:
+    """Danger is shown and sounded until a person acknowledges; then the monitor says so."""
+    assert 'OFF' in shown.text('#arm')
+    shown.click('#arm')
+    shown.wait('document.body.dataset.sound === "armed"')
+    robot.pose(*STRETCHED)
+    shown.wait(f'{LEVEL} === "ERROR" && document.body.dataset.sound === "sounding"')
+    shown.wait('document.querySelectorAll("#alerts li.ERROR").length === 2')
+    assert set(states(shown)) == {'active, not acknowledged'}
+    assert shown.run('verdict.classList.contains("flash")')
+    shown.run('operator.value = "Ada"')
+    shown.click('#acknowledge-all')
+    shown.wait(
+        '[...document.querySelectorAll("#alerts li")].every(x => x.dataset.state === "active, acknowledged")'
+    )
+    shown.wait('document.body.dataset.sound === "armed"')
+    assert shown.run(LEVEL) == 'ERROR'
+    assert not shown.run('verdict.classList.contains("flash")')
+    assert 'Ada' in shown.text('#alerts li small')
+
+
+def test_the_sound_button_is_red_until_pressed(shown: Page) -> None:
+    """Sound is off when the page opens: the button says so in words and in red."""
+    assert shown.run('document.body.dataset.sound') == 'off'
+    red, green, blue = map(int, re.findall(r'\d+', shown.run('getComputedStyle(arm).color'))[:3])
+    assert red > 2 * max(green, blue)
+
+
+def test_what_is_over_stays_until_it_is_seen(shown: Page, robot: Live) -> None:
+    """A danger that has gone by stays on the page until it is acknowledged."""
+    robot.pose(*STRETCHED)
+    shown.wait(f'{LEVEL} === "ERROR"')
+    robot.pose(*FOLDED)
+    shown.wait(f'{LEVEL} === "WARN"')
+    assert shown.text('#cause').startswith('over now, not acknowledged')
+    shown.wait('!document.getElementById("acknowledge-all").disabled')
+    shown.click('#acknowledge-all')
+    shown.wait(f'{LEVEL} === "OK"')
+
+
+def test_a_silent_input_is_no_data(shown: Page, robot: Live) -> None:
+    """Without IMU the page shows NO DATA and which input is silent."""
+    robot.say('silent')
+    shown.wait(f'{LEVEL} === "STALE"')
+    shown.wait('[...document.querySelectorAll("#inputs td.STALE")].length === 1')
+    assert 'imu' in shown.text('#cause')
+    robot.say('speak')
+    shown.wait(f'{LEVEL} !== "STALE"')
+
+
+def test_a_stopped_monitor_is_no_data(shown: Page, robot: Live) -> None:
+    """A monitor that stands still is seen although the inputs go on."""
+    shown.run('new Promise(done => setTimeout(done, 2500))')
+    robot.monitor.send_signal(signal.SIGSTOP)
+    try:
+        shown.wait(f'{LEVEL} === "STALE"')
+        assert 'monitor' in shown.text('#cause')
+        assert shown.text('#word') == 'NO DATA'
+    finally:
+        robot.monitor.send_signal(signal.SIGCONT)
+    shown.wait(f'{LEVEL} !== "STALE"')
+
+
+def test_a_frozen_server_is_no_data(shown: Page, robot: Live) -> None:
+    """A console that stands still closes nothing: the page's own watchdog sees it."""
+    robot.console.send_signal(signal.SIGSTOP)
+    try:
+        shown.wait(f'{LEVEL} === "STALE"')
+        assert 'console server' in shown.text('#cause')
+    finally:
+        robot.console.send_signal(signal.SIGCONT)
+    shown.wait(f'{LEVEL} !== "STALE"')
+
+
+def test_no_data_cannot_be_mistaken_for_ok(shown: Page, robot: Live) -> None:
+    """NO DATA is hatched, in another shape, and covers the numbers that may be old."""
+    look = '[getComputedStyle(verdict).backgroundImage, document.getElementById("sign-shape").getAttribute("d")]'
+    fine = shown.run(look)
+    robot.console.send_signal(signal.SIGSTOP)
+    try:
+        shown.wait(f'{LEVEL} === "STALE"')
+        lost = shown.run(look)
+        cover = 'getComputedStyle(document.querySelector(".live"), "::after").content'
+        assert shown.run(cover) == '"NO DATA"'
+    finally:
+        robot.console.send_signal(signal.SIGCONT)
+    assert fine[0] == 'none'
+    assert 'repeating-linear-gradient' in lost[0]
+    assert fine[1] != lost[1]
+
+
+def test_a_declared_payload_reaches_the_monitor(shown: Page, robot: Live) -> None:
+    """A payload typed into the page is published: the posture that was too much holds 0.1 kg."""
+    robot.pose(*STRETCHED)
+    shown.wait(f'{LEVEL} === "ERROR"')
+    shown.run('document.getElementById("load-mass").value = "0.1"')
+    shown.click('#load-form button')
+    shown.wait('document.getElementById("load").textContent.startsWith("0.10 kg")')
+    shown.wait(f'{LEVEL} !== "ERROR" && {LEVEL} !== "STALE"')
+    shown.run('document.getElementById("load-mass").value = "4"')
+    shown.click('#load-form button')
+    shown.wait('document.getElementById("load").textContent.startsWith("4.00 kg")')
