@@ -16,8 +16,12 @@ PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 VERBS = (
     'demo',
     'evaluate',
+    'verify',
     'monitor',
+    'console',
     'replay',
+    'plan',
+    'run',
     'simulate',
     'model',
     'map',
