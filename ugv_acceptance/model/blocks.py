@@ -10,7 +10,7 @@ from ugv_acceptance.model.expressions import Number
 
 Floats = NDArray[np.float64]
 # Samples a block: more of them fall out of the cache, fewer pay more for each Python call.
-BLOCK = 32768
+BLOCK = 65536
 
 
 def in_blocks(

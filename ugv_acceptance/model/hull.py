@@ -160,14 +160,19 @@ def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64
     turn = _turns(points, place)
     left = {pair: np.asarray(t) >= 0.0 for pair, t in turn.items()}
     right = {pair: np.asarray(t) <= 0.0 for pair, t in turn.items()}
+    # A level triple with a point below it is on the upper side of the hull.
+    level = np.max(reduce(np.minimum, [z for _, _, z in points], np.inf))
     for number, (i, j, k) in enumerate(triples(len(points))):
+        z = [points[n][2] for n in (i, j, k)]
+        if all(isinstance(x, float) and x == z[0] for x in z) and z[0] > level:
+            continue
         inside = left[j, k] & right[i, k] & left[i, j]
         inside = inside | (right[j, k] & left[i, k] & right[i, j])
         rows = np.flatnonzero(np.broadcast_to(inside, count))
         if not rows.size:
             continue
-        turns, heights = (turn[j, k], turn[i, k], turn[i, j]), [points[n][2] for n in (i, j, k)]
-        (a, b, c), (p, q, r) = pick((turns, tuple(heights)), rows)
+        turns = (turn[j, k], turn[i, k], turn[i, j])
+        (a, b, c), (p, q, r) = pick((turns, tuple(z)), rows)
         area = a - b + c
         with np.errstate(divide='ignore', invalid='ignore'):
             height = np.broadcast_to((a * p - b * q + c * r) / np.asarray(area), rows.shape)
