@@ -1,0 +1,185 @@
+"""Reliability held to published values, to scipy and to brute force."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from ugv_acceptance.model.reliability import (
+    availability,
+    demonstrated_mtbf,
+    hours_still_to_run,
+    hours_to_demonstrate,
+    mtbf,
+    proportion,
+    trend,
+)
+from ugv_acceptance.model.two_groups import (
+    compare_mtbf,
+    compare_success,
+    mtbf_power,
+    success_power,
+)
+
+# A development test of 620 h that ended with its last failure, worked in the textbook of the
+# Crow-AMSAA model (ReliaSoft, Reliability Growth Reference): beta 0.6142, lambda 0.4239.
+TEXTBOOK = [2.7, 10.3, 12.5, 30.6, 57.0, 61.3, 80.0, 109.5, 125.0, 128.6, 143.8]
+TEXTBOOK += [167.9, 229.2, 296.7, 320.6, 328.2, 366.2, 396.7, 421.1, 438.2, 501.2, 620.0]
+
+counts = st.integers(0, 60)
+levels = st.floats(0.5, 0.99)
+
+
+@pytest.mark.parametrize(('confidence', 'hours'), [(0.8, 154.5), (0.9, 221.0)])
+def test_hours_without_failure_that_demonstrate_96_hours(confidence: float, hours: float) -> None:
+    """An MTBF of 96 h needs 154.5 h without failure at 80 %, 221.0 h at 90 %."""
+    assert hours_to_demonstrate(96.0, 0, confidence) == pytest.approx(hours, abs=0.06)
+
+
+def test_a_six_hour_endurance_run_proves_little() -> None:
+    """Six hours without failure demonstrate 3.73 h at 80 %."""
+    assert demonstrated_mtbf(6.0, 0, 0.8) == pytest.approx(3.73, abs=0.005)
+
+
+def test_hours_still_to_run_end_at_zero() -> None:
+    """What was run is taken off; what is demonstrated needs no more."""
+    assert hours_still_to_run(96.0, 100.0, 0, 0.8) == pytest.approx(54.5, abs=0.06)
+    assert hours_still_to_run(96.0, 300.0, 0, 0.8) == 0.0
+
+
+@given(hours=st.floats(0.1, 1e5), failures=counts, confidence=levels)
+def test_the_demonstrated_mtbf_needs_exactly_the_hours_run(
+    hours: float, failures: int, confidence: float
+) -> None:
+    """Hours needed and MTBF demonstrated are each other's inverse."""
+    shown = demonstrated_mtbf(hours, failures, confidence)
+    assert hours_to_demonstrate(shown, failures, confidence) == pytest.approx(hours)
+
+
+@given(failures=st.integers(1, 60), confidence=levels)
+def test_time_terminated_bounds_are_those_of_the_poisson_count(
+    failures: int, confidence: float
+) -> None:
+    """At the bounds, so many failures or more (fewer) have half the doubt: exact by definition."""
+    found = mtbf(100.0, failures, confidence)
+    tail = (1.0 - confidence) / 2.0
+    assert stats.poisson.cdf(failures, 100.0 / found.low) == pytest.approx(tail)
+    assert stats.poisson.sf(failures - 1, 100.0 / found.high) == pytest.approx(tail)
+
+
+@given(failures=st.integers(1, 60), confidence=levels)
+def test_failure_terminated_bounds_are_those_of_the_gamma_time(
+    failures: int, confidence: float
+) -> None:
+    """The time of the n-th failure is gamma distributed; the bounds are its two tails."""
+    found = mtbf(100.0, failures, confidence, failure_terminated=True)
+    tail = (1.0 - confidence) / 2.0
+    assert stats.gamma.sf(100.0, failures, scale=found.low) == pytest.approx(tail)
+    assert stats.gamma.cdf(100.0, failures, scale=found.high) == pytest.approx(tail)
+
+
+def test_without_failure_nothing_bounds_the_mtbf_from_above() -> None:
+    """No failure: no point value, an infinite upper bound."""
+    found = mtbf(10.0, 0, 0.8)
+    assert (found.value, found.high) == (None, math.inf)
+
+
+@settings(max_examples=40)
+@given(trials=st.integers(1, 80), data=st.data(), confidence=levels)
+def test_proportions_have_the_bounds_of_scipy(
+    trials: int, data: st.DataObject, confidence: float
+) -> None:
+    """Clopper-Pearson, two-sided and one-sided, as scipy computes it."""
+    good = data.draw(st.integers(0, trials))
+    found = proportion(good, trials, confidence)
+    two = stats.binomtest(good, trials).proportion_ci(confidence)
+    one = stats.binomtest(good, trials, alternative='greater').proportion_ci(confidence)
+    assert (found.low, found.high) == pytest.approx((two.low, two.high), abs=1e-9)
+    assert found.demonstrated == pytest.approx(one.low, abs=1e-9)
+
+
+def test_availability_bounds_cover_as_often_as_they_say() -> None:
+    """Of 4000 simulated campaigns, 90 % hold the true availability within their bounds."""
+    rng, held, trials = np.random.default_rng(1), 0, 4000
+    truth = 50.0 / (50.0 + 5.0)
+    for up, down in zip(
+        rng.gamma(6, 50.0, trials).tolist(), rng.gamma(6, 5.0, trials).tolist(), strict=True
+    ):
+        found = availability(up, 6, down, 0.9)
+        held += found.low <= truth <= found.high
+    assert held / trials == pytest.approx(0.9, abs=0.02)
+
+
+def test_the_textbook_growth_test() -> None:
+    """Slope, scale and MTBF at the end are those published for the 620 h development test."""
+    found = trend(TEXTBOOK, 620.0, 0.9, failure_terminated=True)
+    assert found is not None
+    assert (found.beta, found.scale) == pytest.approx((0.6142, 0.4239), abs=5e-5)
+    assert found.mtbf_now == pytest.approx(620.0 / (22 * 0.61421), rel=1e-4)
+    assert found.high < 1.0
+
+
+def test_a_constant_rate_is_called_a_trend_as_rarely_as_said() -> None:
+    """Evenly spread failures: both tests give p < 0.1 in a tenth of campaigns, bounds cover 1."""
+    rng, trials = np.random.default_rng(2), 2000
+    found = [trend(rng.uniform(0.0, 500.0, 12).tolist(), 500.0, 0.9) for _ in range(trials)]
+    known = [t for t in found if t is not None]
+    assert np.mean([t.p_growth < 0.1 for t in known]) == pytest.approx(0.1, abs=0.025)
+    assert np.mean([t.laplace_p < 0.1 for t in known]) == pytest.approx(0.1, abs=0.025)
+    assert np.mean([t.low <= 1.0 <= t.high for t in known]) == pytest.approx(0.9, abs=0.025)
+
+
+def test_laplace_by_hand() -> None:
+    """Failures at 10, 20, 60 of 100 h: mean 30, so U = (0.3 - 0.5) sqrt(36) = -1.2."""
+    found = trend([60.0, 10.0, 20.0], 100.0, 0.9)
+    assert found is not None
+    assert found.laplace == pytest.approx(-1.2)
+    assert found.laplace_p == pytest.approx(2.0 * stats.norm.cdf(-1.2))
+
+
+def test_two_failures_are_no_trend() -> None:
+    """Fewer than three failures give no trend."""
+    assert trend([1.0, 2.0], 10.0, 0.9) is None
+
+
+@settings(max_examples=40)
+@given(n1=counts, n2=counts, hours=st.floats(1.0, 1e3))
+def test_the_bounds_of_the_ratio_agree_with_the_test(n1: int, n2: int, hours: float) -> None:
+    """Exchanging the two inverts ratio and bounds, and leaves p."""
+    one = compare_mtbf((hours, n1), (50.0, n2), 0.9)
+    other = compare_mtbf((50.0, n2), (hours, n1), 0.9)
+    assert one.p == pytest.approx(other.p)
+    assert one.low == pytest.approx(1.0 / other.high if other.high else math.inf)
+
+
+def test_the_power_of_the_rate_test_is_how_often_it_rejects() -> None:
+    """3000 simulated pairs of campaigns reject as often as the power says."""
+    rng, alpha, trials = np.random.default_rng(3), 0.2, 3000
+    pairs = zip(rng.poisson(12.0, trials).tolist(), rng.poisson(6.0, trials).tolist(), strict=True)
+    rejected = [compare_p(a, b) < alpha for a, b in pairs]
+    assert mtbf_power(0.12, 100.0, 100.0, 2.0, alpha) == pytest.approx(np.mean(rejected), abs=0.03)
+
+
+def compare_p(first: int, second: int) -> float:
+    """Return p of two groups of the same hours."""
+    return float(stats.binomtest(first, first + second, 0.5).pvalue) if first + second else 1.0
+
+
+def test_the_power_of_fishers_test_is_how_often_it_rejects() -> None:
+    """The sum over all tables of small groups is the power."""
+    alpha, runs1, runs2, share1, share2 = 0.2, 9, 7, 0.5, 0.9
+    power = sum(
+        float(stats.binom.pmf(a, runs1, share1) * stats.binom.pmf(b, runs2, share2))
+        for a in range(runs1 + 1)
+        for b in range(runs2 + 1)
+        if stats.fisher_exact([[a, runs1 - a], [b, runs2 - b]]).pvalue < alpha
+    )
+    assert success_power(share1, share2, runs1, runs2, alpha) == pytest.approx(power)
+
+
+def test_success_of_two_groups_is_fishers_exact_test() -> None:
+    """The lady tasting tea: 3 of 4 against 1 of 4 gives p = 0.486, as Fisher published."""
+    assert compare_success((3, 4), (1, 4), 0.9).p == pytest.approx(0.486, abs=5e-4)
