@@ -3,15 +3,12 @@
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-from browser import Browser, Page, chromium, program
-from servers import Live, console, live_console
+from console.browser import Browser, Page, chromium, program
+from console.servers import Live, console, live_console
 
 HERE = Path(__file__).parent
 

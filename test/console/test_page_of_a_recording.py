@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-from browser import Page
-from servers import console
+from console.browser import Page
+from console.servers import console
 
 DANGER = 26.0
 HOSTILE = '<img src=x onerror=window.hacked=1>'
@@ -137,7 +137,8 @@ def test_it_fits_every_screen(shown: Page, width: int) -> None:
     seek(shown, DANGER)
     assert shown.run('document.documentElement.scrollWidth') <= width
     box = shown.run(
-        '(() => { const b = word.getBoundingClientRect(); return [b.x, b.y, b.right, b.bottom]; })()'
+        '(() => { const b = word.getBoundingClientRect();'
+        ' return [b.x, b.y, b.right, b.bottom]; })()'
     )
     assert box[0] >= 0
     assert box[1] >= 0

@@ -4,8 +4,8 @@ import re
 import signal
 
 import pytest
-from browser import Page
-from servers import Live
+from console.browser import Page
+from console.servers import Live
 
 FOLDED = (0.0, 2.0, -2.5, 2.0)
 STRETCHED = (0.0, 0.3, 0.2, 2.0)
@@ -59,7 +59,8 @@ def test_an_alert_appears_sounds_and_is_acknowledged(shown: Page, robot: Live) -
     shown.run('operator.value = "Ada"')
     shown.click('#acknowledge-all')
     shown.wait(
-        '[...document.querySelectorAll("#alerts li")].every(x => x.dataset.state === "active, acknowledged")'
+        '[...document.querySelectorAll("#alerts li")]'
+        '.every(x => x.dataset.state === "active, acknowledged")'
     )
     shown.wait('document.body.dataset.sound === "armed"')
     assert shown.run(LEVEL) == 'ERROR'
@@ -122,7 +123,10 @@ def test_a_frozen_server_is_no_data(shown: Page, robot: Live) -> None:
 
 def test_no_data_cannot_be_mistaken_for_ok(shown: Page, robot: Live) -> None:
     """NO DATA is hatched, in another shape, and covers the numbers that may be old."""
-    look = '[getComputedStyle(verdict).backgroundImage, document.getElementById("sign-shape").getAttribute("d")]'
+    look = (
+        '[getComputedStyle(verdict).backgroundImage,'
+        ' document.getElementById("sign-shape").getAttribute("d")]'
+    )
     fine = shown.run(look)
     robot.console.send_signal(signal.SIGSTOP)
     try:

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -55,9 +56,9 @@ def test_frames_are_those_of_the_live_evaluator(fail: Recording) -> None:
     assert compared > 500
 
 
-def messages(recording: Recording) -> list[tuple[int, str, tuple[object, ...]]]:
+def messages(recording: Recording) -> list[tuple[int, str, tuple[Any, ...]]]:
     """Return a recording's messages one by one, in order of receipt."""
-    found: list[tuple[int, str, tuple[object, ...]]] = []
+    found: list[tuple[int, str, tuple[Any, ...]]] = []
     for batch in recording.bag.batches(recording.topics):
         for p in batch.payload:
             for k, when in enumerate(p.log_time.tolist()):

@@ -47,8 +47,8 @@ def class_of(x: float, y: float, axes: tuple[str, str]) -> int:
 def test_a_cell_is_the_verdict_on_its_posture(axes: tuple[str, str], i: int, j: int) -> None:
     """A cell says what the margins of that posture say: turret and flippers too."""
     found = safe_map(NOW, SETTINGS, axes)
-    x = np.linspace(*found['x_range'], CELLS)[i]
-    y = np.linspace(*found['y_range'], CELLS)[j]
+    (x0, x1), (y0, y1) = found['x_range'], found['y_range']
+    x, y = np.linspace(x0, x1, CELLS)[i], np.linspace(y0, y1, CELLS)[j]
     assert int(found['cells'][i * CELLS + j]) == class_of(x, y, axes)
 
 
