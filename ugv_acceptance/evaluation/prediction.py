@@ -51,7 +51,7 @@ def time_to(limit: ArrayLike, now: ArrayLike, then: ArrayLike, seconds: float) -
     NaN where it is not known.
     """
     bound, start, end = (np.asarray(x, dtype=np.float64) for x in (limit, now, then))
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         left = (bound - start) * seconds / (end - start)
     left = np.where(start >= bound, 0.0, np.where(end <= start, np.inf, left))
     result: Floats = np.where(np.isnan(start) | np.isnan(end) | np.isnan(bound), np.nan, left)

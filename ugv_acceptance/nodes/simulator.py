@@ -66,7 +66,9 @@ class Simulator(Node):
         self._tick = 1.0 / rates[1]
         self._count = 0
         stowed = dict(STOWED)
-        home = list(self._value('home') or ()) or [stowed.get(n, 0.0) for n in robot.joint_names]
+        names = robot.joint_names
+        unset = Parameter('home', value=[stowed.get(n, 0.0) for n in names])
+        home = list(self.get_parameter_or('home', unset).value)
         if len(home) != len(robot.joint_names):
             raise BadConfig(f'home: expected {len(robot.joint_names)} positions, got {len(home)}')
         start = tuple(zip(robot.joint_names, home, strict=True))
