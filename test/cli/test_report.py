@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+import shutil
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
@@ -265,6 +266,19 @@ def test_a_result_that_was_changed_is_not_verified(
     done = run(VERIFY, changed)
     assert done.exit_code == 1
     assert where in done.output
+
+
+def test_a_result_is_verified_from_what_lies_beside_it(papers: Path, tmp_path: Path) -> None:
+    """Recording, robot and result on one stick: places of another machine do not matter."""
+    told = result_of(papers, 'packbot_pass')
+    for path in (*told['bag']['path'], told['robot']['config'], told['robot']['urdf']):
+        shutil.copy(path, tmp_path)
+    told['bag']['path'] = ['/nowhere/' + Path(path).name for path in told['bag']['path']]
+    for key in ('config', 'urdf'):
+        told['robot'][key] = '/nowhere/' + Path(told['robot'][key]).name
+    (tmp_path / 'result.json').write_text(json.dumps(told), 'utf-8')
+    done = run(VERIFY, tmp_path / 'result.json')
+    assert done.exit_code == 0, done.output
 
 
 def test_another_recording_has_another_hash(papers: Path) -> None:

@@ -49,11 +49,21 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    if result['criteria']['path'] is not None:
+        _print_criteria(result['criteria']['results'], console)
     console.print(_margins(result))
     _print_data(result, console)
     _print_alerts(result, console)
     if 'effort' in result:
         _print_effort(result, console)
+
+
+def _print_criteria(outcomes: list[dict[str, Any]], console: Console) -> None:
+    for outcome in outcomes:
+        word = outcome['verdict']
+        mark = f'[{COLOURS[word]}]{escape(MARKS[word]):5}[/]'
+        text = f'{outcome["name"]}: {outcome["demand"]}'
+        console.print(f'  {mark} {escape(text)}', soft_wrap=True)
 
 
 def _margins(result: dict[str, Any]) -> Table:

@@ -37,7 +37,7 @@ def verify(
       ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     told = read_result(result_file)
-    found = again(told, bag, config, urdf, criteria)
+    found = again(told, result_file.parent, bag, config, urdf, criteria)
     differences = compare(told, found)
     for line in differences[:MOST_SHOWN]:
         typer.echo(f'  {line}')
@@ -75,26 +75,34 @@ def read_result(path: Path) -> Json:
     return told
 
 
+def _near(path: str, folder: Path) -> Path:
+    """Return a file where it was, or beside the result: on a USB stick all lie together."""
+    moved = folder / Path(path).name
+    return moved if moved.exists() and not Path(path).exists() else Path(path)
+
+
 def again(
     told: Json,
+    folder: Path,
     bag: list[Path] | None,
     config: Path | None,
     urdf: Path | None,
     criteria: Path | None,
 ) -> Json:
-    """Return the result computed again, from the places it names unless others are given."""
+    """Return the result computed again, from the places it names, beside it, or as given."""
     import json
 
     from ugv_acceptance.cli.evidence import Papers, judge_files
     from ugv_acceptance.config import load
 
     try:
-        paths = bag or [Path(path) for path in told['bag']['path']]
+        paths = bag or [_near(path, folder) for path in told['bag']['path']]
         robot, named = told['robot'], told['criteria']['path']
-        loaded = load(config or Path(robot['config']), urdf=urdf or Path(robot['urdf']))
+        at, model = config or _near(robot['config'], folder), urdf or _near(robot['urdf'], folder)
     except (KeyError, TypeError) as error:
         raise AcceptanceError(f'expected a result of evaluate; there is no {error}') from None
-    papers = Papers(criteria=criteria or (None if named is None else Path(named)))
+    loaded = load(at, urdf=model)
+    papers = Papers(criteria=criteria or (None if named is None else _near(named, folder)))
     result, _ = judge_files(paths, loaded, papers, compare_effort='effort' in told)
     found: Json = json.loads(json.dumps(result, default=str))
     return found
