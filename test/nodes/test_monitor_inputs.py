@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 from nodes.live_case import ERROR, FOLDED, OK, STALE, Live, imu, joints, levels, session_of
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
 from ugv_acceptance.bag.encode import joint_state_cdr
+from ugv_acceptance.bag.raw import Offered
+from ugv_acceptance.nodes.player import qos_of
 
 
 def test_a_monitor_with_both_inputs_says_ok(live: Live) -> None:
@@ -224,7 +225,7 @@ def test_a_quality_of_service_that_does_not_match_is_named(
     config.write_text(text.replace('reliability: best_effort', 'reliability: reliable'))
     live.monitor(config=str(config))
     driver = live.driver()
-    quick = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    quick = qos_of(Offered('best_effort'))
     quiet = driver.create_publisher(Imu, 'imu/data', quick)
     live.until(
         lambda: any('INPUT_QOS imu' in a.name for a in driver.alerts), lambda: quiet.publish(imu())

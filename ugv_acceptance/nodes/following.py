@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from ugv_acceptance.evaluation.alarms import Alarm, Alarms, Change, State, key_of
 from ugv_acceptance.evaluation.alerts import ERROR, Alert
 from ugv_acceptance.evaluation.watch import FAILURES
 
@@ -13,15 +14,13 @@ KEPT = 1000
 class Follower:
     """Reads a log that grows at its end and whose alerts are closed in place; keeps it short.
 
-    `open` are the alerts seen and not closed yet. `latched` are failures of the robot that were
-    cleared before anybody acknowledged them.
+    `open` are the alerts seen and not closed yet, `alarms` what people have seen of them.
     """
 
     log: list[Alert]
     open: list[Alert] = field(default_factory=list)
-    latched: list[Alert] = field(default_factory=list)
+    alarms: Alarms = field(default_factory=Alarms)
     _seen: int = 0
-    _acknowledged: set[int] = field(default_factory=set)
 
     def changed(self) -> bool:
         """Return whether any alert was raised or cleared since `take`."""
@@ -29,36 +28,38 @@ class Follower:
             return True
         return any(alert.end is not None for alert in self.open)
 
-    def take(self) -> list[tuple[Alert, str]]:
-        """Return what changed: alerts with raised or cleared, in that order for each."""
+    def take(self) -> list[Change]:
+        """Return what changed, in order of time."""
         fresh = self.log[self._seen :]
-        found = [(alert, 'raised') for alert in fresh]
+        # Of the same moment: an end comes before a beginning, but no alert's end before its own.
+        events = [(alert.start, 1, alert) for alert in fresh]
         for alert in [*self.open, *fresh]:
-            if alert.end is None:
-                continue
-            found.append((alert, 'cleared'))
-            failure = alert.rule.code in FAILURES and alert.rule.level == ERROR
-            if failure and id(alert) not in self._acknowledged:
-                self.latched.append(alert)
+            if alert.end is not None:
+                events.append((alert.end, 0 if alert.end > alert.start else 2, alert))
+        found: list[Change] = []
+        for now, which, alert in sorted(events, key=lambda event: event[:2]):
+            take = self.alarms.raised if which == 1 else self.alarms.cleared
+            found += take(now, alert)
         self.open = [alert for alert in [*self.open, *fresh] if alert.end is None]
-        self._acknowledged &= {id(alert) for alert in self.open}
-        del self.latched[:-KEPT]
         self._prune()
         return found
 
-    def acknowledge(self) -> list[Alert]:
-        """Take all that is active or latched as seen by a person; return it."""
-        fresh = [alert for alert in self.open if id(alert) not in self._acknowledged]
-        seen = [*self.latched, *fresh]
-        self._acknowledged |= {id(alert) for alert in fresh}
-        self.latched.clear()
-        return seen
-
     def acknowledged(self, alert: Alert) -> bool:
         """Return whether an active alert was acknowledged."""
-        return id(alert) in self._acknowledged
+        return self.alarms.state(key_of(alert.rule)) is State.ACTIVE_ACKNOWLEDGED
+
+    @property
+    def waiting(self) -> list[Alarm]:
+        """The failures of the robot that are over and wait for a person, the newest last."""
+        found = [a for a in self.alarms.table.values() if _is_failure(a) and not a.state.active]
+        over = [a for a in found if a.state is not State.NORMAL]
+        return sorted(over, key=lambda alarm: alarm.alert.start)
 
     def _prune(self) -> None:
         if len(self.log) > 2 * KEPT:
             self.log[:-KEPT] = [alert for alert in self.log[:-KEPT] if alert.end is None]
         self._seen = len(self.log)
+
+
+def _is_failure(alarm: Alarm) -> bool:
+    return alarm.rule.code in FAILURES and alarm.rule.level == ERROR

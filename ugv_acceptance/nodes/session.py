@@ -12,7 +12,9 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
 from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.outlook import Outlook
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.nodes.counsel import Counsel
 from ugv_acceptance.nodes.faults import Faults
 from ugv_acceptance.nodes.following import Follower
 from ugv_acceptance.nodes.receipt import ReceiptClock
@@ -51,6 +53,8 @@ class Session:
     take_joint_state: Callable[[bytes], None] = field(init=False)
     take_imu: Callable[[bytes], None] = field(init=False)
     take_payload: Callable[[bytes], None] = field(init=False)
+    outlook: Outlook = field(init=False)
+    counsel: Counsel = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
     _known: bool = False
     _counted: tuple[int, dict[str, int]] = field(default_factory=lambda: (0, {}))
@@ -59,6 +63,8 @@ class Session:
         self.evaluator = LiveEvaluator(self.settings)
         log = self.evaluator.watch.log
         self.faults, self.follower = Faults(log), Follower(log)
+        self.outlook = Outlook(self.settings)
+        self.counsel = Counsel(self.evaluator, self.outlook)
         self.counts = {name: InputCount() for name in INPUTS}
         self.evaluator.start(self.clock.now())
         self.take_joint_state = self._guard('joint_states', self._joint_states())
@@ -94,7 +100,7 @@ class Session:
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; what was learnt and is active stays."""
-        self.settings = settings
+        self.settings = self.outlook.settings = settings
         self.evaluator.adopt(settings)
 
     def _look(self) -> None:
@@ -105,6 +111,7 @@ class Session:
 
     def _joint_states(self) -> Callable[[bytes], None]:
         decode, evaluate = joint_state_decoder().one, self.evaluator.joint_state
+        see = self.outlook.see
         clock, count, follower = self.clock, self.counts['joint_states'], self.follower
 
         def take(data: bytes) -> None:
@@ -115,6 +122,7 @@ class Session:
             local = clock.stamp(now, stamp) if clock.simulated else stamp
             margins = evaluate(now, local, names, position, velocity, effort)
             if margins is not None:
+                see(margins)
                 self.on_margins(stamp, margins)
             if (margins is not None) is not self._known or follower.changed():
                 self._look()
@@ -122,7 +130,7 @@ class Session:
         return take
 
     def _imu(self) -> Callable[[bytes], None]:
-        decode, evaluate = imu_decoder().one, self.evaluator.imu
+        decode, evaluate, see = imu_decoder().one, self.evaluator.imu, self.outlook.see
         clock, count, follower = self.clock, self.counts['imu'], self.follower
 
         def take(data: bytes) -> None:
@@ -133,6 +141,7 @@ class Session:
             local = clock.stamp(now, stamp) if clock.simulated else stamp
             margins = evaluate(now, local, orientation, covariance_0, omega, acceleration)
             if margins is not None:
+                see(margins)
                 self.on_margins(stamp, margins)
             if (margins is not None) is not self._known or follower.changed():
                 self._look()
