@@ -130,6 +130,8 @@ def test_a_value_is_measured_as_by_a_loop_over_the_rows(
         assert measure.worst[0].value == (max(seen) if demand.below else min(seen))
     else:
         assert not measure.worst
+    broken = [v for v in seen if (v >= demand.limit if demand.below else v <= demand.limit)]
+    assert (measure.first.value if measure.first else None) == (broken[0] if broken else None)
 
 
 @hypothesis.settings(max_examples=40)

@@ -1,6 +1,5 @@
 """Criteria measured while a recording is read: worst values, violations, dwell, visited cells."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from heapq import nsmallest
 
@@ -16,9 +15,8 @@ from ugv_acceptance.evaluation.criteria import (
     Value,
     Window,
 )
-from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.payload_log import PayloadLog
 from ugv_acceptance.evaluation.rows import MarginRows
-from ugv_acceptance.evaluation.samples import PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.signals import SIGNALS, columns_of, subjects_of
 from ugv_acceptance.evaluation.spans import Spans
@@ -44,31 +42,11 @@ class Moment:
 
 
 @dataclass(slots=True)
-class PayloadLog:
-    """Every declared payload and since when (ns), so that a row's can be found again."""
-
-    settings: Settings
-    since: list[int] = field(default_factory=list)
-    payloads: list[Payload] = field(default_factory=list)
-
-    def take(self, segments: Sequence[PayloadColumns]) -> None:
-        """Take the payload messages of a batch."""
-        messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
-        for when, s, k in sorted(messages, key=lambda message: message[0]):
-            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
-            if payload and payload != self.at(when):
-                self.since.append(when)
-                self.payloads.append(payload)
-
-    def at(self, time: int) -> Payload:
-        """Return the payload in force for a joint state received at `time` (ns)."""
-        k = int(np.searchsorted(np.array(self.since, dtype=np.int64), time, side='right'))
-        return self.payloads[k - 1] if k else self.settings.robot.payload
-
-
-@dataclass(slots=True)
 class ValueMeasure:
-    """What a criterion on a value comes to; `span` is its window in log time (ns)."""
+    """What a criterion on a value comes to; `span` is its window in log time (ns).
+
+    `worst` holds the worst row of the worst stretches, `first` the first row in violation.
+    """
 
     criterion: Criterion
     settings: Settings
@@ -77,6 +55,7 @@ class ValueMeasure:
     evaluated: int = 0
     samples: int = 0
     worst: list[Moment] = field(default_factory=list)
+    first: Moment | None = None
     violation: Spans = field(default_factory=Spans)
     kept: Spans = field(default_factory=Spans)
     _last: tuple[int, int, float] | None = None
@@ -135,7 +114,7 @@ class ValueMeasure:
         return found
 
     def _see(self, rows: MarginRows, values: Floats) -> None:
-        """Keep the worst row of this stretch if it is among the worst of all."""
+        """Keep the first row in violation, and the worst if it is among the worst of all."""
         inside = (rows.time >= self.span[0]) & (rows.time <= self.span[1])
         if not inside.all():
             values = np.where(inside, values, np.nan)
@@ -146,6 +125,9 @@ class ValueMeasure:
         self.samples += int(np.count_nonzero(~np.isnan(values)))
         if np.isnan(values[k]):
             return
+        if self.first is None and self._bad(values[k : k + 1])[0]:
+            at = int(self._bad(values).argmax())
+            self.first = self._moment(rows, at, float(values[at]))
         if len(self.worst) == CANDIDATES and order[k] >= sign * self.worst[-1].value:
             return
         moments = [*self.worst, self._moment(rows, k, float(values[k]))]

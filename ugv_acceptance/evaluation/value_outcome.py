@@ -67,7 +67,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
     scale, unit = shown(demand.signal, demand.of, findings.settings)
     method = findings.examination.criteria.uncertainty_of(measure.criterion)
     worst = measure.worst[0] if measure.worst and isfinite(measure.worst[0].value) else None
-    bound = findings.bounds.worst(measure, method)
+    bound, first = findings.bounds.worst(measure, method), measure.first
     start, end = measure.span
     distance = demand.distance(worst.value) * scale if worst else None
     return {
@@ -81,6 +81,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
         'at_s': findings.seconds(worst.time) if worst else None,
         'distance': distance,
         'moment': moment_json(worst, findings.settings) if worst else None,
+        'first_violation': moment_json(first, findings.settings) if first else None,
         'uncertainty': bound,
         'inside_bound': bool(bound and distance and distance > 0.0 >= bound['excess']),
         'evaluated_s': measure.evaluated / 1e9,

@@ -83,9 +83,9 @@ def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | Non
 def _map(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = track_map(strips, result, settings)
     caption = (
-        "The run's track (blue, from the dot) over the map at the moment of least tilt left: "
-        'attitude, payload and the other joints as they were then, so the track may cross areas '
-        'that were not there at other times.'
+        "The run's track (blue, from the dot) over the map. Attitude, payload and the other joints "
+        'are as when the tilt left first broke its limit (or, where it never did, was least), so '
+        'the track may cross areas that were not there at other times.'
     )
     return Picture(svg_of(made, 'map'), caption) if made else None
 

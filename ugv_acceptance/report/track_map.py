@@ -19,11 +19,12 @@ CELLS = 121
 def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None:
     """Return the map of the two judged joints that moved most, with the run's track on it.
 
-    All else - the other joints, attitude, payload - is as at the worst tip-over moment. None where
+    All else - the other joints, attitude, payload - is as when the tilt left first broke its limit,
+    else as when it was least. None where
     the robot has no two such joints or the run no known posture.
     """
     pair = _moving_pair(strips, settings)
-    moment = _worst_moment(result)
+    moment = _telling_moment(result)
     if pair is None or moment is None:
         return None
     grid = _grid(pair, moment, settings)
@@ -71,11 +72,13 @@ def _moving_pair(strips: Strips, settings: Settings) -> list[int] | None:
     return sorted(order[:2])
 
 
-def _worst_moment(result: Json) -> Json | None:
+def _telling_moment(result: Json) -> Json | None:
+    """Return when the tilt left first broke its limit, else when it was least."""
     for outcome in result['criteria']['results']:
-        moment: Json | None = outcome['measured'].get('moment')
-        if outcome['measured'].get('signal') == 'tip_angle' and moment is not None:
-            return moment
+        measured = outcome['measured']
+        if measured.get('signal') == 'tip_angle' and measured['moment'] is not None:
+            found: Json = measured['first_violation'] or measured['moment']
+            return found
     return None
 
 
