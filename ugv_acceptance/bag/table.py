@@ -27,9 +27,10 @@ class ParquetSink:
         if path is not None:
             try:
                 from pyarrow import parquet  # noqa: PLC0415 - an extra
-            except ImportError:
+            except ImportError as error:
                 raise AcceptanceError(
-                    '--parquet: expected PyArrow (pip install "ugv_acceptance[table]"), got none'
+                    'no Parquet: expected PyArrow (pip install "ugv_acceptance[table]"), got: '
+                    f'{error}'
                 ) from None
             self._arrow, self._parquet = __import__('pyarrow'), parquet
 
