@@ -1,7 +1,7 @@
 """A million PackBot postures: all torques and tip edges, beside Pinocchio and MuJoCo loops.
 
-Ours gives torques and the tilt left to every edge, or also the edges' moments and energies and the
-ZMP; the loops give torques and the centre of mass alone. CPU seconds, best of rounds in turn; ratios count.
+Ours gives torques and the tilt left to every edge, or also the edges' moments, energies and ZMP;
+the loops give torques and the centre of mass alone. CPU seconds, best of rounds; ratios count.
 
     python bench/bench_kernels.py [postures]
 """
@@ -114,8 +114,8 @@ def main(count: int = 1_000_000) -> None:
         return lambda: all_margins(robot, postures, g, workers)
 
     ways: dict[str, tuple[int, Callable[[], object]]] = {
-        'ours, torques + tilt to edges, 2 threads': (count, lambda: margins(robot, q, g, workers=2)),
-        'ours, torques + tilt to edges, 1 thread': (count, lambda: margins(robot, q, g)),
+        'ours, torques + tilt, 2 threads': (count, lambda: margins(robot, q, g, workers=2)),
+        'ours, torques + tilt, 1 thread': (count, lambda: margins(robot, q, g)),
         'ours, the same, flippers stowed': (count, lambda: margins(robot, stowed, g)),
         'ours, all margins of all edges, 2 threads': (count, ours(q, 2)),
         'ours, all margins of all edges, 1 thread': (count, ours(q, 1)),

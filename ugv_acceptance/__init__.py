@@ -1,4 +1,4 @@
-"""Acceptance monitoring of unmanned ground vehicles: torque and tip-over margins, live and from bags."""
+"""Acceptance of unmanned ground vehicles: torque and tip-over margins, live and from bags."""
 
 __version__ = '0.1.0'
 
