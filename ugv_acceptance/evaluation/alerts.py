@@ -121,9 +121,7 @@ class Signal:
             self.alert.peak = peak
 
 
-def runs(
-    rule: Rule, values: NDArray[Any], *, raw: bool
-) -> Iterator[tuple[int, int, bool]]:
+def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, int, bool]]:
     """Yield (first row, row after the last, bad) for every run of `values` on one side.
 
     `raw` is the side before the first row; rows inside the deadband, and NaN, prolong a run.

@@ -205,7 +205,12 @@ class ImuTracker:
 
 
 def _orientation_tells(
-    x: Any, y: Any, z: Any, w: Any, covariance_0: Any, attitude: str  # noqa: ANN401 - floats or arrays
+    x: Any,
+    y: Any,
+    z: Any,
+    w: Any,
+    covariance_0: Any,
+    attitude: str,  # noqa: ANN401 - floats or arrays
 ) -> Any:  # noqa: ANN401
     """Return whether a quaternion is claimed, is a rotation, and is not just a default identity."""
     size = x * x + y * y + z * z + w * w
