@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,6 +60,7 @@ class Driver(Node):
         self.diagnostics: dict[str, DiagnosticStatus] = {}
         self.alerts: list[DiagnosticStatus] = []
         at = 'acceptance_monitor'
+        self.hand = self.create_publisher(DiagnosticStatus, f'{at}/operator', 10)
         self.create_subscription(DiagnosticStatus, f'{at}/verdict', self.verdicts.append, LATCHED)
         self.create_subscription(DiagnosticArray, f'{at}/alerts', self._take_alerts, 50)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._take_diagnostics, 50)
@@ -74,6 +75,12 @@ class Driver(Node):
         """Publish one message of each input."""
         self.joints.publish(joints(q))
         self.imu.publish(imu(roll))
+
+    def operate(self, do: str, who: str, note: str = '', **values: str) -> None:
+        """Do as an operator does on a console."""
+        pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+        message = DiagnosticStatus(name=do, hardware_id=who, message=note, values=pairs)
+        self.hand.publish(message)
 
     def connected(self) -> bool:
         """Return whether the monitor hears both inputs."""

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.nodes.outputs import LATCHED
 
 STRETCHED = (0.0, 0.0, 0.0, 2.0)
@@ -111,26 +113,87 @@ def overload(live: Live) -> Any:
 
 
 def test_a_stretched_arm_is_an_error_with_advice(live: Live) -> None:
-    """The paper's arm with 4 kg at full reach tips the robot, and needs 74.8 N m of 50."""
+    """The paper's arm with 4 kg at full reach tips the robot, and needs 74.8 N m of 50.
+
+    What to do is computed for this posture: the elbow is the way out.
+    """
     _, driver = overload(live)
     live.until(
         lambda: any('TORQUE_LIMIT shoulder_joint' in a.name for a in driver.alerts),
         lambda: driver.send(STRETCHED),
     )
     live.until(lambda: driver.verdicts[-1].level[0] == ERROR, lambda: driver.send(STRETCHED))
-    assert 'lower the arm' in driver.verdicts[-1].message
+    assert 'raise the elbow by' in driver.verdicts[-1].message
     torque = 9.81 * (2.5 * 0.55 / 2 + 2.5 * (0.55 + 0.64 / 2) + 4 * (0.55 + 0.64))
     assert any(f'{torque:.1f} N m' in a.message for a in driver.alerts)
 
 
-def test_a_failure_that_is_over_stays_until_acknowledged(live: Live) -> None:
-    """After an ERROR the verdict is WARN, not OK, until somebody acknowledges it."""
+def test_a_tip_over_that_is_over_stays_until_acknowledged_and_reset(live: Live) -> None:
+    """After an ERROR the verdict is WARN, not OK: not acknowledged, then latched, then OK."""
+    _, driver = overload(live)
+    live.until(lambda: 'not acknowledged' in driver.verdicts[-1].message, driver.send)
+    assert driver.verdicts[-1].level[0] == WARN
+    assert live.call(Trigger, '/acceptance_monitor/acknowledge').success
+    live.until(lambda: 'latched until reset' in driver.verdicts[-1].message, driver.send)
+    assert driver.verdicts[-1].level[0] == WARN
+    driver.operate('reset', who='Ada')
+    live.until(lambda: driver.verdicts[-1].level[0] == OK, driver.send)
+
+
+def told(driver: Any, how: str) -> dict[str, str]:
+    """Return the values of the newest change of that kind."""
+    statuses = [{v.key: v.value for v in a.values} for a in driver.alerts]
+    return next((values for values in reversed(statuses) if values['state'] == how), {})
+
+
+def test_who_acknowledged_and_why_is_told(live: Live) -> None:
+    """Name and note of the person are in the change, with the alarm's state."""
+    _, driver = overload(live)
+
+    def see() -> None:
+        driver.operate('acknowledge', who='Ada', note='seen')
+        driver.send(STRETCHED)
+
+    live.until(lambda: told(driver, 'acknowledged'), see)
+    values = told(driver, 'acknowledged')
+    assert (values['who'], values['note']) == ('Ada', 'seen')
+    assert values['alarm'] == 'active, acknowledged'
+
+
+def test_a_warning_can_be_shelved_and_a_critical_alarm_not(live: Live) -> None:
+    """Shelving a warning is told; shelving an ERROR is refused and changes nothing."""
+    _, driver = overload(live)
+    asked = {'code': 'TIP_OVER', 'subject': 'front', 'seconds': '60'}
+
+    def ask() -> None:
+        for level in ('ERROR', 'WARN'):
+            driver.operate('shelve', who='Ada', level=level, **asked)
+        driver.send(STRETCHED)
+
+    live.until(lambda: told(driver, 'shelved'), ask)
+    shelved = [a for a in driver.alerts if a.values[0].value == 'shelved']
+    assert {a.values[3].value for a in shelved} == {'WARN'}
+
+
+def test_near_misses_are_in_the_verdict(live: Live) -> None:
+    """The smallest tilt since the start is kept after the robot stands well again."""
     _, driver = overload(live)
     live.until(lambda: driver.verdicts[-1].message.startswith('over now'), driver.send)
-    assert driver.verdicts[-1].level[0] == WARN
-    answer = live.call(Trigger, '/acceptance_monitor/acknowledge')
-    assert answer.success
-    live.until(lambda: driver.verdicts[-1].level[0] == OK, driver.send)
+    values = {v.key: v.value for v in driver.verdicts[-1].values}
+    assert float(values['near_miss_tilt_deg']) < 5.0
+    assert values['near_miss_tilt_deg_of'] == 'front'
+
+
+def test_a_critical_alert_leaves_a_recording(live: Live, tmp_path: Path) -> None:
+    """The black box holds both inputs and the alert, and is read as any recording."""
+    _, driver = live.running(black_box=str(tmp_path))
+    live.until(lambda: list(tmp_path.iterdir()), lambda: driver.send(STRETCHED))
+    assert change(live, Transition.TRANSITION_DEACTIVATE)
+    (folder,) = tmp_path.iterdir()
+    found = open_bag(folder).topics
+    assert found['/joint_states'].count > 5
+    assert found['/imu/data'].count > 5
+    assert found['/acceptance_monitor/alerts'].count >= 1
 
 
 def test_acknowledging_does_not_clear(live: Live) -> None:

@@ -139,10 +139,10 @@ def test_the_follower_tells_each_change_once() -> None:
     assert not follower.changed()
     log.append(alert(1))
     assert follower.changed()
-    assert [how for _, how in follower.take()] == ['raised']
+    assert [change.how for change in follower.take()] == ['raised']
     assert not follower.changed()
     log[0].end = 2
-    assert [how for _, how in follower.take()] == ['cleared']
+    assert [change.how for change in follower.take()] == ['cleared']
     assert follower.take() == []
 
 
@@ -151,13 +151,13 @@ def test_an_alert_shorter_than_a_look_is_told() -> None:
     short = alert(1)
     short.end = 2
     follower = Follower([short])
-    assert [how for _, how in follower.take()] == ['raised', 'cleared']
+    assert [change.how for change in follower.take()] == ['raised', 'cleared']
 
 
 @given(st.lists(st.integers(0, 400), max_size=30))
 def test_memory_stays_bounded(bursts: list[int]) -> None:
     """Of cleared alerts no more than a fixed number is kept; active ones are never forgotten."""
-    log: list[Alert] = [alert(0)]
+    log: list[Alert] = [alert(0, 'NO_SUPPORT')]
     follower = Follower(log)
     active = log[0]
     told = 0
@@ -167,34 +167,36 @@ def test_memory_stays_bounded(bursts: list[int]) -> None:
             log[-1].end = k + 1
         told += len(follower.take())
         assert len(log) <= 2 * KEPT + 1
-        assert len(follower.latched) <= KEPT
+        assert len(follower.alarms.table) <= 2
     assert any(found is active for found in log) or not bursts
     assert told == 2 * sum(bursts) + bool(bursts)
 
 
-def test_acknowledged_failures_are_not_latched() -> None:
-    """A failure of the robot acknowledged while active is forgotten when it clears."""
-    log = [alert(1), alert(2, 'INPUT_STALE')]
+def test_what_is_over_and_seen_waits_for_nobody_but_a_tip_over() -> None:
+    """Of failures that were acknowledged only a tip-over stays, until it is reset."""
+    log = [alert(1), alert(2, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
     follower = Follower(log)
     follower.take()
-    assert len(follower.acknowledge()) == 2
+    assert len(follower.alarms.acknowledge(2, 'Ada')) == 3
     for one in log:
         one.end = 3
     follower.take()
-    assert follower.latched == []
+    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
+    follower.alarms.reset(4, 'Ada')
+    assert follower.waiting == []
 
 
-def test_unacknowledged_failures_are_latched_and_faults_of_inputs_not() -> None:
+def test_failures_nobody_saw_wait_and_faults_of_inputs_do_not() -> None:
     """Only failures of the robot wait for somebody to have seen them."""
-    log = [alert(1), alert(2, 'INPUT_STALE')]
+    log = [alert(1, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
     follower = Follower(log)
     follower.take()
     for one in log:
         one.end = 3
     follower.take()
-    assert follower.latched == [log[0]]
-    assert follower.acknowledge() == [log[0]]
-    assert follower.latched == []
+    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
+    follower.alarms.acknowledge(4, 'Ada')
+    assert follower.waiting == []
 
 
 @pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)

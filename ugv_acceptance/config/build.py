@@ -216,7 +216,7 @@ def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:
     return Limits(
         torque=tuple(_limit(build, joint, section) for joint, section in joints),
         speed=tuple(_speed(build, joint, section) for joint, section in joints),
-        **limits.model_dump(),
+        **limits.model_dump(exclude_none=True),
     )
 
 

@@ -196,6 +196,7 @@ class LimitsSection(Section):
     tip_warn: Angle = _LIMITS.tip_warn
     tip_error: Angle = _LIMITS.tip_error
     tip_deadband: Annotated[NotNegative, _number('angle')] = _LIMITS.tip_deadband
+    friction: Annotated[Positive, _number()] | None = None
 
 
 class DelaysSection(Section):

@@ -152,6 +152,11 @@ class LiveEvaluator:
             self.margins = None
 
     @property
+    def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Newest rates and efforts of the joints (rad/s, N m; m/s, N); NaN where not reported."""
+        return tuple(self._joints.qd), tuple(self._joints.effort)
+
+    @property
     def level(self) -> int:
         """The most severe level now: STALE where the margins are not known."""
         active = [alert.rule.level for alert in self.watch.active]

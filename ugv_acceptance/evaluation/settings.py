@@ -49,7 +49,8 @@ class Limits:
 
     `torque` limit of each joint (N m or N; infinite: not judged); `torque_warn` and `torque_error`
     are utilisations |tau| / limit. Tip angles are the tilt left (rad). `speed` is the joint rate
-    (rad/s or m/s) to which the static model was shown valid; infinite: not judged.
+    (rad/s or m/s) to which the static model was shown valid; infinite: not judged. `friction` is
+    that of the tracks on the ground; infinite: not known.
     """
 
     torque: tuple[float, ...]
@@ -60,6 +61,7 @@ class Limits:
     tip_error: float = 0.08726646259971647
     tip_deadband: float = 0.017453292519943295
     speed: tuple[float, ...] = ()
+    friction: float = float('inf')
 
 
 @dataclass(frozen=True, slots=True)

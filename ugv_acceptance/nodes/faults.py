@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.taxonomy import FIRST_SUSPECT, FailureSource
 from ugv_acceptance.evaluation.wording import advice, describe
 
 # Nanoseconds a fault must be gone before its alert is cleared.
@@ -51,6 +52,17 @@ WORDS = {
     ),
 }
 
+# Where to look first, as in evaluation/taxonomy.py.
+SUSPECTS = {
+    'SECOND_PUBLISHER': FailureSource.CONTROL_SYSTEM,
+    'FOREIGN_PUBLISHER': FailureSource.CONTROL_SYSTEM,
+    'INPUT_MALFORMED': FailureSource.COMMUNICATIONS,
+    'INPUT_QOS': FailureSource.DESIGN,
+    'MESSAGES_LOST': FailureSource.COMMUNICATIONS,
+    'NO_CLOCK': FailureSource.CONTROL_SYSTEM,
+    'MONITOR_FAULT': FailureSource.CONTROL_SYSTEM,
+}
+
 
 @dataclass(slots=True)
 class Faults:
@@ -93,6 +105,11 @@ class Faults:
         detail = self._details.get((rule.code, rule.subject), '')
         text = WORDS[rule.code][1]
         return text.format(subject=rule.subject, peak=alert.peak, detail=detail)
+
+
+def suspect_of(code: str) -> str:
+    """Return where to look first for the failure behind an alert, such as "physical / sensor"."""
+    return (SUSPECTS.get(code) or FIRST_SUSPECT[code]).path
 
 
 def what_to_do(code: str) -> str:

@@ -33,9 +33,11 @@ class Follower:
         fresh = self.log[self._seen :]
         # Of the same moment: an end comes before a beginning, but no alert's end before its own.
         events = [(alert.start, 1, alert) for alert in fresh]
-        for alert in [*self.open, *fresh]:
-            if alert.end is not None:
-                events.append((alert.end, 0 if alert.end > alert.start else 2, alert))
+        events += [
+            (alert.end, 0 if alert.end > alert.start else 2, alert)
+            for alert in [*self.open, *fresh]
+            if alert.end is not None
+        ]
         found: list[Change] = []
         for now, which, alert in sorted(events, key=lambda event: event[:2]):
             take = self.alarms.raised if which == 1 else self.alarms.cleared

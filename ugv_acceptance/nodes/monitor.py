@@ -9,25 +9,29 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance import AcceptanceError, BadConfig, BadSample
 from ugv_acceptance.config import Config, load
-from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.alarms import Change
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.nodes.black_box import BlackBox
 from ugv_acceptance.nodes.inputs import Inputs
+from ugv_acceptance.nodes.operating import all_reset, black_box_of, by_service, operate
 from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
 from ugv_acceptance.nodes.parameters import (
     Knob,
     changed,
-    described,
-    described_integer,
+    check_at_rest,
+    declare_all,
     knobs_of,
     unknown,
 )
@@ -38,8 +42,7 @@ from ugv_acceptance.nodes.status import Status, alert_status, verdict_of
 from ugv_acceptance.nodes.supervision import diagnostics_of, unavailable
 
 NAME = 'acceptance_monitor'
-# Parameters that are read on configuration or activation and stay as they are until the next.
-AT_REST = ('config', 'urdf', 'depth')
+INACTIVE = 'the monitor is not active'
 # Takes (alert or verdict, what is said).
 Listener = Callable[[str, Status], None]
 
@@ -58,7 +61,8 @@ class Monitor(LifecycleNode):
         self._inputs: Inputs | None = None
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
-        self._declare()
+        self._box: BlackBox | None = None
+        declare_all(self)
         self.output = StatusOutput(self)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._take_parameters)
@@ -67,20 +71,8 @@ class Monitor(LifecycleNode):
         self.create_timer(1.0, self._every_second, clock=self.steady)
         self.create_service(Trigger, '~/acknowledge', self._acknowledge)
         self.create_service(Trigger, '~/reset', self._reset)
+        self.create_subscription(DiagnosticStatus, '~/operator', self._on_operator, 10)
         self.say()
-
-    def _declare(self) -> None:
-        declare = self.declare_parameter
-        declare('config', 'packbot', described('YAML file, or the name of one that ships'))
-        declare('urdf', '', described('URDF in place of the one the YAML names'))
-        what = 'configure and activate at once; false: a lifecycle manager does'
-        declare('autostart', True, described(what, fixed=True))
-        what = 'queue of each input; what comes while the processor is busy waits in it'
-        declare('depth', 1000, described_integer(what, 1, 100_000))
-        what = 'margin messages a second; 0: one for every input message'
-        declare('publish_rate', 25.0, described(what, 0.0, 10_000.0))
-        what = 'nodes that may publish the inputs, such as /driver; empty: any, but only one'
-        declare('allowed_publishers', [''], described(what))
 
     # Lifecycle
 
@@ -144,6 +136,7 @@ class Monitor(LifecycleNode):
         if self._settings is None or self.config is None:
             raise BadConfig('expected a configured monitor')
         self.session = self._new_session(self._settings)
+        self._box = black_box_of(self, self._value('black_box'), self.config.topics, self.session)
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
@@ -162,12 +155,14 @@ class Monitor(LifecycleNode):
 
     def _deactivate(self) -> None:
         if self.session is not None:
-            self._tell_all('reset', [*self.session.follower.latched, *self.session.follower.open])
+            self._tell(all_reset(self.session))
+        if self._box is not None:
+            self._box.close()
         if self._inputs is not None:
             self._inputs.destroy()
         if self._tick is not None:
             self.destroy_timer(self._tick)
-        self._inputs = self._tick = self.session = None
+        self._inputs = self._tick = self.session = self._box = None
 
     def _clean_up(self) -> None:
         for knob in self.knobs:
@@ -186,11 +181,18 @@ class Monitor(LifecycleNode):
         if session.clock.simulated:
             session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
+        now = session.clock.now()
+        self._tell(session.follower.alarms.advance(now))
+        if self._box is not None:
+            self._box.advance(now)
+        if session.counsel.urgent(now):
+            self.say()
 
     def _every_second(self) -> None:
         if self.session is not None and self._inputs is not None:
             self._inputs.look_around(self._value('allowed_publishers'))
             self.session.measure_rates()
+            self.session.counsel.feel()
             self.session.tick()
         if self._margins is not None:
             self._margins.look_for_listeners()
@@ -210,39 +212,45 @@ class Monitor(LifecycleNode):
         self.listener('verdict', status)
 
     def _on_change(self) -> None:
-        session = self.session
-        if session is None:
-            return
-        told = (session.settings, session.faults)
-        self._tell([alert_status(a, how, *told) for a, how in session.follower.take()])
-        self.say()
-
-    def _tell_all(self, how: str, alerts: list[Alert]) -> None:
         if self.session is not None:
-            told = (self.session.settings, self.session.faults)
-            self._tell([alert_status(alert, how, *told) for alert in alerts])
+            self._tell(self.session.follower.take())
+            self.say()
 
-    def _tell(self, statuses: list[Status]) -> None:
-        if statuses:
-            self.output.alerts(statuses)
-        for status in statuses:
+    def _tell(self, changes: list[Change]) -> None:
+        """Publish changes of alerts, and give those to the black box that it is made for."""
+        session = self.session
+        if session is None or not changes:
+            return
+        statuses = [alert_status(change, session) for change in changes]
+        message = self.output.alerts(statuses)
+        for change, status in zip(changes, statuses, strict=True):
             self.listener('alert', status)
+            if self._box is not None and change.how == 'raised':
+                self._box.alert(session.clock.now(), change.alert, serialize_message(message))
 
     # Services and parameters
 
     def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self.session is not None
-        response.message = 'the monitor is not active'
+        response.success, response.message = self.session is not None, INACTIVE
         if self.session is not None:
-            seen = self.session.follower.acknowledge()
-            self._tell_all('acknowledged', seen)
+            seen = by_service(self.session)
+            self._tell(seen)
             response.message = f'acknowledged {len(seen)} alerts'
             self.say()
         return response
 
+    def _on_operator(self, message: DiagnosticStatus) -> None:
+        """Take what a person did, with name and note: docs/operator.md."""
+        try:
+            if self.session is None:
+                raise BadSample(INACTIVE)
+            self._tell(operate(self.session, message))
+        except AcceptanceError as error:
+            self.get_logger().warning(f'operator: {error}')
+        self.say()
+
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self.session is not None
-        response.message = 'the monitor is not active'
+        response.success, response.message = self.session is not None, INACTIVE
         if self.session is not None:
             self._deactivate()
             self._activate()
@@ -257,17 +265,13 @@ class Monitor(LifecycleNode):
         """Refuse a set as a whole, with the reason; what it would change is not touched here."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
-            self._check_at_rest(values)
+            if self.session is not None:
+                check_at_rest(values)
             if self._settings is not None:
                 changed(self._settings, self.knobs, values)
         except (BadConfig, TypeError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
-
-    def _check_at_rest(self, values: dict[str, Any]) -> None:
-        fixed = [name for name in AT_REST if name in values and self.session is not None]
-        if fixed:
-            raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
 
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         values = {parameter.name: parameter.value for parameter in parameters}

@@ -38,9 +38,11 @@ class StatusOutput:
         """Publish the verdict; who comes later gets the last one."""
         self._verdict.publish(status_message(status, self.name, self.hardware_id))
 
-    def alerts(self, statuses: Sequence[Status]) -> None:
-        """Publish changes of alerts."""
-        self._alerts.publish(self._array(statuses))
+    def alerts(self, statuses: Sequence[Status]) -> DiagnosticArray:
+        """Publish changes of alerts; return what was published."""
+        message = self._array(statuses)
+        self._alerts.publish(message)
+        return message
 
     def diagnostics(self, statuses: Sequence[Status]) -> None:
         """Publish the state of everything."""

@@ -11,6 +11,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.evaluation.settings import Settings
@@ -51,6 +52,34 @@ def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
     """Return a descriptor with a range for integers."""
     ranges = [IntegerRange(from_value=lower, to_value=upper, step=1)]
     return ParameterDescriptor(description=what, integer_range=ranges)
+
+
+# Parameters that are read on configuration or activation and stay as they are until the next.
+AT_REST = ('config', 'urdf', 'depth', 'black_box')
+
+
+def check_at_rest(values: Mapping[str, Any]) -> None:
+    """Raise BadConfig where one of these parameters cannot change while the monitor is active."""
+    fixed = [name for name in AT_REST if name in values]
+    if fixed:
+        raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
+
+
+def declare_all(node: Node) -> None:
+    """Declare what a monitor can be told before it knows its robot."""
+    declare = node.declare_parameter
+    declare('config', 'packbot', described('YAML file, or the name of one that ships'))
+    declare('urdf', '', described('URDF in place of the one the YAML names'))
+    what = 'configure and activate at once; false: a lifecycle manager does'
+    declare('autostart', True, described(what, fixed=True))
+    what = 'queue of each input; what comes while the processor is busy waits in it'
+    declare('depth', 1000, described_integer(what, 1, 100_000))
+    what = 'margin messages a second; 0: one for every input message'
+    declare('publish_rate', 25.0, described(what, 0.0, 10_000.0))
+    what = 'nodes that may publish the inputs, such as /driver; empty: any, but only one'
+    declare('allowed_publishers', [''], described(what))
+    what = 'folder for a recording of each critical alert; empty: none is made'
+    declare('black_box', '', described(what))
 
 
 # Parameter -> (part of Settings, field, factor of its unit, range, what it is).

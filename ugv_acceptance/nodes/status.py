@@ -4,11 +4,12 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from ugv_acceptance.evaluation.alarms import Alarm, Change, State
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
-from ugv_acceptance.nodes.faults import Faults, what_to_do
+from ugv_acceptance.nodes.faults import suspect_of
 from ugv_acceptance.nodes.session import Session
 
 
@@ -46,29 +47,59 @@ def what_is_left(margins: Margins, settings: Settings) -> str:
 
 def verdict_of(session: Session) -> Status:
     """Return the one line an operator reads: the most severe cause, what is left, what to do."""
-    faults, follower, settings = session.faults, session.follower, session.settings
+    follower, now = session.follower, session.clock.now()
     margins, active = session.evaluator.margins, session.active
-    left = what_is_left(margins, settings) if margins else 'margins not known'
-    values: dict[str, object] = {'left': left, 'alerts_active': len(active)}
+    session.counsel.renew(now, active)
+    left = what_is_left(margins, session.settings) if margins else 'margins not known'
+    unseen = sum(alarm.state.unseen for alarm in follower.alarms.table.values())
+    values: dict[str, object] = {
+        'left': left,
+        'alerts_active': len(active),
+        'alerts_unacknowledged': unseen,
+    }
+    known = session.counsel.values(now)
+    left = '; '.join([left, *session.counsel.hints(now)])
     if active:
-        first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
-        more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
-        text = f'{faults.sentence(first, settings)}{more}; {left}; {what_to_do(first.rule.code)}'
-        values |= {
-            'code': first.rule.code,
-            'subject': first.rule.subject,
-            'do': what_to_do(first.rule.code),
-            'acknowledged': all(map(follower.acknowledged, active)),
-        }
-        return Status(session.level, '', text, values)
+        return _worst(session, active, left, values | known)
     if margins is None:
-        return Status(STALE, '', 'waiting for joint_states and imu: no margins yet', values)
-    if follower.latched:
-        last = follower.latched[-1]
-        text = f'over now, not acknowledged: {faults.sentence(last, settings)}; {left}'
-        values |= {'code': last.rule.code, 'subject': last.rule.subject, 'do': 'acknowledge'}
-        return Status(max(session.level, WARN), '', text, values)
-    return Status(OK, '', f'all margins kept: {left}', values)
+        text = 'waiting for joint_states and imu: no margins yet'
+        return Status(STALE, '', text, values | known)
+    if follower.waiting:
+        return _over(session, follower.waiting[-1], left, values | known)
+    return Status(OK, '', f'all margins kept: {left}', values | known)
+
+
+def _worst(
+    session: Session, active: Sequence[Alert], left: str, values: dict[str, object]
+) -> Status:
+    """Return the verdict while alerts are active: the most severe one speaks."""
+    follower, counsel = session.follower, session.counsel
+    first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
+    more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
+    do = counsel.do(first)
+    text = f'{session.faults.sentence(first, session.settings)}{more}; {left}; {do}'
+    own = {
+        **_named(first),
+        'do': do,
+        'acknowledged': all(map(follower.acknowledged, active)),
+    }
+    return Status(session.level, '', text, own | values)
+
+
+def _over(session: Session, alarm: Alarm, left: str, values: dict[str, object]) -> Status:
+    """Return the verdict while a failure that is over waits to be acknowledged or reset."""
+    latched = alarm.state is State.LATCHED
+    text = (
+        f'over now, {"latched until reset" if latched else "not acknowledged"}: '
+        f'{session.faults.sentence(alarm.alert, session.settings)}; {left}'
+    )
+    own = {**_named(alarm.alert), 'do': 'reset' if latched else 'acknowledge'}
+    return Status(max(session.level, WARN), '', text, own | values)
+
+
+def _named(alert: Alert) -> dict[str, object]:
+    rule = alert.rule
+    return {'code': rule.code, 'subject': rule.subject, 'class': suspect_of(rule.code)}
 
 
 def _severity(alert: Alert) -> tuple[int, bool]:
@@ -76,22 +107,38 @@ def _severity(alert: Alert) -> tuple[int, bool]:
     return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
 
 
-def alert_status(alert: Alert, state: str, settings: Settings, faults: Faults) -> Status:
-    """Return a change of an alert: `state` is raised, cleared, acknowledged or reset."""
-    rule = alert.rule
+def alert_status(change: Change, session: Session) -> Status:
+    """Return a change of an alert, ready to be published."""
+    alert, rule = change.alert, change.alert.rule
     values: dict[str, object] = {
-        'state': state,
+        'state': change.how,
         'code': rule.code,
         'subject': rule.subject,
         'level': LEVELS[rule.level],
         'start_ns': alert.start,
         'end_ns': '' if alert.end is None else alert.end,
         'peak': float(alert.peak),
-        'do': what_to_do(rule.code),
+        'do': session.counsel.do(alert),
+        'class': suspect_of(rule.code),
+        'alarm': change.state.value,
+        'offers': ','.join(_offers(change)),
+        'time_ns': change.time,
+        'who': change.who,
+        'note': change.note,
     }
-    level = OK if state in {'cleared', 'reset'} else rule.level
-    sentence = faults.sentence(alert, settings)
-    return Status(level, f'{rule.code} {rule.subject}', f'{state}: {sentence}', values)
+    level = OK if change.how in {'cleared', 'reset'} else rule.level
+    sentence = session.faults.sentence(alert, session.settings)
+    return Status(level, f'{rule.code} {rule.subject}', f'{change.how}: {sentence}', values)
+
+
+def _offers(change: Change) -> Iterator[str]:
+    """Yield what an operator may do about an alert now."""
+    if change.state.unseen:
+        yield 'acknowledge'
+    if change.state.active and change.alert.rule.level == WARN:
+        yield 'unshelve' if change.how == 'shelved' else 'shelve'
+    if change.state is State.LATCHED:
+        yield 'reset'
 
 
 def margin_statuses(
