@@ -30,16 +30,21 @@ SIMULATION = ['mujoco']
 CONSOLE = ['starlette', 'textual', 'uvicorn', 'websockets']
 PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
 TABLE = ['pyarrow']
+CLUSTER = ['dask', 'distributed', 'fsspec', 's3fs']
 TEST = [
     'catkin-pkg',
+    'flask',  # with flask-cors: the S3 server of moto
+    'flask-cors',
     'hypothesis',
     'jsonschema',
+    'moto[s3]',
     'pin',
     'pytest',
     'pytest-timeout',
     'pytest-xdist',
     'setuptools<80',
     'wheel',
+    *CLUSTER,
     *CONSOLE,
     *PDF,
     *SIMULATION,
@@ -115,6 +120,7 @@ setup(
         'fast': ['isal'],
         'pdf': PDF,
         'table': TABLE,
+        'cluster': CLUSTER,
         'test': TEST,
         'lint': LINT,
     },

@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / 'ugv_acceptance'
 MODULES = sorted(PACKAGE.rglob('*.py'))
 
 # What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
-BELOW_RUN = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'plan'}
+BELOW_RUN = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'plan', 'campaign'}
 BELOW_NODES = BELOW_RUN | {'run', 'console'}
 MAY_IMPORT: dict[str, set[str]] = {
     '__init__': set(),
@@ -24,6 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'config': {'model', 'evaluation'},
     'bag': {'model', 'evaluation'},
     'simulation': {'model'},
+    'campaign': {'model', 'evaluation', 'config', 'bag'},
     'report': {'model', 'evaluation'},
     'console': {'model', 'evaluation', 'bag', 'config'},
     'plan': {'model', 'evaluation', 'config', 'report'},
@@ -32,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'cli': BELOW_NODES | {'nodes'},
 }
 # Every start of the command loads every module of cli, so they import these inside a verb.
-HEAVY = {'rclpy', 'mujoco', 'matplotlib', 'starlette', 'textual', 'uvicorn'}
+HEAVY = {'distributed', 'rclpy', 'mujoco', 'matplotlib', 'starlette', 'textual', 'uvicorn'}
 
 # The layers that may import a foreign library.
 HOME_OF = {
@@ -43,6 +44,8 @@ HOME_OF = {
     'defusedxml': {'config'},
     'mcap': {'bag'},
     'rosbags': {'bag'},
+    'distributed': {'campaign'},
+    'fsspec': {'campaign'},
     'matplotlib': {'report'},
     'jinja2': {'report', 'plan'},
     'click': {'cli'},

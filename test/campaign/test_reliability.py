@@ -172,10 +172,10 @@ def test_the_power_of_fishers_test_is_how_often_it_rejects() -> None:
     """The sum over all tables of small groups is the power."""
     alpha, runs1, runs2, share1, share2 = 0.2, 9, 7, 0.5, 0.9
     power = sum(
-        float(stats.binom.pmf(a, runs1, share1) * stats.binom.pmf(b, runs2, share2))
+        float(stats.binom.pmf(a, runs1, share1)) * float(stats.binom.pmf(b, runs2, share2))
         for a in range(runs1 + 1)
         for b in range(runs2 + 1)
-        if stats.fisher_exact([[a, runs1 - a], [b, runs2 - b]]).pvalue < alpha
+        if stats.fisher_exact(np.array([[a, runs1 - a], [b, runs2 - b]])).pvalue < alpha
     )
     assert success_power(share1, share2, runs1, runs2, alpha) == pytest.approx(power)
 

@@ -17,6 +17,7 @@ VERBS = (
     'demo',
     'evaluate',
     'verify',
+    'campaign',
     'monitor',
     'console',
     'replay',

@@ -104,7 +104,7 @@ def compare_success(
     """
     (good1, runs1), (good2, runs2) = first, second
     bad1, bad2 = runs1 - good1, runs2 - good2
-    p = float(fisher_exact([[good1, bad1], [good2, bad2]]).pvalue)
+    p = float(fisher_exact(np.array([[good1, bad1], [good2, bad2]])).pvalue)
     ratio = (good2 * bad1) / (bad2 * good1) if bad2 and good1 else None
     failing = bad1 / runs1 if runs1 else 0.0
     power = success_power(1.0 - failing, 1.0 - assumed * failing, runs1, runs2, 1.0 - confidence)

@@ -1,0 +1,1 @@
+"""Many recorded runs to one statement of reliability."""

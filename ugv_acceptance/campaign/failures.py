@@ -1,0 +1,158 @@
+"""Failures of a campaign: from the alerts of its runs, and from a log that a person writes.
+
+Class, impact and repairability are those of Carlson and Murphy's taxonomy. An alert shows an
+effect, so what it says of the class is a suspicion; an entry of the log replaces it.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from ugv_acceptance.campaign.failure_log import (
+    FIELD,
+    NON_TERMINAL,
+    TERMINAL,
+    UNKNOWN,
+    Entry,
+)
+from ugv_acceptance.evaluation.taxonomy import FIRST_SUSPECT, FailureSource
+
+Json = dict[str, Any]
+
+# Levels at which an alert counts as a failure; a warning does not.
+CRITICAL = frozenset({'ERROR', 'STALE'})
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A failure in a run: when (s since its start), what, and what taxonomy says of it.
+
+    `times` is how often the alert came in this run: one cause, one failure. `origin` is alert, log,
+    or both. Only `chargeable` failures count.
+    """
+
+    run: str
+    at_s: float
+    what: str
+    source: str
+    impact: str
+    repairability: str
+    origin: str
+    alert: str | None = None
+    subject: str | None = None
+    times: int = 1
+    repair_h: float | None = None
+    chargeable: bool = True
+
+    @property
+    def path(self) -> str:
+        """Where it is in the taxonomy, such as "physical / effector"."""
+        return FailureSource(self.source).path if self.source != UNKNOWN else UNKNOWN
+
+    def json(self) -> Json:
+        """Return it for JSON."""
+        return {**asdict(self), 'class': self.path}
+
+
+def from_alerts(run: str, result: Json) -> list[Failure]:
+    """Return the failures that a run's critical alerts show: one a code and subject.
+
+    One that is still active at the end is terminal. One that went away without leaving the run
+    was repaired, or went by itself, in the field; of others nothing is known.
+    """
+    groups: dict[tuple[str, str], list[Json]] = {}
+    for alert in result['alerts']:
+        if alert['level'] in CRITICAL:
+            groups.setdefault((alert['code'], alert['subject']), []).append(alert)
+    return [_from_group(run, code, subject, group) for (code, subject), group in groups.items()]
+
+
+def _from_group(run: str, code: str, subject: str, group: Sequence[Json]) -> Failure:
+    lasting = any(alert['end_s'] is None for alert in group)
+    suspect = FIRST_SUSPECT.get(code)
+    return Failure(
+        run,
+        min(alert['start_s'] for alert in group),
+        group[0]['message'],
+        suspect.value if suspect else UNKNOWN,
+        TERMINAL if lasting else NON_TERMINAL,
+        UNKNOWN if lasting else FIELD,
+        'alert',
+        code,
+        subject,
+        len(group),
+    )
+
+
+def with_log(
+    failures: Sequence[Failure], entries: Sequence[Entry], runs: Sequence[str]
+) -> list[Failure]:
+    """Return failures with those of a log; an entry that names an alert tells more of it.
+
+    BadConfig where an entry's run is not one of `runs`, or its alert did not come in that run.
+    """
+    merged = list(failures)
+    for entry in entries:
+        run = entry.run_of(runs)
+        told = [
+            k for k, f in enumerate(merged) if f.run == run and entry.explains(f.alert, f.subject)
+        ]
+        if entry.alert is None:
+            merged.append(_from_entry(run, entry))
+        elif not told:
+            raise entry.wrong('alert', f'a critical alert of this run, got {entry.alert}')
+        else:
+            # Several subjects of one alert are then one failure: a person said so.
+            merged[told[0]] = _told(merged[told[0]], entry)
+            merged = [f for k, f in enumerate(merged) if k not in told[1:]]
+    return sorted(merged, key=lambda f: (f.run, f.at_s, f.alert or '', f.subject or '', f.what))
+
+
+def _from_entry(run: str, entry: Entry) -> Failure:
+    return Failure(
+        run,
+        entry.at_s or 0.0,
+        entry.what,
+        entry.source,
+        entry.impact,
+        entry.repairability,
+        'log',
+        repair_h=entry.repair_h,
+        chargeable=entry.chargeable,
+    )
+
+
+def _told(failure: Failure, entry: Entry) -> Failure:
+    """Return an alert's failure with what the log says of it; what it leaves out stays."""
+    said = {
+        'source': entry.source,
+        'impact': entry.impact,
+        'repairability': entry.repairability,
+    }
+    changes: Mapping[str, Any] = {k: v for k, v in said.items() if v != UNKNOWN}
+    return replace(
+        failure,
+        **changes,
+        what=entry.what or failure.what,
+        at_s=failure.at_s if entry.at_s is None else entry.at_s,
+        origin='alert and log',
+        repair_h=entry.repair_h,
+        chargeable=entry.chargeable,
+    )
+
+
+def counts(failures: Sequence[Failure]) -> Json:
+    """Return how many chargeable failures there are by class, impact and repairability."""
+    counted = [f for f in failures if f.chargeable]
+    keys = {
+        'class': [f.path for f in counted],
+        'impact': [f.impact for f in counted],
+        'repairability': [f.repairability for f in counted],
+        'origin': [f.origin for f in counted],
+    }
+    return {name: dict(_counted(values)) for name, values in keys.items()}
+
+
+def _counted(values: Sequence[str]) -> Iterator[tuple[str, int]]:
+    for value in sorted(set(values)):
+        yield value, values.count(value)

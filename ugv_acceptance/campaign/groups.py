@@ -1,0 +1,71 @@
+"""Two groups of a campaign's runs - two robots, two firmware versions - beside each other."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from fnmatch import fnmatchcase
+from typing import Any
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.campaign.failures import Failure
+from ugv_acceptance.campaign.rows import Row
+from ugv_acceptance.model.two_groups import Compared, compare_mtbf, compare_success
+
+Json = dict[str, Any]
+
+
+def comparison(
+    rows: Sequence[Row],
+    failures: Sequence[Failure],
+    groups: Sequence[tuple[str, str]],
+    confidence: float,
+) -> Json | None:
+    """Return MTBFs and successes of two groups (name, pattern), with tests and their power.
+
+    None without groups. AcceptanceError where a group has no run or no judged time, or a run is in
+    both.
+    """
+    if not groups:
+        return None
+    members = [[r for r in rows if fnmatchcase(r.name, pattern)] for _, pattern in groups]
+    _check(groups, members)
+    charged = [f.run for f in failures if f.chargeable]
+    sides = [_side(name, runs, charged) for (name, _), runs in zip(groups, members, strict=True)]
+    first, second = sides
+    rates = compare_mtbf(
+        (first['hours'], first['failures']), (second['hours'], second['failures']), confidence
+    )
+    shares = compare_success(
+        (first['passed'], first['runs']), (second['passed'], second['runs']), confidence
+    )
+    return {'groups': sides, 'mtbf': _json(rates), 'success': _json(shares)}
+
+
+def _side(name: str, runs: Sequence[Row], charged: Sequence[str]) -> Json:
+    names = {run.name for run in runs}
+    return {
+        'name': name,
+        'runs': len(runs),
+        'passed': sum(run.verdict == 'PASS' for run in runs),
+        'hours': sum(run.judged_s for run in runs) / 3600.0,
+        'failures': sum(run in names for run in charged),
+    }
+
+
+def _check(groups: Sequence[tuple[str, str]], members: Sequence[Sequence[Row]]) -> None:
+    if len(groups) != 2:
+        raise AcceptanceError(f'--compare: expected two groups, got {len(groups)}')
+    for (name, pattern), runs in zip(groups, members, strict=True):
+        if sum(run.judged_s for run in runs) <= 0.0:
+            raise AcceptanceError(
+                f'--compare {name}={pattern}: expected runs with judged time, got {len(runs)} runs'
+            )
+    both = {run.name for run in members[0]} & {run.name for run in members[1]}
+    if both:
+        raise AcceptanceError(f'--compare: expected each run in one group, {min(both)} is in both')
+
+
+def _json(found: Compared) -> Json:
+    return {
+        k: None if v is not None and not math.isfinite(v) else v for k, v in asdict(found).items()
+    }

@@ -1,0 +1,152 @@
+"""Where the runs of a campaign are: folders, files and URLs, sorted into recordings.
+
+A rosbag2 folder is one recording; elsewhere files of one folder that differ only in their number
+are. URLs are those fsspec knows (file, s3, gs, sftp, http, ...): it is imported for them only.
+"""
+
+import os
+import posixpath
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ugv_acceptance import AcceptanceError, BadBag
+
+METADATA = 'metadata.yaml'
+SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Source:
+    """One recording: its name (path or URL as found), its files, and whether fsspec fetches them.
+
+    Of a rosbag2 folder, metadata.yaml is among the files.
+    """
+
+    name: str
+    files: tuple[str, ...]
+    remote: bool = False
+
+
+def is_url(place: str) -> bool:
+    """Return whether a place is a URL, not a path."""
+    return '://' in place
+
+
+def find_sources(places: Iterable[str]) -> list[Source]:
+    """Return the recordings in folders, files and URLs, each once, by name.
+
+    AcceptanceError where a place does not exist, cannot be listed, or holds no recording.
+    """
+    found: set[Source] = set()
+    for place in places:
+        files = _remote_files(place) if is_url(place) else _local_files(place)
+        sources = sorted_out(files, remote=is_url(place))
+        if not sources:
+            raise AcceptanceError(
+                f'{place}: expected recordings ({", ".join(SUFFIXES)}), found none'
+            )
+        found.update(sources)
+    return sorted(found)
+
+
+def sorted_out(files: Sequence[str], *, remote: bool = False) -> list[Source]:
+    """Return the recordings that files make up; what is no recording is left out."""
+    folders: dict[str, list[str]] = {}
+    for file in sorted(files):
+        folders.setdefault(posixpath.dirname(file), []).append(file)
+    sources = []
+    for folder, members in folders.items():
+        parts = [file for file in members if file.lower().endswith(SUFFIXES)]
+        if parts and f'{folder}/{METADATA}' in members:
+            sources.append(Source(folder, (*parts, f'{folder}/{METADATA}'), remote))
+        else:
+            sources += [Source(run[0], tuple(run), remote) for run in _numbered(parts)]
+    return sources
+
+
+def _numbered(files: Sequence[str]) -> list[list[str]]:
+    """Return files grouped: those that differ only in _NUMBER are the parts of one recording."""
+    groups: dict[str, list[tuple[int, str]]] = {}
+    for file in files:
+        stem, _, number = posixpath.basename(file).partition('.')[0].rpartition('_')
+        split = bool(stem) and number.isdigit()
+        groups.setdefault(stem + '/' if split else file, []).append(
+            (int(number) if split else 0, file)
+        )
+    return [[file for _, file in sorted(group)] for group in groups.values()]
+
+
+def _local_files(place: str) -> list[str]:
+    if Path(place).is_file():
+        return [place]
+    if not Path(place).is_dir():
+        raise AcceptanceError(f'{place}: expected a folder, a file or a URL, found nothing there')
+    return [
+        posixpath.join(folder, name)
+        for folder, _, names in os.walk(place)
+        for name in sorted(names)
+    ]
+
+
+def _remote_files(url: str) -> list[str]:
+    system, path = _opened(url)
+    try:
+        listed = [path] if system.isfile(path) else system.find(path)
+    except Exception as error:  # noqa: BLE001 - every protocol has its own errors
+        raise AcceptanceError(f'{url}: cannot be listed ({_words(error)})') from None
+    return [str(system.unstrip_protocol(file)) for file in listed]
+
+
+def _opened(url: str) -> tuple[Any, str]:
+    """Return the file system of a URL and the path in it."""
+    try:
+        import fsspec  # noqa: PLC0415 - an extra
+
+        system, path = fsspec.core.url_to_fs(url)
+    except ImportError as error:
+        name = error.name or 'fsspec'
+        raise AcceptanceError(
+            f"{url}: expected {name} for this URL (pip install 'ugv_acceptance[cluster]')"
+        ) from None
+    except Exception as error:  # noqa: BLE001 - every protocol has its own errors
+        raise AcceptanceError(
+            f'{url}: expected a URL that fsspec knows ({_words(error)})'
+        ) from None
+    return system, path
+
+
+@contextmanager
+def local_paths(source: Source) -> Iterator[Path | list[Path]]:
+    """Give what `open_bag` takes; remote files are copied into a folder that goes afterwards."""
+    if not source.remote:
+        yield _openable(source, [Path(file) for file in source.files])
+        return
+    with tempfile.TemporaryDirectory(prefix='campaign-') as folder:
+        yield _openable(source, _copied(source, Path(folder)))
+
+
+def _copied(source: Source, folder: Path) -> list[Path]:
+    run = folder / posixpath.basename(source.name)
+    run.mkdir()
+    copies = []
+    for url in source.files:
+        system, path = _opened(url)
+        copy = run / posixpath.basename(url)
+        try:
+            system.get_file(path, str(copy))
+        except Exception as error:  # noqa: BLE001 - every protocol has its own errors
+            raise BadBag(f'{url}: cannot be read ({_words(error)})') from None
+        copies.append(copy)
+    return copies
+
+
+def _openable(source: Source, files: list[Path]) -> Path | list[Path]:
+    return files[0].parent if source.files[-1].endswith(f'/{METADATA}') else files
+
+
+def _words(error: Exception) -> str:
+    return ' '.join(str(error).split())[:200] or type(error).__name__

@@ -1,0 +1,47 @@
+"""The folder of a campaign: results of runs by the hash of all they depend on, for resuming."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.bag.result import unwritable, write_json
+
+Json = dict[str, Any]
+
+RUNS = 'runs'
+# Hexadecimal digits of a key.
+_KEY = 64
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder. AcceptanceError where that cannot be."""
+    try:
+        (folder / RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error.strerror) from None
+
+
+def known_keys(folder: Path) -> frozenset[str]:
+    """Return the keys of the results that are there."""
+    return frozenset(p.stem for p in (folder / RUNS).glob('*.json') if len(p.stem) == _KEY)
+
+
+def keep(folder: Path, key: str, result: Json) -> None:
+    """Write a run's result, whole or not at all."""
+    write_json(folder / RUNS / f'{key}.json', result)
+
+
+def read(folder: Path, key: str) -> Json:
+    """Return a run's result. AcceptanceError where it is not what was written."""
+    path = folder / RUNS / f'{key}.json'
+    try:
+        result = json.loads(path.read_text('utf-8'))
+        if not all(field in result for field in ('verdict', 'coverage', 'alerts', 'start_ns')):
+            raise AcceptanceError(f'{path}: expected a result of a run; remove it')
+    except (OSError, ValueError, TypeError) as error:
+        raise AcceptanceError(
+            f'{path}: expected a result of a run, got: {error}; remove it'
+        ) from None
+    found: Json = result
+    return found

@@ -1,0 +1,136 @@
+"""A campaign as a person reads it: runs, hours, failures, MTBF, what is still to run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from ugv_acceptance.campaign.run import Effort
+
+Json = dict[str, Any]
+
+VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', 'BROKEN')
+MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
+_MOST_BROKEN = 8
+
+
+def print_campaign(said: Json, out: Path, console: Console | None = None) -> None:
+    """Print the statement of a campaign."""
+    console = console or Console(highlight=False)
+    table = Table(box=None, pad_edge=False, padding=(0, 2), show_header=False)
+    for what, text in lines(said):
+        table.add_row(escape(what), escape(text))
+    console.print(table)
+    broken = [run for run in said['each_run'] if run['verdict'] == 'BROKEN']
+    for run in broken[:_MOST_BROKEN]:
+        console.print(
+            f'    BROKEN {escape(run["name"])}: {escape(run["reasons"][0])}', soft_wrap=True
+        )
+    if len(broken) > _MOST_BROKEN:
+        console.print(f'    and {len(broken) - _MOST_BROKEN} more that could not be read')
+    console.print(f'    {escape(str(out / "campaign.json"))}, campaign.html', soft_wrap=True)
+
+
+def lines(said: Json) -> list[tuple[str, str]]:
+    """Return the statement as pairs of what and how much."""
+    runs, share = said['runs'], f'{said["confidence"]:.0%}'
+    hours, failed, success = said['hours'], said['failures'], said['success']
+    verdicts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS)
+    found = [
+        ('runs', f'{runs["total"]}: {verdicts}; {runs["copies"]} copies counted once'),
+        ('hours', f'{hours["judged"]:.3f} judged of {hours["recorded"]:.3f} recorded'),
+        (
+            'failures',
+            f'{failed["chargeable"]} chargeable'
+            + ''.join(f'; {count} {name}' for name, count in failed['class'].items()),
+        ),
+        ('MTBF', mtbf_text(said['mtbf_h'], share)),
+        ('success', f'{interval_percent(success)} at {share} (what is unclear is no success)'),
+        ('trend', trend_text(said['trend'])),
+    ]
+    if said['availability']['repairs_known']:
+        found.append(('availability', f'{interval_percent(said["availability"])} at {share}'))
+    if said['endurance']:
+        found.append(('longest run', endurance_text(said['endurance'], share)))
+    if said['requirement']:
+        found.append(('requirement', requirement_text(said['requirement'], share)))
+    if said['comparison']:
+        found += comparison_lines(said['comparison'])
+    return found
+
+
+def mtbf_text(found: Json, share: str) -> str:
+    """Return an MTBF with its bounds."""
+    value = 'no failure' if found['value'] is None else f'{found["value"]:.4g} h'
+    high = 'no upper bound' if found['high'] is None else f'{found["high"]:.4g} h'
+    return (
+        f'{value}, {share} interval {found["low"]:.4g} h to {high};'
+        f' at least {found["demonstrated"]:.4g} h at {share}'
+    )
+
+
+def interval_percent(found: Json) -> str:
+    """Return a share with its bounds."""
+    value = 'unknown' if found['value'] is None else f'{found["value"]:.1%}'
+    return f'{value}, {found["low"]:.1%} to {found["high"]:.1%}'
+
+
+def trend_text(found: Json) -> str:
+    """Return whether failures grow rarer."""
+    law = found['power_law']
+    if law is None:
+        return 'fewer than 3 failures: no trend'
+    word = 'constant rate plausible' if found['constant_rate_plausible'] else 'rate NOT constant'
+    return (
+        f'growth slope {law["beta"]:.2f} ({law["low"]:.2f} to {law["high"]:.2f}),'
+        f' Laplace {law["laplace"]:+.2f} (p {law["laplace_p"]:.2f}): {word}'
+    )
+
+
+def endurance_text(found: Json, share: str) -> str:
+    """Return what the longest run shows by itself."""
+    return (
+        f'{found["hours"]:.3f} h with {found["failures"]} failures alone shows MTBF'
+        f' >= {found["demonstrated_h"]:.3g} h at {share}'
+    )
+
+
+def requirement_text(found: Json, share: str) -> str:
+    """Return whether an MTBF is shown, and what is missing."""
+    start = f'{MARKS[found["verdict"]]} MTBF {found["mtbf_h"]:g} h at {share}'
+    words = {'PASS': 'demonstrated', 'FAIL': 'excluded', 'INCONCLUSIVE': 'not demonstrated'}
+    text = f'{start}: {words[found["verdict"]]}'
+    if found['verdict'] == 'PASS':
+        return text
+    return (
+        f'{text}; {found["still_to_run_h"]:.1f} h still to run without another failure,'
+        f' {found["still_to_run_after_one_more_failure_h"]:.1f} h with one more'
+    )
+
+
+def comparison_lines(found: Json) -> list[tuple[str, str]]:
+    """Return two groups beside each other."""
+    sides = ' against '.join(
+        f'{g["name"]} {g["failures"]} failures in {g["hours"]:.3f} h, {g["passed"]} of {g["runs"]}'
+        ' passed'
+        for g in found['groups']
+    )
+    rows = [('comparison', sides)]
+    for name, key in (('MTBF ratio', 'mtbf'), ('success', 'success')):
+        test = found[key]
+        ratio = 'unknown' if test['ratio'] is None else f'{test["ratio"]:.3g}'
+        rows.append((f'  {name}', f'ratio {ratio}, p {test["p"]:.3f}; power {test["power"]:.0%}'))
+    return rows
+
+
+def print_effort(effort: 'Effort', runs: int, seconds: float) -> None:
+    """Print how fast the runs were judged, and how many were found judged."""
+    rate = 3600.0 / max(seconds, 1e-9)
+    Console(highlight=False).print(
+        f'    {effort.judged} of {runs} judged anew in {seconds:.1f} s:'
+        f' {effort.judged * rate:.0f} bags/h, {effort.size / 1e9 * rate:.2f} GB/h',
+        soft_wrap=True,
+    )
