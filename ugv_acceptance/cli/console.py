@@ -65,12 +65,9 @@ def console(
         with live_feed(loaded, ros) as feed:
             show(feed)
         return
-    from ugv_acceptance.bag.reader import choose_topics, open_bag
-    from ugv_acceptance.console.recording import RecordingFeed, judge_for_console
+    from ugv_acceptance.cli.watch import recording_feed
 
-    opened, names = open_bag(bag), loaded.topics
-    topics = choose_topics(opened, names.joint_states.name, names.imu.name, names.payload.name)
-    show(RecordingFeed(judge_for_console(opened, topics, loaded.settings)))
+    show(recording_feed(bag, loaded))
 
 
 def _announce(address: str, token: str | None) -> None:

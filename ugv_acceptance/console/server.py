@@ -74,7 +74,6 @@ async def _listen(hub: Hub, client: Client, websocket: WebSocket) -> None:
         hub.ask(client, text)
 
 
-
 def serve(
     hub: Hub,
     host: str = '127.0.0.1',

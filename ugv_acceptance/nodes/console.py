@@ -213,7 +213,10 @@ class ConsoleNode(Node):
         if arriving and self.margins.silent(now, MARGIN_SILENCE):
             return 'the monitor is silent although its inputs arrive'
         level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
-        return self.verdict.message if level == STALE or margins is None else ''
+        silent = level == STALE or margins is None
+        # An alert says better what is missing, and what to do.
+        told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
+        return self.verdict.message if silent and not told else ''
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)

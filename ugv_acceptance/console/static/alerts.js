@@ -12,7 +12,7 @@ export class Alerts {
   }
 
   describe(hello) {
-    $('who').hidden = hello.source !== 'live';
+    this.live = hello.source === 'live';
   }
 
   send(deed, key) {
@@ -32,6 +32,7 @@ export class Alerts {
     text($('alert-count'), frame.alerts.length ? `(${frame.alerts.length}${hidden > 0 ? `, +${hidden} more` : ''})` : '');
     const open = frame.alerts.some((a) => a.unseen);
     $('acknowledge-all').disabled = !open;
+    $('who').hidden = !this.live || (!open && !$('who').contains(document.activeElement));
   }
 
   make(alert) {

@@ -43,7 +43,7 @@ export function showTilt(frame, hello) {
   }
   const a = frame.attitude;
   const lean = (value, plus, minus) => `${fixed(Math.abs(value))}° ${value >= 0 ? plus : minus}`;
-  text($('attitude'), a ? `slope ${fixed(a.slope_deg)}°: ${lean(a.pitch_deg, 'nose down', 'nose up')}, ${lean(a.roll_deg, 'right side down', 'left side down')}` : 'attitude not known');
+  text($('attitude'), !a ? 'attitude not known' : a.slope_deg < 1 ? `level: slope ${fixed(a.slope_deg)}°` : `slope ${fixed(a.slope_deg)}°: ${lean(a.pitch_deg, 'nose down', 'nose up')}, ${lean(a.roll_deg, 'right side down', 'left side down')}`);
 }
 
 export function showTorques(frame, hello) {

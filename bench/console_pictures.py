@@ -1,0 +1,67 @@
+"""Pictures of the console in four states, wide and on a phone: `python bench/console_pictures.py`.
+
+A real monitor watches a driver that stands still, stretches its arm and falls silent; a real
+Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small enough to be kept.
+"""
+
+import io
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / 'test'))
+
+from console.browser import Page, chromium  # noqa: E402 - the tests' helpers
+from console.servers import Live, live_console  # noqa: E402 - the same
+
+OUT = ROOT / 'docs' / 'images'
+SCREENS = {'wide': (1280, 860, False), 'phone': (360, 740, True)}
+# Turret, shoulder, elbow, flippers (rad), and roll.
+POSTURES = {
+    'ok': (0.0, 2.0, -2.5, 2.0, 0.0),
+    'warning': (-1.57, 1.3, -1.9, 2.0, 0.2),
+    'critical': (-1.57, 1.2, -1.6, 2.0, 0.2),
+}
+LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE'}
+COLOURS = 96
+
+
+def main() -> None:
+    """Take all pictures."""
+    OUT.mkdir(exist_ok=True)
+    with live_console() as robot, chromium() as browser, browser.page() as page:
+        page.open(robot.url)
+        for state, level in LEVELS.items():
+            bring(robot, page, state, level)
+            for screen, (width, height, touch) in SCREENS.items():
+                page.resize(width, height, touch=touch)
+                page.run('scrollTo(0, 0); new Promise(done => setTimeout(done, 700))')
+                save(page.picture(), OUT / f'console_{state}_{screen}.png')
+
+
+def bring(robot: Live, page: Page, state: str, level: str) -> None:
+    """Bring the robot into a state and wait until the page shows it."""
+    if state == 'no_data':
+        robot.say('silent')
+    else:
+        robot.pose(*POSTURES['ok'][:4], roll=0.0)
+        page.wait('!!window.console_page?.frame && console_page.frame.level !== "STALE"')
+        page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
+        page.wait('console_page.frame.level === "OK"')
+        *q, roll = POSTURES[state]
+        robot.pose(*q, roll=roll)
+    page.wait(f'document.body.dataset.level === "{level}"')
+
+
+def save(png: bytes, path: Path) -> None:
+    """Write a picture with few colours."""
+    with Image.open(io.BytesIO(png)) as picture:
+        few = picture.convert('RGB').quantize(COLOURS, dither=Image.Dither.NONE)
+        few.save(path, optimize=True)
+    print(f'{path.relative_to(ROOT)}  {path.stat().st_size / 1024:.0f} kB')
+
+
+if __name__ == '__main__':
+    main()
