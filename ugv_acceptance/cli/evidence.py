@@ -62,6 +62,7 @@ def judge_files(
     paths: list[Path], config: 'Config', papers: Papers, *, compare_effort: bool = False
 ) -> tuple[Json, 'StripRecorder | None']:
     """Return the result of one recording, and its strips where a report is asked for."""
+    from ugv_acceptance.bag.acknowledgements import add_acknowledgements
     from ugv_acceptance.bag.judge import Terms, judge
     from ugv_acceptance.bag.reader import choose_topics, open_bag
     from ugv_acceptance.bag.result import CsvSink
@@ -91,6 +92,7 @@ def judge_files(
         takers = [*sinks, *csv.sinks, *parquet.sinks]
         result = judge(bag, topics, settings, takers, progress, terms).result
     complete(result, bag, config)
+    add_acknowledgements(result, bag)
     if compare_effort:
         result['effort'] = effort.result(bag.start_ns)
     return result, recorder if papers.paged else None
