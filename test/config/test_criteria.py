@@ -118,6 +118,7 @@ def test_what_is_common_to_all_is_read(tmp_path: Path) -> None:
 REFUSED = [
     ('value: torqe, below: 1', 'value: expected a known name, got "torqe"; did you mean torque?'),
     ('value: torque, of: shouldr_joint, below: 1', 'of: .* did you mean shoulder_joint'),
+    ('value: torque_margin, of: turret_joint, above: 1', 'turret_joint has none'),
     ('value: torque, below: 1, above: 2', 'expected one of below and above, got 2'),
     ('value: torque', 'expected one of below and above, got 0'),
     (

@@ -191,6 +191,7 @@ def _value(reading: _Reading, section: CriterionSection) -> Demand:
     subjects = subjects_of(kind, reading.settings)
     default = 'robot' if kind.subjects == 'robot' else ANY
     of = reading.known('of', section.of or default, (*subjects, ANY))
+    _check_judged(reading, signal, of)
     sides = [side for side in ('below', 'above') if getattr(section, side) is not None]
     if len(sides) != 1:
         raise reading.refuse('', f'expected one of below and above, got {len(sides)} of them')
@@ -206,6 +207,15 @@ def _value(reading: _Reading, section: CriterionSection) -> Demand:
         section.share_in_violation,
         section.dwell,
     )
+
+
+def _check_judged(reading: _Reading, signal: str, of: str) -> None:
+    """Refuse a share of a torque limit that the configuration does not give."""
+    limits = dict(
+        zip(reading.settings.robot.joint_names, reading.settings.limits.torque, strict=True)
+    )
+    if signal in ('torque_utilisation', 'torque_margin') and not limits.get(of, 0.0) < math.inf:
+        raise reading.refuse('of', f'expected a joint with a torque limit, {of} has none')
 
 
 def _limit_of(reading: _Reading, side: str, given: Given, signal: str, of: str) -> float:
