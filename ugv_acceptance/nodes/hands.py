@@ -18,7 +18,7 @@ from ugv_acceptance.plan.plan import Step
 SIM, ROBOT, OPERATOR = 'sim', 'robot', 'operator'
 SIMULATOR = 'packbot_simulator'
 # Peak rate (rad/s) at which the simulated ground tilts; seconds to come to rest after it.
-TILT_RATE, REST = 0.35, 1.0
+TILT_RATE, REST = 0.6, 0.8
 # Seconds between two drive commands.
 DRIVE_PERIOD = 0.1
 

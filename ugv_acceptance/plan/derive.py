@@ -27,6 +27,8 @@ TILT_INSIDE, TILT_BEYOND, TILT_OVER = (6.0, 9.0), (1.0, 4.0), (-8.0, -2.5)
 
 # Speed (deg/s) of a demonstration: just below the rate to which the static model holds.
 QUICK = 35.0
+# And of a motion that ends in a tip-over, in simulation.
+TIPPING = 50.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +259,8 @@ def _few(steps: Sequence[Step], home: Posture) -> list[Step]:
         if of:
             nearest = min(of, key=lambda s: (not s.alerts.must, distance(home, s.posture_deg)))
             sweeps = nearest.action == 'sweep'
-            found.append(nearest if sweeps else nearest.model_copy(update=quick))
+            speed = {'speed_degps': TIPPING} if nearest.action == 'tip' else {}
+            found.append(nearest if sweeps else nearest.model_copy(update=quick | speed))
     return found
 
 

@@ -22,8 +22,6 @@ from ugv_acceptance.simulation.vehicle import Build
 
 # Simulated seconds held in memory at a time.
 STRETCH = 5.0
-# Time constant (s) of contacts: rubber; harder ones rattle, which the accelerometer feels.
-CONTACT_TIME = 0.02
 # A motor that gives all it has for this long (s) is saturated; shorter is a jolt.
 SATURATED_FOR = 0.1
 TOPICS = (
@@ -50,12 +48,7 @@ class Outcome:
 def build_of(config: Config) -> Build:
     """Return how the simulated robot is built: its IMU where the configuration says it is."""
     imu = config.settings.imu
-    return replace(
-        BUILD,
-        imu_position=imu.position,
-        imu_rotation=imu.mounting,
-        contact_time=CONTACT_TIME,
-    )
+    return replace(BUILD, imu_position=imu.position, imu_rotation=imu.mounting)
 
 
 def play(config: Config, case: Case, seed: int, length: float = STRETCH) -> Iterator[Recording]:

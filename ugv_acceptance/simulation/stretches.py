@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+import mujoco
 import numpy as np
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recording, Scenario, Truth
@@ -14,6 +15,15 @@ from ugv_acceptance.simulation.vehicle import Build
 
 # Share of a motor's limit from which it gives all it has.
 _ALL = 1.0 - 1e-9
+# Warnings of MuJoCo after which it starts from its first state again.
+_UNSTABLE = tuple(
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+)
 
 
 @dataclass(slots=True)
@@ -35,7 +45,8 @@ def stretches(
     """Yield the run of `scenario` in stretches of `length` (s); the same seed gives the same bits.
 
     Payloads are those from the stretch's start on; stamps count from the run's start. Raises
-    BadConfig where the scenario and the robot do not fit.
+    BadConfig where the scenario and the robot do not fit, AcceptanceError where the simulation
+    becomes unstable.
     """
     stride = stride_of(scenario, build)
     simulation = Simulation(robot, scenario.start, scenario.slope, scenario.payload, build)
@@ -60,8 +71,17 @@ def stretches(
             rows.joints.append((now, *simulation.joints()))
             rows.base.append((*simulation.base(), simulation.slope()[0]))
         if count == last or len(rows.imu) >= block:
+            _check_stable(scenario, simulation)
             yield _recording(scenario, sensors, rows, loads, (limit, upright))
             rows, loads = Rows(), [(now + tick, loads[-1][1])]
+
+
+def _check_stable(scenario: Scenario, simulation: Simulation) -> None:
+    """Raise AcceptanceError where MuJoCo gave up and began anew: what follows means nothing."""
+    if any(simulation.data.warning[kind].number for kind in _UNSTABLE):
+        raise AcceptanceError(
+            f'{scenario.name}: the simulation became unstable before {simulation.time:.1f} s'
+        )
 
 
 def _recording(
