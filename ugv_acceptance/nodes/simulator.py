@@ -28,7 +28,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.config import load
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import run
@@ -65,15 +65,8 @@ class Simulator(Node):
         )
         self._tick = 1.0 / rates[1]
         self._count = 0
-        stowed = dict(STOWED)
-        names = robot.joint_names
-        unset = Parameter('home', value=[stowed.get(n, 0.0) for n in names])
-        home = list(self.get_parameter_or('home', unset).value)
-        if len(home) != len(robot.joint_names):
-            raise BadConfig(f'home: expected {len(robot.joint_names)} positions, got {len(home)}')
-        start = tuple(zip(robot.joint_names, home, strict=True))
         self.remote = RemoteRobot(
-            weakened(robot, faults), build_of(config), start, overload(faults)
+            weakened(robot, faults), build_of(config), self._home(robot), overload(faults)
         )
         self._corruption = Corruption(faults, robot.joint_names)
         self._rng = np.random.default_rng(seed)
@@ -94,6 +87,15 @@ class Simulator(Node):
         self._subscribe()
         self._began = 0.0
         self._next_clock = 0.0
+
+    def _home(self, robot: Robot) -> tuple[tuple[str, float], ...]:
+        """Return the posture at the start: stowed, unless the parameter says another."""
+        names, stowed = robot.joint_names, dict(STOWED)
+        unset = Parameter('home', value=[stowed.get(n, 0.0) for n in names])
+        home = list(self.get_parameter_or('home', unset).value)
+        if len(home) != len(names):
+            raise BadConfig(f'home: expected {len(names)} positions, got {len(home)}')
+        return tuple(zip(names, home, strict=True))
 
     def _declare(self) -> None:
         declare = self.declare_parameter
