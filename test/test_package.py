@@ -19,7 +19,8 @@ DATA_FOLDERS = ['msg_configs', 'urdf', 'launch', 'bags']
 
 # A requirement's rosdep key is python3-<its name>, except:
 ROSDEP_KEY = {'pyyaml': 'python3-yaml', 'rosbags': 'python3-rosbags-pip'}
-WITHOUT_ROSDEP_KEY = {'mcap'}
+# lz4 and zstandard come with mcap, which has no key.
+WITHOUT_ROSDEP_KEY = {'mcap', 'lz4', 'zstandard'}
 
 # Nobody else's machine has these. Written in two halves, so that this file does not name them.
 NOT_OURS = [

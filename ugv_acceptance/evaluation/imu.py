@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from ugv_acceptance.model.attitude import (
     up_from_orientation,
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
+from ugv_acceptance.model.rows import Values
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -205,13 +205,8 @@ class ImuTracker:
 
 
 def _orientation_tells(
-    x: Any,
-    y: Any,
-    z: Any,
-    w: Any,
-    covariance_0: Any,
-    attitude: str,  # noqa: ANN401 - floats or arrays
-) -> Any:  # noqa: ANN401
+    x: Values, y: Values, z: Values, w: Values, covariance_0: Values, attitude: str
+) -> Values:
     """Return whether a quaternion is claimed, is a rotation, and is not just a default identity."""
     size = x * x + y * y + z * z + w * w
     told = (abs(size - 1.0) <= 2.0 * NORM_SLACK) & (covariance_0 != -1.0)
@@ -237,7 +232,7 @@ def _norms(v: Floats) -> Floats:
     return size
 
 
-def _force(smooth: Any, omega: Any, imu: ImuInput) -> Any:  # noqa: ANN401 - floats or arrays
+def _force(smooth: Values, omega: Values, imu: ImuInput) -> Values:
     """Return minus the specific force at base_link's origin (m/s2, base axes)."""
     force = rotate(imu.mounting, smooth)
     spin = rotate(imu.mounting, omega)
