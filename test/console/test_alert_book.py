@@ -1,21 +1,15 @@
 """The console's list of alerts against what the monitor publishes."""
 
-from typing import Any
-
-import pytest
-
 from ugv_acceptance.console.alert_book import AlertBook
 from ugv_acceptance.console.snapshot import AlertRow
 from ugv_acceptance.evaluation.alerts import ERROR
 
 
-def say(
-    book: AlertBook, state: str, level: str = 'ERROR', code: str = 'TIP_OVER', **more: str
-) -> None:
+def say(book: AlertBook, how: str, alarm: str, offers: str = '', **more: str) -> None:
     """Let the monitor publish a change."""
-    values = {'state': state, 'code': code, 'subject': 'left', 'level': level, 'do': 'stop'}
-    end = '9' if state == 'cleared' else ''
-    book.take(values | {'start_ns': '5', 'end_ns': end} | more, f'{state}: it tips')
+    values = {'state': how, 'code': 'TIP_OVER', 'subject': 'left', 'level': 'ERROR', 'do': 'stop'}
+    values |= {'start_ns': '5', 'end_ns': '9' if alarm.startswith('over') else ''}
+    book.take(values | {'alarm': alarm, 'offers': offers} | more, f'{how}: it tips')
 
 
 def only(book: AlertBook) -> AlertRow:
@@ -25,51 +19,43 @@ def only(book: AlertBook) -> AlertRow:
 
 
 def test_a_raised_alert_is_active_and_unseen() -> None:
-    """What is raised is shown with its words, its advice and its state."""
+    """What is raised is shown with its words, its advice, its state and what may be done."""
     book = AlertBook()
-    say(book, 'raised')
+    say(book, 'raised', 'active, not acknowledged', 'acknowledge,shelve')
     row = only(book)
     assert (row.text, row.advice, row.level, row.start) == ('it tips', 'stop', ERROR, 5)
     assert (row.state, row.unseen, row.end) == ('active, not acknowledged', True, None)
+    assert row.offers == ('acknowledge', 'shelve')
 
 
 def test_acknowledging_clears_nothing() -> None:
-    """An acknowledged alert stays active until the monitor clears it."""
+    """An acknowledged alert stays, with who saw it and why, until the monitor lets go of it."""
     book = AlertBook()
-    say(book, 'raised')
-    say(book, 'acknowledged')
-    assert only(book).state == 'active, acknowledged'
-    say(book, 'cleared')
-    assert not book.rows
-
-
-def test_a_danger_that_nobody_saw_stays() -> None:
-    """A failure of the robot that is over stays until it is acknowledged."""
-    book = AlertBook()
-    say(book, 'raised')
-    say(book, 'cleared')
-    assert only(book).state == 'over, not acknowledged'
-    say(book, 'acknowledged', end_ns='9')
-    assert not book.rows
-
-
-@pytest.mark.parametrize('change', [{'level': 'WARN'}, {'code': 'CLOCK'}])
-def test_lesser_alerts_go_when_they_are_over(change: dict[str, Any]) -> None:
-    """A caution, or a fault of an input, goes by itself."""
-    book = AlertBook()
-    say(book, 'raised', **change)
-    say(book, 'cleared', **change)
-    assert not book.rows
-
-
-def test_what_the_monitor_offers_is_offered() -> None:
-    """A state in the monitor's words and what it offers are shown as they are."""
-    book = AlertBook()
-    say(book, 'raised', alarm='shelved', offers='acknowledge,shelve')
+    say(book, 'raised', 'active, not acknowledged')
+    say(book, 'acknowledged', 'active, acknowledged', who='Ada', note='spotter is there')
     row = only(book)
-    assert (row.state, row.offers) == ('shelved', ('acknowledge', 'shelve'))
-    say(book, 'reset', alarm='normal')
+    assert (row.unseen, row.end, row.note) == (False, None, 'Ada: spotter is there')
+    say(book, 'cleared', 'over, latched until reset', 'reset')
+    row = only(book)
+    assert (row.end, row.note, row.offers) == (9, 'Ada: spotter is there', ('reset',))
+    say(book, 'reset', 'normal')
     assert not book.rows
+
+
+def test_what_nobody_saw_stays() -> None:
+    """An alert that is over and was not acknowledged stays unseen."""
+    book = AlertBook()
+    say(book, 'cleared', 'over, not acknowledged')
+    assert (only(book).unseen, only(book).end) == (True, 9)
+
+
+def test_a_shelved_alert_is_silent() -> None:
+    """A shelved alert says so and calls nobody; unshelved it calls again."""
+    book = AlertBook()
+    say(book, 'shelved', 'active, not acknowledged', 'unshelve')
+    assert (only(book).unseen, only(book).state) == (False, 'active, not acknowledged, shelved')
+    say(book, 'unshelved', 'active, not acknowledged')
+    assert only(book).unseen
 
 
 def test_who_joins_late_sees_what_is_active() -> None:
@@ -79,17 +65,8 @@ def test_who_joins_late_sees_what_is_active() -> None:
         AlertRow('TIP_OVER-left-ERROR', 'TIP_OVER', 'left', ERROR, '', '', '', 0),
     )
     assert book.also([own]) == (own,)
-    say(book, 'raised')
+    say(book, 'raised', 'active, not acknowledged')
     assert len(book.also([own])) == 1
-
-
-def test_a_note_stands_with_what_it_was_for() -> None:
-    """A person's note is kept with what was not acknowledged when it was written."""
-    book = AlertBook()
-    say(book, 'raised')
-    book.annotate('Ada, spotter is there')
-    say(book, 'acknowledged')
-    assert only(book).note == 'Ada, spotter is there'
 
 
 def test_strange_messages_are_taken() -> None:

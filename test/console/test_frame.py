@@ -118,9 +118,24 @@ def test_a_caution_under_its_danger_is_left_out() -> None:
 
 
 def test_what_is_over_and_unseen_is_said() -> None:
-    """An alert that is over stays the cause until somebody acknowledges it."""
-    found = frame(replace(FINE, level=WARN, alerts=(alert(end=2),)))
-    assert found['cause'] == 'over now, not acknowledged: TIP_OVER it is'
+    """A failure that is over stays the cause until a person has dealt with it."""
+    row = alert(end=2, state='over, latched until reset', offers=('reset',))
+    found = frame(replace(FINE, level=WARN, alerts=(row,)))
+    assert found['cause'] == 'over, latched until reset: TIP_OVER it is'
+    assert found['advice'].startswith('reset it')
+
+
+def test_a_lesser_thing_that_is_over_leaves_ok() -> None:
+    """Where the monitor says OK, what is over stays in the list and is no cause."""
+    found = frame(replace(FINE, alerts=(alert(end=2, level=WARN),)))
+    assert (found['word'], found['cause']) == ('OK', 'all margins kept')
+    assert len(found['alerts']) == 1
+
+
+def test_hints_stand_with_what_is_left() -> None:
+    """What else the operator should know follows the margins."""
+    found = frame(replace(FINE, hints=('it tips to the left in 3 s at this rate',)))
+    assert found['left'].endswith('; it tips to the left in 3 s at this rate')
 
 
 def test_a_problem_comes_before_old_alerts() -> None:

@@ -9,6 +9,7 @@ from console.servers import Live
 
 FOLDED = (0.0, 2.0, -2.5, 2.0)
 STRETCHED = (0.0, 0.3, 0.2, 2.0)
+CLOSE = (0.0, 1.2, -1.55, 2.0)  # the shoulder at 90 % of its limit
 LEVEL = 'document.body.dataset.level'
 
 
@@ -22,12 +23,16 @@ def shown(page: Page, robot: Live) -> Page:
 
 
 def calm(page: Page, robot: Live) -> None:
-    """Bring the robot back and acknowledge what was."""
+    """Bring the robot back, and acknowledge and reset what was."""
     robot.pose(*FOLDED)
     page.wait('!!window.console_page?.hello')
     page.wait(f'{LEVEL} !== "STALE" && {LEVEL} !== "ERROR"')
-    page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
+    hand = (
+        '["acknowledge", "reset"].forEach(x => console_page.socket.send(JSON.stringify({do: x})))'
+    )
+    page.run(f'window.hand = setInterval(() => {hand}, 300)')
     page.wait(f'{LEVEL} === "OK" && console_page.frame.alerts.length === 0')
+    page.run('clearInterval(hand)')
 
 
 def states(page: Page) -> list[str]:
@@ -81,10 +86,28 @@ def test_what_is_over_stays_until_it_is_seen(shown: Page, robot: Live) -> None:
     shown.wait(f'{LEVEL} === "ERROR"')
     robot.pose(*FOLDED)
     shown.wait(f'{LEVEL} === "WARN"')
-    assert shown.text('#cause').startswith('over now, not acknowledged')
+    assert shown.text('#cause').startswith('over, not acknowledged')
     shown.wait('!document.getElementById("acknowledge-all").disabled')
     shown.click('#acknowledge-all')
+    shown.wait(
+        'document.getElementById("cause").textContent.startsWith("over, latched until reset")'
+    )
+    shown.click('#alerts button[data-deed="reset"]')
     shown.wait(f'{LEVEL} === "OK"')
+
+
+def test_a_caution_can_be_shelved_a_danger_not(shown: Page, robot: Live) -> None:
+    """The page offers shelving for a caution, which is silent then; for a danger it does not."""
+    robot.pose(*CLOSE)
+    shown.wait(f'{LEVEL} === "WARN"')
+    shown.wait('!!document.querySelector("#alerts li.WARN button[data-deed=shelve]")')
+    shown.click('#alerts li.WARN button[data-deed="shelve"]')
+    shown.wait('document.querySelector("#alerts li.WARN").dataset.state.endsWith("shelved")')
+    assert not shown.run('document.querySelector("#alerts li.WARN").matches(".unacknowledged")')
+    shown.click('#alerts li.WARN button[data-deed="unshelve"]')
+    robot.pose(*STRETCHED)
+    shown.wait('!!document.querySelector("#alerts li.ERROR button[data-deed=acknowledge]")')
+    assert not shown.run('!!document.querySelector("#alerts li.ERROR button[data-deed=shelve]")')
 
 
 def test_a_silent_input_is_no_data(shown: Page, robot: Live) -> None:

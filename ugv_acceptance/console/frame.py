@@ -101,7 +101,7 @@ def what_is_left(snapshot: Snapshot, settings: Settings) -> str:
     if uses:
         use, name = max(uses)
         parts.append(f'{name} at {use:.0%} of its limit')
-    return ', '.join(parts)
+    return '; '.join([', '.join(parts), *snapshot.hints])
 
 
 def _uses(snapshot: Snapshot, settings: Settings) -> list[tuple[float, str]]:
@@ -130,14 +130,15 @@ def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
 
 def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
     active = [row for row in _by_urgency(snapshot.alerts) if row.end is None]
-    over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None and row.unseen]
+    over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None]
     if active and not (level == STALE and snapshot.problem):
         more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
         return active[0].text + more, active[0].advice
     if level == STALE:
         return snapshot.problem or UNKNOWN, WAIT
-    if over:
-        return f'over now, not acknowledged: {over[0].text}', 'acknowledge it when it is understood'
+    if over and level != OK:
+        do = 'reset it' if 'reset' in over[0].offers else 'acknowledge it'
+        return f'{over[0].state}: {over[0].text}', f'{do} when the robot stands well again'
     return FINE, ''
 
 

@@ -13,6 +13,8 @@ from ugv_acceptance.model.tree import Tree, point_of, pose_of
 
 # Points of one body closer than this (m) are drawn as one.
 _SAME = 0.02
+# A point further away (m) is none of the robot's.
+_FAR = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +132,9 @@ def _plumb(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector | 
     if not down < 0.0:
         return None
     way: Any = dot(normal, subtract(a, cog)) / down
-    return _numbers(add(cog, scale(gravity, way)))
+    point = _numbers(add(cog, scale(gravity, way)))
+    # Gravity all but along the ground meets it nowhere that could be drawn.
+    return point if max(map(abs, point)) < _FAR else None
 
 
 def _numbers(v: Sequence[Any]) -> Vector:

@@ -52,7 +52,8 @@ class Snapshot:
 
     `level` is that of the verdict. Where the margins are not `known`, `problem` may say why and the
     numbers are NaN. `torque` (N m; N), `angle` (rad) the tilt left to each of SIDES, `state` a
-    number in STATES, `effort` what the motors measure.
+    number in STATES, `effort` what the motors measure, `hints` what else
+    the operator should know, in words.
     """
 
     time: int
@@ -68,3 +69,4 @@ class Snapshot:
     payload: Payload = NO_LOAD
     alerts: tuple[AlertRow, ...] = ()
     inputs: tuple[InputRow, ...] = ()
+    hints: tuple[str, ...] = ()

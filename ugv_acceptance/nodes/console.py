@@ -7,7 +7,7 @@ computed here from the same inputs by the same code, so that a page costs the mo
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
@@ -18,17 +18,19 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.config import Config
 from ugv_acceptance.console.alert_book import AlertBook
+from ugv_acceptance.console.hearing import Heartbeat, hints_of
 from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.snapshot import NO_LOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.nodes.conversions import key_values
 from ugv_acceptance.nodes.faults import what_to_do
 from ugv_acceptance.nodes.inputs import Inputs, qos_of
+from ugv_acceptance.nodes.operating import DOINGS, SHELVED
 from ugv_acceptance.nodes.outputs import LATCHED
 from ugv_acceptance.nodes.running import Stop, ros, spin
 from ugv_acceptance.nodes.session import Session
@@ -43,24 +45,6 @@ OWN_SILENCE = 0.5
 _DEPTH = 100
 
 
-@dataclass(slots=True)
-class Heartbeat:
-    """How regularly something is heard; `last` and `period` in seconds of a monotonic clock."""
-
-    last: float | None = None
-    period: float = 0.0
-
-    def beat(self, now: float) -> None:
-        """Take one."""
-        if self.last is not None:
-            self.period += 0.1 * (min(now - self.last, 1.0) - self.period)
-        self.last = now
-
-    def silent(self, now: float, least: float) -> bool:
-        """Return whether it was heard before, and not for `least` s and five of its periods."""
-        return self.last is not None and now - self.last > max(least, 5.0 * self.period)
-
-
 class ConsoleNode(Node):
     """Listens to a robot and its monitor. `latest` is replaced, never changed."""
 
@@ -69,6 +53,7 @@ class ConsoleNode(Node):
         self.config, self.settings = config, config.settings
         self.book = AlertBook()
         self.verdict: DiagnosticStatus | None = None
+        self.said: dict[str, str] = {}
         self.heard, self.margins = Heartbeat(), Heartbeat()
         self.session = Session(
             self.settings, lambda _stamp, _margins: None, self._take_own, self._complain
@@ -83,9 +68,7 @@ class ConsoleNode(Node):
         self.create_subscription(
             JointState, f'{MONITOR}/stability', lambda _: self._beat(), 10, raw=True
         )
-        self._callers = {
-            do: self.create_client(Trigger, f'{MONITOR}/{do}') for do in ('acknowledge', 'reset')
-        }
+        self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(PERIOD, self._every_frame, clock=steady)
         self.create_timer(1.0, self._every_second, clock=steady)
@@ -112,16 +95,27 @@ class ConsoleNode(Node):
         )
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Acknowledge, reset, or declare a payload. Raises BadSample for anything else."""
-        if do in self._callers:
-            if values.get('key') is not None:
-                raise BadSample('this monitor acknowledges all alerts at once')
-            note = ', '.join(str(values.get(k) or '') for k in ('by', 'note')).strip(', ')
-            self._asked.put(lambda: self._call(do, note[:200]))
+        """Do about alerts what the monitor offers, or declare a payload; BadSample for else."""
+        if do in DOINGS:
+            message = self._operation(do, values)
+            self._asked.put(lambda: self._hand.publish(message))
             return f'asked the monitor: {do}'
         if do == 'payload':
             return self._declare(values)
         raise BadSample(f'a live robot cannot do {do!r}')
+
+    def _operation(self, do: str, values: dict[str, Any]) -> DiagnosticStatus:
+        message = DiagnosticStatus(name=do, message=str(values.get('note') or '')[:200])
+        message.hardware_id = str(values.get('by') or 'console')[:40]
+        key = values.get('key')
+        if key is not None:
+            row = self.book.rows.get(str(key))
+            if row is None:
+                raise BadSample(f'{do}: expected an alert that is listed, got {key!r:.80}')
+            named = {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]}
+            seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
+            message.values = key_values(named | {'seconds': seconds})
+        return message
 
     def _declare(self, values: dict[str, Any]) -> str:
         cog = values.get('cog_m')
@@ -156,19 +150,15 @@ class ConsoleNode(Node):
             self._load.header.stamp = self.get_clock().now().to_msg()
             self._load_out.publish(self._load)
 
-    def _call(self, do: str, note: str) -> None:
-        if self._callers[do].service_is_ready():
-            self.book.annotate(note)
-            self._callers[do].call_async(Trigger.Request())
-
     def _beat(self) -> None:
         self.margins.beat(time.monotonic())
 
     def _on_verdict(self, status: DiagnosticStatus) -> None:
         self.verdict = status
         self.heard.beat(time.monotonic())
-        values = {pair.key: pair.value for pair in status.values}
-        if values.get('alerts_active') == '0' and 'code' not in values:
+        self.said = values = {pair.key: pair.value for pair in status.values}
+        none = values.get('alerts_active') == values.get('alerts_unacknowledged') == '0'
+        if none and 'code' not in values:
             self.book.clear()
 
     def _on_alerts(self, message: DiagnosticArray) -> None:
@@ -223,7 +213,7 @@ class ConsoleNode(Node):
         margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
         own = [*evaluator.watch.active, *self.session.faults.active]
         inputs = tuple(self._input(name, own) for name in ('joint_states', 'imu', 'payload'))
-        alerts = self.book.also(self._row(alert) for alert in own)
+        alerts = tuple(self._newest(r) for r in self.book.also(map(self._row, own)))
         told = () if problem and self.verdict is None else alerts
         moment = self.session.clock.now()
         if margins is None or problem or self.verdict is None:
@@ -244,7 +234,15 @@ class ConsoleNode(Node):
             payload=evaluator.payload,
             alerts=told,
             inputs=inputs,
+            hints=hints_of(self.said),
         )
+
+    def _newest(self, row: AlertRow) -> AlertRow:
+        """Return an alert with the advice of the newest verdict, where it is about this one."""
+        about = (self.said.get('code'), self.said.get('subject'))
+        if row.end is None and about == (row.code, row.subject):
+            return replace(row, advice=self.said.get('do', row.advice))
+        return row
 
     def _row(self, alert: Alert) -> AlertRow:
         rule = alert.rule

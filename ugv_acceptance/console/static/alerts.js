@@ -1,7 +1,7 @@
 // The list of alerts; an alert keeps its place in the document, so that a finger or the focus stays on its button.
 import { $, text, element, fixed } from './dom.js';
 
-const DEEDS = { acknowledge: 'Acknowledge', shelve: 'Shelve 5 min', reset: 'Reset' };
+const DEEDS = { acknowledge: 'Acknowledge', shelve: 'Shelve 5 min', unshelve: 'Unshelve', reset: 'Reset' };
 const MOST = 8;
 
 export class Alerts {
@@ -32,7 +32,7 @@ export class Alerts {
     text($('alert-count'), frame.alerts.length ? `(${frame.alerts.length}${hidden > 0 ? `, +${hidden} more` : ''})` : '');
     const open = frame.alerts.some((a) => a.unseen);
     $('acknowledge-all').disabled = !open;
-    $('who').hidden = !this.live || (!open && !$('who').contains(document.activeElement));
+    $('who').hidden = !this.live || (!frame.alerts.length && !$('who').contains(document.activeElement));
   }
 
   make(alert) {
