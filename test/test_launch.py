@@ -46,17 +46,19 @@ def test_what_a_launch_file_starts_is_installed(path: Path) -> None:
 
 
 def declared_parameters(executable: str) -> dict[str, type]:
-    """Return the parameters a node's module declares by name, each with its default's type."""
+    """Return the parameters a node declares by name, each with its default's type."""
     (script,) = entry_points(group='console_scripts', name=executable)
     spec = find_spec(script.module)
     assert spec is not None
     assert spec.origin is not None
     declared: dict[str, type] = {'use_sim_time': bool}
-    for node in ast.walk(ast.parse(Path(spec.origin).read_text(encoding='utf-8'))):
-        if isinstance(node, ast.Call) and 'declare' in ast.unparse(node.func):
-            match node.args:
-                case [ast.Constant(str() as name), ast.Constant(value), *_]:
-                    declared[name] = type(value)
+    own = Path(spec.origin)
+    for path in (own, own.with_name('parameters.py')):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            if isinstance(node, ast.Call) and 'declare' in ast.unparse(node.func):
+                match node.args:
+                    case [ast.Constant(str() as name), ast.Constant(value), *_]:
+                        declared[name] = type(value)
     return declared
 
 

@@ -1,6 +1,11 @@
-"""What to do and what comes next, worked out for the verdict: never on the way of a message."""
+"""What to do and what comes next, worked out for the verdict: never on the way of a message.
+
+Advice takes some hundredths of a second, so a thread works it out while messages are taken.
+"""
 
 import math
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice import Advice, advise
@@ -21,25 +26,44 @@ URGENT, AGAIN = 2.0, 1_000_000_000
 
 @dataclass(slots=True)
 class Counsel:
-    """The advice of one session; `advice` is the newest, best first."""
+    """The advice of one session; `advice` is the newest, best first; `on_problem` for the log."""
 
     evaluator: LiveEvaluator
     outlook: Outlook
+    on_problem: Callable[[str], None]
     advice: tuple[Advice, ...] = ()
     estimate: PayloadEstimate | None = None
     _made: int = 0
     _told: int = 0
-    _felt: int = field(default=0)
+    _felt: int = 0
+    _pool: ThreadPoolExecutor = field(
+        default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
+    )
+    _asked: 'Future[tuple[Advice, ...]] | None' = None
 
     def renew(self, now: int, active: list[Alert]) -> None:
-        """Work the advice out anew where it is asked for and old."""
-        margins = self.evaluator.margins
+        """Have the advice worked out anew where it is asked for and old."""
+        margins, evaluator = self.evaluator.margins, self.evaluator
         if margins is None or not any(alert.rule.code in COMPUTED for alert in active):
             self.advice = ()
-        elif now - self._made >= FRESH or not self.advice:
-            load = self.evaluator.payload
-            self.advice = advise(self.evaluator.settings, margins.q, margins.gravity, load)
-            self._made = now
+        elif self._asked is None and now - self._made >= FRESH:
+            case = evaluator.settings, margins.q, margins.gravity, evaluator.payload
+            self._asked, self._made = self._pool.submit(advise, *case), now
+
+    def arrived(self) -> bool:
+        """Take advice that was worked out; return whether it says another thing than before."""
+        if self._asked is None or not self._asked.done():
+            return False
+        asked, self._asked, before = self._asked, None, self.advice
+        error = asked.exception()
+        if error is not None:
+            self.on_problem(f'advice: fault of the monitor: {error!r}')
+        self.advice = () if error is not None else asked.result()
+        return [a.subject for a in self.advice] != [b.subject for b in before]
+
+    def close(self) -> None:
+        """Give no more advice."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def feel(self) -> None:
         """Look at the efforts; to be called once a second."""

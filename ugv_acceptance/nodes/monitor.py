@@ -136,26 +136,26 @@ class Monitor(LifecycleNode):
         if self._settings is None or self.config is None:
             raise BadConfig('expected a configured monitor')
         self.session = self._new_session(self._settings)
-        self._box = black_box_of(self, self._value('black_box'), self.config.topics, self.session)
+        self._box = black_box_of(self, self.config.topics, self.session)
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
         self._tick = self.create_timer(tick, self._on_tick, clock=self.steady)
 
     def _new_session(self, settings: Settings) -> Session:
-        simulated = bool(self._value('use_sim_time'))
         warn = self.get_logger().warning
         return Session(
             settings,
             self._margins.publish if self._margins else lambda _stamp, _margins: None,
             self._on_change,
             lambda text: warn(text, throttle_duration_sec=5.0),
-            ReceiptClock(simulated),
+            ReceiptClock(bool(self._value('use_sim_time'))),
         )
 
     def _deactivate(self) -> None:
         if self.session is not None:
             self._tell(all_reset(self.session))
+            self.session.counsel.close()
         if self._box is not None:
             self._box.close()
         if self._inputs is not None:
@@ -185,7 +185,7 @@ class Monitor(LifecycleNode):
         self._tell(session.follower.alarms.advance(now))
         if self._box is not None:
             self._box.advance(now)
-        if session.counsel.urgent(now):
+        if session.counsel.arrived() or session.counsel.urgent(now):
             self.say()
 
     def _every_second(self) -> None:

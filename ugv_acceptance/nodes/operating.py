@@ -82,7 +82,7 @@ def all_reset(session: Session) -> list[Change]:
     return [Change(now, alarm.alert, 'reset', State.NORMAL) for alarm in table.values()]
 
 
-def black_box_of(node: Node, folder: str, topics: Topics, session: Session) -> BlackBox:
+def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
     """Return a black box before the inputs of a session; it does nothing without a folder."""
     names = {
         'joint_states': (topics.joint_states, 'sensor_msgs/msg/JointState'),
@@ -97,6 +97,7 @@ def black_box_of(node: Node, folder: str, topics: Topics, session: Session) -> B
     }
     alerts = node.resolve_topic_name('~/alerts')
     channels['alerts'] = Channel(alerts, 'diagnostic_msgs/msg/DiagnosticArray', 'reliable')
+    folder = node.get_parameter('black_box').value
     path = Path(folder).expanduser() if folder else None
     box = BlackBox(path, channels, session.clock.offset, session.on_problem)
     session.take_joint_state = box.tap('joint_states', session.take_joint_state)

@@ -64,7 +64,7 @@ class Session:
         log = self.evaluator.watch.log
         self.faults, self.follower = Faults(log), Follower(log)
         self.outlook = Outlook(self.settings)
-        self.counsel = Counsel(self.evaluator, self.outlook)
+        self.counsel = Counsel(self.evaluator, self.outlook, self.on_problem)
         self.counts = {name: InputCount() for name in INPUTS}
         self.evaluator.start(self.clock.now())
         self.take_joint_state = self._guard('joint_states', self._joint_states())
