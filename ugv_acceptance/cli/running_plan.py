@@ -58,6 +58,8 @@ def execute(asked: Asked) -> int:
     waiting = [step for step in chosen if folder.done(step) is None]
     console = Console(highlight=False)
     console.print(f'plan {escape(plan.plan)}, sha256 {plan.sha256}', soft_wrap=True)
+    if plan.config_sha256 != config.sha256:
+        console.print("[yellow]The plan was derived from another state of the robot's files.[/]")
     if len(waiting) < len(chosen):
         console.print(f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
     interrupted = bool(waiting) and _live(asked, config, folder, waiting, console)
