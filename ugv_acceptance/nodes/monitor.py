@@ -25,6 +25,7 @@ from ugv_acceptance.evaluation.alarms import Change
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.nodes.black_box import BlackBox
 from ugv_acceptance.nodes.inputs import Inputs
+from ugv_acceptance.nodes.markers import MarkerOutput
 from ugv_acceptance.nodes.operating import all_reset, black_box_of, by_service, operate
 from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
 from ugv_acceptance.nodes.parameters import (
@@ -64,6 +65,7 @@ class Monitor(LifecycleNode):
         self._box: BlackBox | None = None
         declare_all(self)
         self.output = StatusOutput(self)
+        self.markers = MarkerOutput(self, lambda: self.session)
         self.add_on_set_parameters_callback(self._judge_parameters)
         self.add_post_set_parameters_callback(self._take_parameters)
         # Steady: a frozen /clock must not silence the diagnostics.
@@ -143,12 +145,11 @@ class Monitor(LifecycleNode):
         self._tick = self.create_timer(tick, self._on_tick, clock=self.steady)
 
     def _new_session(self, settings: Settings) -> Session:
-        warn = self.get_logger().warning
         return Session(
             settings,
             self._margins.publish if self._margins else lambda _stamp, _margins: None,
             self._on_change,
-            lambda text: warn(text, throttle_duration_sec=5.0),
+            lambda text: self.get_logger().warning(text, throttle_duration_sec=5.0),
             ReceiptClock(bool(self._value('use_sim_time'))),
         )
 
@@ -169,8 +170,7 @@ class Monitor(LifecycleNode):
             self.undeclare_parameter(knob.name)
         if self._margins is not None:
             self._margins.destroy()
-        self.knobs, self._margins = (), None
-        self.config = self._settings = None
+        self.knobs, self._margins, self.config, self._settings = (), None, None, None
 
     # Time
 
