@@ -7,7 +7,7 @@ chargeable; all but run may be left out.
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -36,7 +36,7 @@ FIELDS = (*TEXTS, *CHOICES, *NUMBERS)
 class Entry:
     """An entry of the log; `where` says file and line. Times in s since the run's start, or h.
 
-    `alert` is a code such as TIP_OVER, or CODE:SUBJECT: the entry tells more of that alert.
+    `alert` is a code such as TIP_OVER: the entry tells more of that failure of the run.
     """
 
     where: str
@@ -54,18 +54,20 @@ class Entry:
         """Return the error of a field."""
         return BadConfig(f'{self.where}: {field}: expected {text}')
 
-    def run_of(self, runs: Sequence[str]) -> str:
+    def run_of(self, runs: Mapping[str, str]) -> str:
         """Return the one run this entry is about: its name, or the last parts of it."""
-        wanted = PurePosixPath(self.run).parts
-        found = [r for r in runs if PurePosixPath(r).parts[-len(wanted) :] == wanted]
+        wanted = _parts(self.run)
+        found = sorted(
+            {run for name, run in runs.items() if _parts(name)[-len(wanted) :] == wanted}
+        )
         if len(found) != 1:
             much = f'{len(found)} runs end so' if found else 'no run ends so'
             raise self.wrong('run', f'one run of the campaign, got {self.run!r}: {much}')
         return found[0]
 
-    def explains(self, alert: str | None, subject: str | None) -> bool:
-        """Return whether it is about an alert of this code and subject."""
-        return self.alert is not None and self.alert in {alert, f'{alert}:{subject}'}
+
+def _parts(name: str) -> tuple[str, ...]:
+    return PurePosixPath(name).parts
 
 
 def read_log(path: Path) -> list[Entry]:

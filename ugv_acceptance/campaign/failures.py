@@ -27,7 +27,7 @@ CRITICAL = frozenset({'ERROR', 'STALE'})
 class Failure:
     """A failure in a run: when (s since its start), what, and what taxonomy says of it.
 
-    `times` is how often the alert came in this run: one cause, one failure. `origin` is alert, log,
+    `times` is how often the alert came in this run, about which `subjects`. `origin` is alert, log,
     or both. Only `chargeable` failures count.
     """
 
@@ -39,7 +39,7 @@ class Failure:
     repairability: str
     origin: str
     alert: str | None = None
-    subject: str | None = None
+    subjects: tuple[str, ...] = ()
     times: int = 1
     repair_h: float | None = None
     chargeable: bool = True
@@ -55,19 +55,20 @@ class Failure:
 
 
 def from_alerts(run: str, result: Json) -> list[Failure]:
-    """Return the failures that a run's critical alerts show: one a code and subject.
+    """Return the failures that a run's critical alerts show: one a code, whatever its subjects.
 
+    A fall passes several edges, a fault comes and goes: that is one cause until a log says more.
     One that is still active at the end is terminal. One that went away without leaving the run
     was repaired, or went by itself, in the field; of others nothing is known.
     """
-    groups: dict[tuple[str, str], list[Json]] = {}
+    groups: dict[str, list[Json]] = {}
     for alert in result['alerts']:
         if alert['level'] in CRITICAL:
-            groups.setdefault((alert['code'], alert['subject']), []).append(alert)
-    return [_from_group(run, code, subject, group) for (code, subject), group in groups.items()]
+            groups.setdefault(alert['code'], []).append(alert)
+    return [_from_group(run, code, group) for code, group in groups.items()]
 
 
-def _from_group(run: str, code: str, subject: str, group: Sequence[Json]) -> Failure:
+def _from_group(run: str, code: str, group: Sequence[Json]) -> Failure:
     lasting = any(alert['end_s'] is None for alert in group)
     suspect = FIRST_SUSPECT.get(code)
     return Failure(
@@ -79,33 +80,30 @@ def _from_group(run: str, code: str, subject: str, group: Sequence[Json]) -> Fai
         UNKNOWN if lasting else FIELD,
         'alert',
         code,
-        subject,
+        tuple(sorted({alert['subject'] for alert in group})),
         len(group),
     )
 
 
 def with_log(
-    failures: Sequence[Failure], entries: Sequence[Entry], runs: Sequence[str]
+    failures: Sequence[Failure], entries: Sequence[Entry], runs: Mapping[str, str]
 ) -> list[Failure]:
     """Return failures with those of a log; an entry that names an alert tells more of it.
 
-    BadConfig where an entry's run is not one of `runs`, or its alert did not come in that run.
+    `runs` gives every name of a run, those of its copies too, the name it goes by. BadConfig
+    where an entry's run is not one of `runs`, or its alert did not come in that run.
     """
     merged = list(failures)
     for entry in entries:
         run = entry.run_of(runs)
-        told = [
-            k for k, f in enumerate(merged) if f.run == run and entry.explains(f.alert, f.subject)
-        ]
+        told = [k for k, f in enumerate(merged) if f.run == run and f.alert == entry.alert]
         if entry.alert is None:
             merged.append(_from_entry(run, entry))
         elif not told:
             raise entry.wrong('alert', f'a critical alert of this run, got {entry.alert}')
         else:
-            # Several subjects of one alert are then one failure: a person said so.
             merged[told[0]] = _told(merged[told[0]], entry)
-            merged = [f for k, f in enumerate(merged) if k not in told[1:]]
-    return sorted(merged, key=lambda f: (f.run, f.at_s, f.alert or '', f.subject or '', f.what))
+    return sorted(merged, key=lambda f: (f.run, f.at_s, f.alert or '', f.subjects, f.what))
 
 
 def _from_entry(run: str, entry: Entry) -> Failure:

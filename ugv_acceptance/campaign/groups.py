@@ -27,7 +27,7 @@ def comparison(
     """
     if not groups:
         return None
-    members = [[r for r in rows if fnmatchcase(r.name, pattern)] for _, pattern in groups]
+    members = [[row for row in rows if _matches(row, pattern)] for _, pattern in groups]
     _check(groups, members)
     charged = [f.run for f in failures if f.chargeable]
     sides = [_side(name, runs, charged) for (name, _), runs in zip(groups, members, strict=True)]
@@ -39,6 +39,11 @@ def comparison(
         (first['passed'], first['runs']), (second['passed'], second['runs']), confidence
     )
     return {'groups': sides, 'mtbf': _json(rates), 'success': _json(shares)}
+
+
+def _matches(row: Row, pattern: str) -> bool:
+    """Return whether a run, or a copy of it, has a name of this pattern."""
+    return any(fnmatchcase(name, pattern) for name in (row.name, *row.also))
 
 
 def _side(name: str, runs: Sequence[Row], charged: Sequence[str]) -> Json:

@@ -93,7 +93,7 @@ def on_cluster(sources: Sequence[Source], brief: Brief, address: str) -> Iterato
         shared = client.scatter(brief, broadcast=True, hash=False)
         futures = client.map(judge_source, sources, brief=shared, pure=False)
         known = dict(zip(futures, sources, strict=True))
-        for future in distributed.as_completed(futures):
+        for future in distributed.as_completed(futures, loop=client.loop):
             yield (
                 future.result()
                 if future.status == 'finished'

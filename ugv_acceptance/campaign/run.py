@@ -70,7 +70,7 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
 
 def all_failures(rows: Sequence[Row], entries: Sequence[Entry]) -> list[Failure]:
     """Return the failures of all runs with those of a log, in the order of the runs."""
-    names = [row.name for row in rows]
+    names = {name: row.name for row in rows for name in (row.name, *row.also)}
     found = with_log([f for row in rows for f in row.failures], entries, names)
-    place = {name: k for k, name in enumerate(names)}
+    place = {row.name: k for k, row in enumerate(rows)}
     return sorted(found, key=lambda f: (place[f.run], f.at_s))

@@ -1,7 +1,7 @@
 """One run of a campaign judged, wherever the work is done: in this process, another, a cluster."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -50,8 +50,14 @@ def judge_source(source: Source, brief: Brief) -> Done:
     """Return what came of one run; whatever is wrong with it is said in `error`, never raised."""
     try:
         with local_paths(source) as paths:
-            done = _judged(source, open_bag(paths), brief)
-            return _renamed(done, paths)
+            return _renamed(_tried(source, paths, brief), paths)
+    except AcceptanceError as error:
+        return Done(source, error=str(error))
+
+
+def _tried(source: Source, paths: Path | list[Path], brief: Brief) -> Done:
+    try:
+        return _judged(source, open_bag(paths), brief)
     except AcceptanceError as error:
         return Done(source, error=str(error))
     except Exception as error:  # noqa: BLE001 - one broken bag never ends a campaign
@@ -89,10 +95,10 @@ def _renamed(done: Done, paths: Path | list[Path]) -> Done:
     """Return an outcome in which a fetched copy goes by the name of what it was fetched from."""
     if not done.source.remote:
         return done
-    first = paths if isinstance(paths, Path) else paths[0]
-    copied = str(first if isinstance(paths, Path) else first.parent)
+    copied = str(paths if isinstance(paths, Path) else paths[0].parent)
     origin = done.source.files[0].rpartition('/')[0]
-    return Done(done.source, done.key, done.size, _replaced(done.result, copied, origin))
+    result, error = (_replaced(said, copied, origin) for said in (done.result, done.error))
+    return replace(done, result=result, error=error)
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:  # noqa: ANN401 - JSON

@@ -1,0 +1,100 @@
+"""Throughput of a campaign: `python bench/bench_campaign.py [FOLDER]`, one worker against several.
+
+FOLDER holds recordings, such as make_fleet.py writes; without it one-minute bags with the rates of
+a real robot are written: joint states at 200 Hz, IMU at 400 Hz, zstd. The campaign runs in a fresh
+folder each time. Says what 100,000 one-hour bags would cost, from the time a recorded hour takes.
+"""
+
+import argparse
+import os
+import shutil
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from ugv_acceptance.campaign.pool import cores
+from ugv_acceptance.campaign.run import Place, carry_out
+from ugv_acceptance.campaign.sources import find_sources
+from ugv_acceptance.campaign.work import Brief
+from ugv_acceptance.config import load
+from ugv_acceptance.run.catalogue import case_of
+from ugv_acceptance.run.record import record
+
+BAGS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a campaign took: wall and CPU seconds (children included), bags, bytes, hours."""
+
+    wall: float
+    cpu: float
+    bags: int
+    size: int
+    hours: float
+
+
+def measure(folder: Path, workers: int) -> Measured:
+    """Run a campaign from nothing and return what it took."""
+    out = Path(tempfile.mkdtemp(prefix='campaign-'))
+    sources, brief = find_sources([str(folder)]), Brief(load())
+    began, busy = time.perf_counter(), cpu()
+    rows, effort = carry_out(sources, brief, Place(out, workers))
+    took, used = time.perf_counter() - began, cpu() - busy
+    shutil.rmtree(out)
+    hours = sum(row.duration_s * (1 + len(row.also)) for row in rows) / 3600.0
+    return Measured(took, used, effort.judged, effort.size, hours)
+
+
+def cpu() -> float:
+    """Return the CPU seconds of this process and its children that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def write_bags(folder: Path, count: int, seconds: float) -> None:
+    """Write one simulated shift, and copies of it: each is judged, as if it were another."""
+    config = load()
+    case = case_of('work', config.settings.robot, 1, seconds)
+    record(config, case, 1, folder / 'run_0')
+    for k in range(1, count):
+        shutil.copytree(folder / 'run_0', folder / f'run_{k}')
+
+
+def line(name: str, found: Measured) -> str:
+    """Return a line of the table."""
+    rate = 3600.0 / found.wall
+    return (
+        f'{name:12s} {found.wall:7.1f} {found.cpu:7.1f} {found.bags * rate:10.0f}'
+        f' {found.size / 1e9 * rate:8.2f} {found.hours * rate:10.0f}'
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('folder', type=Path, nargs='?', help='recordings; made if left out')
+    parser.add_argument('--workers', type=int, default=cores())
+    parser.add_argument('--bags', type=int, default=8, help='how many to make')
+    parser.add_argument('--seconds', type=float, default=60.0, help='how long each')
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix='bags-') as made:
+        folder = arguments.folder or Path(made)
+        if arguments.folder is None:
+            write_bags(folder, arguments.bags, arguments.seconds)
+        one, several = measure(folder, 1), measure(folder, arguments.workers)
+    print(f'{"workers":12s} {"wall s":>7} {"CPU s":>7} {"bags/h":>10} {"GB/h":>8} {"h/h":>10}')
+    print(line('1', one))
+    print(line(str(arguments.workers), several))
+    gain = one.wall / several.wall
+    print(f'gain {gain:.2f}, efficiency {gain / arguments.workers:.0%}, 1-minute load', end=' ')
+    print(f'{os.getloadavg()[0]:.1f} on {cores()} cores')
+    core_hours = BAGS * one.cpu / 3600.0 / one.hours
+    wall_hours = BAGS * several.wall / 3600.0 / several.hours
+    print(f'{BAGS} one-hour bags: {core_hours:.0f} core hours, {wall_hours:.0f} h on this machine,')
+    print(f'{BAGS * one.size / one.hours / 1e12:.1f} TB to read')
+
+
+if __name__ == '__main__':
+    main()

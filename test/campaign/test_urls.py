@@ -1,0 +1,76 @@
+"""Bags at URLs: a real S3 server on loopback, and fsspec's own protocols."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from campaign.fleet import campaign, said
+
+BUCKET = 'acceptance'
+
+
+@pytest.fixture(scope='module')
+def s3(fleet: Path) -> Iterator[str]:
+    """The URL of the fleet in a bucket of moto's S3 server."""
+    server_module = pytest.importorskip('moto.server', reason='moto is not installed')
+    s3fs = pytest.importorskip('s3fs', reason='extra cluster is not installed')
+    server = server_module.ThreadedMotoServer(ip_address='127.0.0.1', port=0, verbose=False)
+    server.start()
+    patch = pytest.MonkeyPatch()
+    try:
+        host, port = server.get_host_and_port()
+        for name, value in (
+            ('FSSPEC_S3_ENDPOINT_URL', f'http://{host}:{port}'),
+            ('FSSPEC_S3_KEY', 'nobody'),
+            ('FSSPEC_S3_SECRET', 'secret'),
+            ('NO_PROXY', '127.0.0.1'),
+            ('AWS_EC2_METADATA_DISABLED', 'true'),
+        ):
+            patch.setenv(name, value)
+        system = s3fs.S3FileSystem(
+            key='nobody',
+            secret='secret',  # noqa: S106 - of a server for this test
+            endpoint_url=f'http://{host}:{port}',
+        )
+        system.mkdir(BUCKET)
+        system.put(f'{fleet}/', f'{BUCKET}/fleet', recursive=True)
+        yield f's3://{BUCKET}/fleet'
+    finally:
+        patch.undo()
+        server.stop()
+
+
+def test_a_campaign_on_s3_is_that_of_the_folder(s3: str, fleet: Path, tmp_path: Path) -> None:
+    """Fetched from S3, the runs have the same hashes and say the same; only names differ."""
+    code, text = campaign(tmp_path / 's3', s3, '--workers', '2')
+    assert code == 1, text
+    campaign(tmp_path / 'here', fleet, '--workers', '1')
+    there = (tmp_path / 's3' / 'campaign.json').read_text().replace(s3, str(fleet))
+    here = said(tmp_path / 'here')
+    assert json.loads(there)['runs'] == here['runs']
+    verdicts = {(run['sha256'], run['verdict']) for run in here['each_run']}
+    assert {(run['sha256'], run['verdict']) for run in json.loads(there)['each_run']} == verdicts
+    assert json.loads(there)['mtbf_h'] == here['mtbf_h']
+
+
+def test_nothing_of_a_fetched_copy_is_named(s3: str, tmp_path: Path) -> None:
+    """The result of a run names its URL, not the temporary file it was fetched into."""
+    campaign(tmp_path, f'{s3}/good_a', f'{s3}/nothing.mcap', '--workers', '1')
+    (result,) = (tmp_path / 'runs').glob('*.json')
+    assert json.loads(result.read_text())['bag']['path'][0].startswith(f'{s3}/good_a/')
+    broken = next(run for run in said(tmp_path)['each_run'] if run['verdict'] == 'BROKEN')
+    assert broken['reasons'][0].startswith(f'{s3}/nothing.mcap: expected MCAP')
+
+
+def test_a_bucket_that_is_not_there_is_one_line(s3: str, tmp_path: Path) -> None:
+    """Exit code 2 and one line."""
+    code, text = campaign(tmp_path, s3.replace(BUCKET, 'nobody'))
+    assert (code, text.count('\n')) == (2, 1)
+
+
+def test_file_urls_are_read(fleet: Path, tmp_path: Path) -> None:
+    """A file:// URL is fetched like any other."""
+    pytest.importorskip('fsspec', reason='extra cluster is not installed')
+    code, text = campaign(tmp_path, f'file://{fleet}/good_a', '--workers', '1')
+    assert code == 0, text
