@@ -1,5 +1,6 @@
 """The black box keeps the seconds about a critical alert, also of a process that is killed."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from nodes.live_case import imu, joints
+from nodes.live_case import Live, imu, joints
 from rosbags.highlevel import AnyReader
 
 from ugv_acceptance.bag.encode import inertia_cdr
@@ -197,3 +198,34 @@ def test_a_process_killed_after_the_alert_leaves_the_recording(tmp_path: Path, a
     assert (np.diff(written) == SECOND // 10).all()
     assert written[-1] >= alert + after * SECOND - SECOND * 6 // 10
     assert times(found, '/acceptance_monitor/alerts').tolist() == [alert]
+
+
+MONITOR = """
+import sys
+from ugv_acceptance.nodes.monitor import main
+main(['--ros-args', '-p', f'black_box:={sys.argv[1]}'])
+"""
+
+
+def test_a_monitor_killed_after_a_critical_alert_leaves_the_recording(
+    tmp_path: Path, live: Live
+) -> None:
+    """The node in a process of its own, over DDS, is killed when its recording appears."""
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    driver = live.driver()
+    process = subprocess.Popen([sys.executable, '-c', MONITOR, str(tmp_path)], env=environment)
+    try:
+        live.until(driver.connected)
+        live.until(
+            lambda: list(tmp_path.glob('*/*.mcap')), lambda: driver.send((0.0, 0.0, 0.0, 2.0))
+        )
+        live.until(
+            lambda: next(tmp_path.glob('*/*.mcap')).stat().st_size > 10_000,
+            lambda: driver.send((0.0, 0.0, 0.0, 2.0)),
+        )
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    (found,) = tmp_path.iterdir()
+    assert len(times(found, '/joint_states')) > 5
+    assert len(times(found, '/acceptance_monitor/alerts')) >= 1

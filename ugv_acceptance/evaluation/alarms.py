@@ -145,7 +145,7 @@ class Alarms:
         """
         alarm = self.table.get(key)
         if alarm is None:
-            raise AcceptanceError(f'shelve: expected a known alarm, got {key[0]} of {key[1]}')
+            raise AcceptanceError(f'shelve: expected a known alarm, got {key[0]!r} of {key[1]!r}')
         if key[2] != WARN:
             raise AcceptanceError(f'shelve: only warnings can be shelved, {key[0]} is critical')
         if not 0 < length <= LONGEST_SHELVING:
