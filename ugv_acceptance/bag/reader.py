@@ -19,6 +19,9 @@ from ugv_acceptance.bag.metadata import Metadata, files_of
 from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
 
 _BLOCK = 1 << 20
+# A packed file may unpack to this many times its size, or to as much as a chunk may: no recording
+# packs better, and a bomb of a few kB must not fill the disk.
+_MAX_RATIO = 200
 _MAGIC = {b'\x89MCAP0\r\n': 'mcap', b'SQLite f': 'sqlite3', b'#ROSBAG ': 'ros1'}
 
 
@@ -151,9 +154,13 @@ def _member(path: Path, max_chunk_bytes: int) -> Member:
 def _unzstd(path: Path) -> 'tempfile._TemporaryFileWrapper[bytes]':
     """The unpacked content in a temporary file, which lives as long as what is returned."""
     local = tempfile.NamedTemporaryFile(prefix='bag-')  # noqa: SIM115 (the member keeps it)
+    most = max(MAX_CHUNK_BYTES, _MAX_RATIO * path.stat().st_size)
     try:
-        with path.open('rb') as file:
-            zstandard.ZstdDecompressor().copy_stream(file, local)
+        with path.open('rb') as file, zstandard.ZstdDecompressor().stream_reader(file) as stream:
+            while block := stream.read(_BLOCK):
+                local.write(block)
+                if local.tell() > most:
+                    raise BadBag(f'{path}: expected at most {most >> 20} MiB unpacked, got more')
     except zstandard.ZstdError as error:
         raise BadBag(f'{path}: its zstd data is broken ({error})') from error
     local.flush()
