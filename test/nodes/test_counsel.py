@@ -3,6 +3,7 @@
 import math
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alarms import State
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.wording import WORDS as EVALUATED
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.nodes.faults import SUSPECTS, WORDS, suspect_of, what_to_do
@@ -106,7 +108,7 @@ def test_a_tilt_that_grows_fast_is_urgent() -> None:
 def test_every_fault_of_the_node_says_what_to_do_and_where_to_look() -> None:
     """No code without an action and a class."""
     assert SUSPECTS.keys() == WORDS.keys()
-    for code in (*WORDS, *('TIP_OVER', 'TORQUE_LIMIT', 'INPUT_STALE')):
+    for code in (*WORDS, *EVALUATED):
         assert what_to_do(code)
         assert ' / ' in suspect_of(code)
 
@@ -115,6 +117,14 @@ def message(name: str, **values: str) -> DiagnosticStatus:
     """Return an operator's message."""
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticStatus(name=name, hardware_id='Ada', message='seen', values=pairs)
+
+
+def test_the_operators_page_has_every_code_with_its_class(repository: Path) -> None:
+    """One row a code: meaning, what to do, and where to look first."""
+    page = (repository / 'docs' / 'operator.md').read_text(encoding='utf-8')
+    rows = [line.strip('| ').split(' | ') for line in page.splitlines() if line.count('|') == 5]
+    written = {row[0]: row[3] for row in rows if row[0].isupper()}
+    assert written == {code: suspect_of(code) for code in (*WORDS, *EVALUATED)}
 
 
 texts = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=12)

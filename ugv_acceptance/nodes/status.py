@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from ugv_acceptance.evaluation.alarms import Alarm, Change, State
+from ugv_acceptance.evaluation.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
@@ -110,6 +110,7 @@ def _severity(alert: Alert) -> tuple[int, bool]:
 def alert_status(change: Change, session: Session) -> Status:
     """Return a change of an alert, ready to be published."""
     alert, rule = change.alert, change.alert.rule
+    shelved = session.follower.alarms.shelved(key_of(rule))
     values: dict[str, object] = {
         'state': change.how,
         'code': rule.code,
@@ -121,7 +122,8 @@ def alert_status(change: Change, session: Session) -> Status:
         'do': session.counsel.do(alert),
         'class': suspect_of(rule.code),
         'alarm': change.state.value,
-        'offers': ','.join(_offers(change)),
+        'offers': ','.join(_offers(change, shelved=shelved)),
+        'shelved': shelved,
         'time_ns': change.time,
         'who': change.who,
         'note': change.note,
@@ -131,12 +133,12 @@ def alert_status(change: Change, session: Session) -> Status:
     return Status(level, f'{rule.code} {rule.subject}', f'{change.how}: {sentence}', values)
 
 
-def _offers(change: Change) -> Iterator[str]:
+def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
     """Yield what an operator may do about an alert now."""
     if change.state.unseen:
         yield 'acknowledge'
     if change.state.active and change.alert.rule.level == WARN:
-        yield 'unshelve' if change.how == 'shelved' else 'shelve'
+        yield 'unshelve' if shelved else 'shelve'
     if change.state is State.LATCHED:
         yield 'reset'
 
