@@ -83,11 +83,13 @@ class Bench:
             if k in {None, j}:
                 flags.unseen = False
 
-    def reset(self) -> None:
-        """Reset what is latched."""
-        self.hear(self.alarms.reset(self.now, 'operator'))
-        for flags in self.flags:
-            flags.latched = flags.latched and (flags.active or flags.unseen)
+    def reset(self, k: int | None) -> None:
+        """Reset one alarm, or all, that are latched."""
+        key = None if k is None else key_of(RULES[k])
+        self.hear(self.alarms.reset(self.now, 'operator', '', key))
+        for j, flags in enumerate(self.flags):
+            if k in {None, j}:
+                flags.latched = flags.latched and (flags.active or flags.unseen)
 
     def shelve(self, k: int, length: int) -> None:
         """Try to shelve."""
@@ -136,10 +138,10 @@ class AlarmMachine(RuleBasedStateMachine):
         """Acknowledge."""
         self.bench.acknowledge(k)
 
-    @rule()
-    def reset(self) -> None:
+    @rule(k=st.none() | st.integers(0, len(RULES) - 1))
+    def reset(self, k: int | None) -> None:
         """Reset."""
-        self.bench.reset()
+        self.bench.reset(k)
 
     @rule(k=st.integers(0, len(RULES) - 1), length=st.integers(-1, LONGEST_SHELVING + 1))
     def shelve(self, k: int, length: int) -> None:
@@ -174,7 +176,7 @@ def test_a_long_run_of_random_events_agrees_with_the_flags() -> None:
         elif event == 1:
             bench.acknowledge(rng.choice((None, k)))
         elif event == 2:
-            bench.reset()
+            bench.reset(rng.choice((None, k)))
         elif event == 3:
             bench.shelve(k, rng.randrange(-1, LONGEST_SHELVING + 2))
         else:

@@ -133,9 +133,10 @@ class Alarms:
             changes += found
         return changes
 
-    def reset(self, now: int, who: str, note: str = '') -> list[Change]:
-        """Let go of what is latched: over and seen. All else stays."""
-        chosen = [a for a in self.table.values() if a.state is State.LATCHED]
+    def reset(self, now: int, who: str, note: str = '', key: Key | None = None) -> list[Change]:
+        """Let go of one alarm (None: all) if it is latched: over and seen. All else stays."""
+        latched = {k: a for k, a in self.table.items() if a.state is State.LATCHED}
+        chosen = [a for k, a in latched.items() if key in {None, k}]
         return [c for alarm in chosen for c in self._event(now, alarm, 'reset', who, note)]
 
     def shelve(self, now: int, key: Key, length: int, who: str, note: str = '') -> list[Change]:

@@ -68,7 +68,7 @@ def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
     if o.do == 'acknowledge':
         return alarms.acknowledge(now, o.who, o.note, o.key)
     if o.do == 'reset':
-        return alarms.reset(now, o.who, o.note)
+        return alarms.reset(now, o.who, o.note, o.key)
     if o.key is None:
         raise BadSample(f'{o.do}: expected the code, subject and level of an alert')
     if o.do == 'shelve':
