@@ -48,6 +48,7 @@ ERROR = 'ERROR TIP_OVER left'
         (step(), [alert(ERROR, 1.0, 4.9)], 'PASS'),
         (step(), [alert(ERROR, 1.0, 5.1)], 'FAIL'),
         (step(), [alert('WARN TIP_OVER left', 6.0, None)], 'PASS'),
+        (step(), [alert('STALE INPUT_STALE imu', 6.0, 6.5)], 'INCONCLUSIVE'),
         (step((ERROR,), ()), [], 'FAIL'),
         (step((ERROR,), ()), [alert(ERROR, 1.0, 2.0)], 'PASS'),
         (step((ERROR,), ()), [alert('ERROR TIP_OVER right', 1.0, 2.0)], 'FAIL'),

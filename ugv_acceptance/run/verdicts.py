@@ -113,21 +113,30 @@ def decide(
         for pattern in step.alerts.must
         if not any(_matches(pattern, a) and _active(a, begin, end) for a in alerts)
     ]
-    unwanted = [
-        f'{a["level"]} {a["code"]} {a["subject"]} was active: {a["message"]}'
+    active = [
+        a
         for a in alerts
         if _active(a, hold, end) and any(_matches(p, a) for p in step.alerts.must_not)
     ]
+    # Missing data neither passes nor fails.
+    unwanted = [_told(a) for a in active if a['level'] != 'STALE']
+    unknown = [_told(a) for a in active if a['level'] == 'STALE']
     if done.fault:
         return INCONCLUSIVE, [done.fault]
     if done.stopped:
         return FAIL, [f'stopped: {done.stopped}']
     wrong = [*missing, *unwanted, *([] if done.reached else ['the posture was not reached'])]
     if wrong:
-        return FAIL, wrong
+        return FAIL, [*wrong, *unknown]
+    if unknown:
+        return INCONCLUSIVE, unknown
     if share < LEAST and not any(p.startswith('STALE') for p in step.alerts.must):
         return INCONCLUSIVE, [f'only {share:.0%} of the hold could be evaluated']
     return PASS, ['every alert as expected']
+
+
+def _told(alert: Mapping[str, Any]) -> str:
+    return '{level} {code} {subject} was active: {message}'.format(**alert)
 
 
 def _matches(pattern: str, alert: Mapping[str, Any]) -> bool:
