@@ -19,8 +19,6 @@ PASS, FAIL, INCONCLUSIVE, SKIPPED = 'PASS', 'FAIL', 'INCONCLUSIVE', 'SKIPPED'
 VERDICTS = (FAIL, INCONCLUSIVE, SKIPPED, PASS)
 # Less than this share of the hold evaluated: nothing was shown.
 LEAST = 0.95
-# Levels from the least.
-_SEVERITY = {'WARN': 1, 'ERROR': 2, 'STALE': 3}
 
 
 @dataclass(frozen=True, slots=True)
