@@ -1,0 +1,15 @@
+"""How a recording is read does not show in its result."""
+
+from pathlib import Path
+
+import pytest
+from hardening.sameness import trial
+
+
+@pytest.mark.parametrize('name', ['packbot_fail', 'packbot_gap'])
+def test_the_way_of_reading_changes_no_byte_of_the_result(
+    repository: Path, tmp_path: Path, name: str
+) -> None:
+    """Threads, parts, the order of files, and message by message as the live monitor decodes."""
+    outcome = trial(repository / 'bags' / name, tmp_path)
+    assert outcome.held, outcome.measured
