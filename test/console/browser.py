@@ -162,7 +162,7 @@ class Browser:
         )
         with urllib.request.urlopen(request, timeout=PATIENCE) as answer:  # noqa: S310 - our own
             address = json.load(answer)['webSocketDebuggerUrl']
-        with connect(address, max_size=None, compression=None) as socket:
+        with connect(address, max_size=None, compression=None, ping_interval=None) as socket:
             page = Page(socket)
             yield page
             page.call('Page.close')

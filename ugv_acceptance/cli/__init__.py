@@ -20,6 +20,7 @@ VERBS = (
     'campaign',
     'monitor',
     'console',
+    'watch',
     'replay',
     'plan',
     'run',

@@ -36,7 +36,8 @@ from ugv_acceptance.nodes.running import Stop, ros, spin
 from ugv_acceptance.nodes.session import Session
 
 MONITOR = 'acceptance_monitor'
-PERIOD = 0.05
+# Seconds between snapshots: shorter than between frames, or each would wait for the next.
+PERIOD = 0.02
 # Seconds without a verdict (it comes each second), without margins while inputs arrive, without a
 # snapshot of our own, after which nothing that was said counts any more.
 VERDICT_SILENCE = 2.5
