@@ -46,7 +46,8 @@ def listener(live: Live, heard: list[bytes]) -> Node:
 
 def player(live: Live, play: Play) -> Player:
     """Return a player that somebody listens to."""
-    return Player(live.add(Node('bag_player')), play)
+    # A name of its own: the graph may still hold the player of the test before.
+    return Player(live.add(Node(f'bag_player_{time.monotonic_ns()}')), play)
 
 
 def play_all(live: Live, play: Play) -> list[bytes]:
@@ -76,10 +77,14 @@ def test_the_recorded_quality_of_service_is_offered(live: Live, tmp_path: Path) 
     """A topic that was best effort is offered as best effort, a reliable one as reliable."""
     path, _ = write(tmp_path)
     playing = player(live, Play(path))
-    offered = {
-        topic: playing.node.get_publishers_info_by_topic(topic)[0].qos_profile
-        for topic in ('/joint_states', '/imu/data')
-    }
+
+    def offers(topic: str) -> list[Any]:
+        found = playing.node.get_publishers_info_by_topic(topic)
+        return [i.qos_profile for i in found if i.node_name == playing.node.get_name()]
+
+    topics = ('/joint_states', '/imu/data')
+    live.until(lambda: all(offers(topic) for topic in topics))
+    offered = {topic: offers(topic)[0] for topic in topics}
     assert offered['/joint_states'].reliability == ReliabilityPolicy.RELIABLE
     assert offered['/imu/data'].reliability == ReliabilityPolicy.BEST_EFFORT
     assert offered['/imu/data'].durability == DurabilityPolicy.VOLATILE
