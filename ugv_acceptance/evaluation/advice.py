@@ -1,4 +1,4 @@
-"""What to do about the smallest margin: which joint to move which way, turn, or set the load down.
+"""What to do about the worst margin: which joint to move which way, turn, or set the load down.
 
 Each candidate is a path, followed step by step with the compiled model: it is left where another
 margin falls below its warning limit, where a motor would have to lift more than it can, or where
@@ -121,7 +121,7 @@ def _case_of(
     if state >= NO_CONTACT:
         return None
     scores = scores_of(settings, now.torque, now.angle)
-    worst = int(np.argmin(scores))
+    worst = _most_severe(scores)
     limits, (tip, span) = settings.limits, _spans(settings)
     if worst < len(SIDES):
         reserve = limits.tip_deadband / tip
@@ -130,6 +130,12 @@ def _case_of(
     return _Case(
         settings, at, down, payload, scores, now.torque, state, worst, 1.0 + reserve + SLACK
     )
+
+
+def _most_severe(scores: Floats) -> int:
+    """Return the margin to speak of: past ERROR first, of those a tip-over, then the least."""
+    order = [(score > 0.0, k >= len(SIDES), score) for k, score in enumerate(scores.tolist())]
+    return min(range(len(order)), key=lambda k: order[k])
 
 
 def _ends(case: _Case) -> Iterator[tuple[Path, int, float, bool]]:

@@ -17,7 +17,7 @@ from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.nodes.faults import what_to_do
 
 # Codes whose advice is computed, and how old (ns) computed advice may be.
-COMPUTED, FRESH = frozenset({'TIP_OVER', 'TORQUE_LIMIT'}), 500_000_000
+COMPUTED, FRESH = frozenset({'TIP_OVER', 'TORQUE_LIMIT'}), 250_000_000
 # Times in a row (once a second) that efforts must tell of another load before it is told.
 PERSISTENT = 3
 # Seconds to a limit below which the operator is told at once, and ns before it is told again.
@@ -78,8 +78,9 @@ class Counsel:
         self.estimate = found if self._felt >= PERSISTENT else None
 
     def do(self, alert: Alert) -> str:
-        """Return what to do about an alert: computed where that was possible, else in general."""
-        if alert.rule.code in COMPUTED and self.advice:
+        """Return what to do about an alert: computed for its margin if it is, else in general."""
+        rule = alert.rule
+        if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
         return what_to_do(alert.rule.code)
 
@@ -131,7 +132,7 @@ class Counsel:
         """Return what the operator should know beside the alerts, in plain words."""
         hints = []
         soon = self.ahead(now)
-        if soon:
+        if soon and soon[0].seconds > 0.0:
             hints.append(_ahead_words(soon[0]))
         margins = self.evaluator.margins
         if margins is not None:
@@ -151,6 +152,4 @@ def _ahead_words(ahead: Ahead) -> str:
         what, unit = f'it tips to the {ahead.subject}', 'deg/s'
     else:
         what, unit, rate = f'{ahead.subject} saturates', 'N m/s', abs(ahead.rate)
-    if ahead.seconds <= 0.0:
-        return f'{what} now and loses {rate:.0f} {unit} more'
     return f'shrinking by {rate:.0f} {unit}: {what} in {ahead.seconds:.1f} s'

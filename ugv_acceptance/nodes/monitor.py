@@ -181,10 +181,10 @@ class Monitor(LifecycleNode):
         if session.clock.simulated:
             session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
-        now = session.clock.now()
-        self._tell(session.follower.alarms.advance(now))
+        self._tell(session.follower.alarms.advance(now := session.clock.now()))
         if self._box is not None:
             self._box.advance(now)
+        session.counsel.renew(now, session.active)
         if session.counsel.arrived() or session.counsel.urgent(now):
             self.say()
 
