@@ -2,7 +2,9 @@
 
 FOLDER holds recordings, such as make_fleet.py writes; without it one-minute bags with the rates of
 a real robot are written: joint states at 200 Hz, IMU at 400 Hz, zstd. The campaign runs in a fresh
-folder each time. Says what 100,000 one-hour bags would cost, from the time a recorded hour takes.
+folder each time. One worker reads ahead in a second thread. Wall times tell something on a quiet
+machine only, CPU times on any. Says what 100,000 one-hour bags would cost, from the time a recorded
+hour takes.
 """
 
 import argparse
@@ -90,6 +92,7 @@ def main() -> None:
     gain = one.wall / several.wall
     print(f'gain {gain:.2f}, efficiency {gain / arguments.workers:.0%}, 1-minute load', end=' ')
     print(f'{os.getloadavg()[0]:.1f} on {cores()} cores')
+    print(f'CPU of one worker over that of {arguments.workers}: {one.cpu / several.cpu:.0%}')
     core_hours = BAGS * one.cpu / 3600.0 / one.hours
     wall_hours = BAGS * several.wall / 3600.0 / several.hours
     print(f'{BAGS} one-hour bags: {core_hours:.0f} core hours, {wall_hours:.0f} h on this machine,')

@@ -2,7 +2,8 @@
 
 Half of the runs have firmware fw1, half fw2, which fails more rarely; a run an hour, short. Among
 them are a copy, a file that breaks off and one that is no recording. The same seed gives the same
-messages. Prints how many runs are of each kind.
+messages. Only the times of receipt say when a run was: its stamps do not, of which CLOCK warns.
+Prints how many runs are of each kind.
 """
 
 import argparse

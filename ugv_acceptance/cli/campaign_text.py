@@ -106,8 +106,8 @@ def requirement_text(found: Json, share: str) -> str:
     if found['verdict'] == 'PASS':
         return text
     return (
-        f'{text}; {found["still_to_run_h"]:.1f} h still to run without another failure,'
-        f' {found["still_to_run_after_one_more_failure_h"]:.1f} h with one more'
+        f'{text}; {found["still_to_run_h"]:.4g} h still to run without another failure,'
+        f' {found["still_to_run_after_one_more_failure_h"]:.4g} h with one more'
     )
 
 
