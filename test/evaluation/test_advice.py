@@ -115,3 +115,10 @@ def test_following_the_advice_in_the_simulator_raises_the_margin(kind: str) -> N
     found = list(trials(PACKBOT, 10, 11, (kind,)))
     assert len(found) == 10
     assert sum(trial.helped for trial in found) >= 9
+
+
+def test_a_warning_of_a_motor_is_not_hidden_by_a_tilt_that_is_fine() -> None:
+    """Only margins below their warning limit compete; of those a tip-over is spoken of first."""
+    told = advise(STEADY, STRETCHED, LEVEL, Payload(2.0))
+    assert {a.margin for a in told} == {'shoulder_joint'}
+    assert {a.margin for a in advise(PACKBOT, STRETCHED, LEVEL, Payload(4.0))} == {'front'}

@@ -134,7 +134,10 @@ def _case_of(
 
 def _most_severe(scores: Floats) -> int:
     """Return the margin to speak of: past ERROR first, of those a tip-over, then the least."""
-    order = [(score > 0.0, k >= len(SIDES), score) for k, score in enumerate(scores.tolist())]
+    order = [
+        (int(score > 0.0) + int(score >= 1.0), k >= len(SIDES), score)
+        for k, score in enumerate(scores.tolist())
+    ]
     return min(range(len(order)), key=lambda k: order[k])
 
 
