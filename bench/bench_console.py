@@ -78,9 +78,7 @@ def painted(page: Page) -> None:
     ages = sorted(page.run('ages'))
     gaps = sorted(page.run('gaps.slice(1)'))
     p50, p99 = (ages[int(len(ages) * p)] for p in (0.5, 0.99))
-    print(
-        f'stamp to screen, newest message of a frame   {p50:6.1f} ms median, {p99:.1f} p99 (bar 150)'
-    )
+    print(f"stamp of a frame's newest message to screen  {p50:6.1f} ms, {p99:.1f} p99 (bar 150)")
     rate, worst = len(ages) / SECONDS, gaps[int(len(gaps) * 0.99)]
     print(
         f'frames painted                               {rate:6.1f} a second, gap p99 {worst:.0f} ms'

@@ -49,7 +49,7 @@ HOME_OF = {
     'matplotlib': {'report'},
     'jinja2': {'report', 'plan'},
     'click': {'cli'},
-    'rich': {'cli'},
+    'rich': {'cli', 'console'},
     'typer': {'cli'},
     'starlette': {'console'},
     'textual': {'console'},

@@ -11,6 +11,7 @@ FOLDED = (0.0, 2.0, -2.5, 2.0)
 STRETCHED = (0.0, 0.3, 0.2, 2.0)
 CLOSE = (0.0, 1.2, -1.55, 2.0)  # the shoulder at 90 % of its limit
 LEVEL = 'document.body.dataset.level'
+CAUSE = 'document.getElementById("cause").textContent'
 
 
 @pytest.fixture
@@ -113,9 +114,8 @@ def test_a_caution_can_be_shelved_a_danger_not(shown: Page, robot: Live) -> None
 def test_a_silent_input_is_no_data(shown: Page, robot: Live) -> None:
     """Without IMU the page shows NO DATA and which input is silent."""
     robot.say('silent')
-    shown.wait(f'{LEVEL} === "STALE"')
+    shown.wait(f'{LEVEL} === "STALE" && {CAUSE}.includes("imu")')
     shown.wait('[...document.querySelectorAll("#inputs td.STALE")].length === 1')
-    assert 'imu' in shown.text('#cause')
     robot.say('speak')
     shown.wait(f'{LEVEL} !== "STALE"')
 
@@ -125,8 +125,8 @@ def test_a_stopped_monitor_is_no_data(shown: Page, robot: Live) -> None:
     shown.run('new Promise(done => setTimeout(done, 2500))')
     robot.monitor.send_signal(signal.SIGSTOP)
     try:
-        shown.wait(f'{LEVEL} === "STALE"')
-        assert 'monitor' in shown.text('#cause')
+        # On a busy machine an input may be late as well: what counts is that the page names this.
+        shown.wait(f'{LEVEL} === "STALE" && {CAUSE}.includes("the monitor")')
         assert shown.text('#word') == 'NO DATA'
     finally:
         robot.monitor.send_signal(signal.SIGCONT)
@@ -137,8 +137,7 @@ def test_a_frozen_server_is_no_data(shown: Page, robot: Live) -> None:
     """A console that stands still closes nothing: the page's own watchdog sees it."""
     robot.console.send_signal(signal.SIGSTOP)
     try:
-        shown.wait(f'{LEVEL} === "STALE"')
-        assert 'console server' in shown.text('#cause')
+        shown.wait(f'{LEVEL} === "STALE" && {CAUSE}.includes("console server")')
     finally:
         robot.console.send_signal(signal.SIGCONT)
     shown.wait(f'{LEVEL} !== "STALE"')
