@@ -55,11 +55,12 @@ def test_the_period_is_the_median_of_the_last_full_window(steps: list[int]) -> N
 @given(
     st.lists(st.tuples(st.integers(1, 3 * S), st.integers(-3 * S, 3 * S)), min_size=1, max_size=40),
     st.integers(0, 40),
+    st.sampled_from([1, S, 3 * S]),
 )
-def test_clock_of_many_is_clock_of_each(pairs: list[tuple[int, int]], cut: int) -> None:
-    """Also where the messages come in two parts."""
+def test_clock_of_many_is_clock_of_each(pairs: list[tuple[int, int]], cut: int, grain: int) -> None:
+    """Also where the messages come in two parts, or a clock is so coarse that it stands."""
     times = T0 + np.cumsum([step for step, _ in pairs])
-    stamps = times + [shift for _, shift in pairs]
+    stamps = (times + [shift for _, shift in pairs]) // grain * grain
     one, many = Freshness(Delays()), Freshness(Delays())
     expected = []
     for now, stamp in zip(times.tolist(), stamps.tolist(), strict=True):
@@ -93,11 +94,11 @@ def test_stamps_that_jump_or_are_days_off_are_a_clock_fault(
     assert fresh.deadline == T0 + S + STARTUP
 
 
-def test_a_frozen_clock_is_a_fault_within_two_seconds() -> None:
+def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
     """Stamps that stand still while messages are received."""
     fresh = Freshness(Delays())
     wrong = []
     for k in range(40):
         wrong.append(fresh.clock(T0 + k * 50 * MS, T0))
         fresh.message(T0 + k * 50 * MS)
-    assert wrong.index(1.0) * 50 <= 1100
+    assert 500 < wrong.index(1.0) * 50 <= 600

@@ -14,6 +14,8 @@ WINDOW = 32
 STARTUP = 500_000_000
 # Time (ns) by which two clocks may differ, or a stamp may jump, before it is worth a warning.
 CLOCK_SLACK = 1_000_000_000
+# Time (ns) for which messages may come with one and the same stamp.
+STANDSTILL = 500_000_000
 
 
 @dataclass(slots=True)
@@ -21,13 +23,15 @@ class Freshness:
     """Learns an input's period (median of each WINDOW intervals) and how long it may be silent.
 
     `started` is when listening began (ns), `last` when the newest message was received (None: none
-    yet), `limit` the silence (ns) after which the input is stale.
+    yet), `moved` when its stamp was last another one than before, `limit` the silence (ns) after
+    which the input is stale.
     """
 
     delays: Delays
     started: int | None = None
     last: int | None = None
     stamp: int = 0
+    moved: int = 0
     limit: int = STARTUP
     period: float = float('nan')
     _intervals: list[int] = field(default_factory=list)
@@ -39,15 +43,16 @@ class Freshness:
         return None if since is None else since + self.limit
 
     def clock(self, now: int, stamp: int) -> float:
-        """Return 1 where a header stamp is far from the receipt time or jumped, else 0.
+        """Return 1 where a header stamp is far from the receipt time, jumped or stands, else 0.
 
         To be asked before `message`.
         """
         wrong = abs(now - stamp) > CLOCK_SLACK
         if self.last is not None:
             wrong = wrong or abs((stamp - self.stamp) - (now - self.last)) > CLOCK_SLACK
-        self.stamp = stamp
-        return 1.0 if wrong else 0.0
+        if self.last is None or stamp != self.stamp:
+            self.stamp, self.moved = stamp, now
+        return 1.0 if wrong or now - self.moved > STANDSTILL else 0.0
 
     def clocks(self, times: Times, stamps: Times) -> NDArray[np.float64]:
         """Return `clock` of many messages, to be asked before `messages`."""
@@ -57,8 +62,12 @@ class Freshness:
         first = times[0] if self.last is None else self.last
         before = stamps[0] if self.last is None else self.stamp
         step = np.diff(stamps, prepend=before) - np.diff(times, prepend=first)
-        self.stamp = int(stamps[-1])
-        return np.where(wrong | (np.abs(step) > CLOCK_SLACK), 1.0, 0.0)
+        new = np.diff(stamps, prepend=before) != 0
+        new[0] |= self.last is None
+        moved = np.maximum.accumulate(np.where(new, times, self.moved))
+        self.stamp, self.moved = int(stamps[-1]), int(moved[-1])
+        stands = times - moved > STANDSTILL
+        return np.where(wrong | stands | (np.abs(step) > CLOCK_SLACK), 1.0, 0.0)
 
     def message(self, now: int) -> None:
         """Take the receipt time (ns) of a message."""
