@@ -111,7 +111,7 @@ def test_a_dask_cluster_gives_the_same(fleet: Path, tmp_path: Path, single: Path
     """Workers of dask.distributed on loopback judge as processes here do."""
     distributed = pytest.importorskip('distributed', reason='extra cluster is not installed')
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, host='127.0.0.1', dashboard_address=None
+        n_workers=1, threads_per_worker=1, host='127.0.0.1', dashboard_address=':0'
     ) as cluster:
         options = ('--scheduler', cluster.scheduler_address, '--require-mtbf', '96')
         code, text = campaign(tmp_path, fleet, *options)

@@ -83,7 +83,7 @@ def on_cluster(sources: Sequence[Source], brief: Brief, address: str) -> Iterato
     """
     distributed = _distributed()
     try:
-        client = distributed.Client(address, timeout='10s', set_as_default=False)
+        client = distributed.Client(address, timeout='5s', set_as_default=False)
     except (OSError, ValueError) as error:
         text = ' '.join(str(error).split())[:200]
         raise AcceptanceError(
