@@ -36,7 +36,7 @@ WORDS = {
         'check for not-a-number, degrees for radians, raw counts, a quaternion that is no rotation',
     ),
     'CLOCK': (
-        'header stamps of {subject} differ from the time of receipt by over a second, jump or stand',
+        'header stamps of {subject} are over a second from the time of receipt, jump or stand',
         'check the clocks and use_sim_time',
     ),
     'IMU_GRAVITY': (
