@@ -35,10 +35,12 @@ def judge_all(
     """Yield what came of every run, in the order in which they are ready."""
     if scheduler is not None:
         yield from on_cluster(sources, brief, scheduler)
-    elif workers == 1:
+    elif min(workers, len(sources)) == 1:
         yield from (judge_source(source, brief) for source in sources)
     else:
-        yield from in_processes(partial(judge_source, brief=brief), sources, workers)
+        yield from in_processes(
+            partial(judge_source, brief=brief), sources, min(workers, len(sources))
+        )
 
 
 def in_processes(work: Work, sources: Iterable[Source], workers: int) -> Iterator[Done]:
