@@ -1,13 +1,15 @@
-"""Trials of recordings: damaged by the thousand, and read in several ways."""
+"""Trials of files: recordings damaged and read in several ways, robots of an attacker."""
 
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from hardening import damage, sameness
+from hardening import damage, robots_fuzzed, sameness
 from hardening.outcome import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
+# Seconds that any file may take.
+PATIENCE = 5.0
 CONFORMANCE = ROOT.parent / 'shared' / 'bags' / 'conformance'
 
 
@@ -15,12 +17,12 @@ def damaged(share: float) -> Iterable[Outcome]:
     """Cut at every byte, flip 10,000 bits, 4,000 wrong lengths, bombs of 1 GiB, 656 files."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
-        yield damage.cuts(path, round(1 / share))
-        yield damage.flips(path, int(10_000 * share))
-        yield damage.hostile(path, int(4_000 * share))
-        yield damage.bombs(path)
+        yield damage.cuts(path, round(1 / share), PATIENCE)
+        yield damage.flips(path, int(10_000 * share), patience=PATIENCE)
+        yield damage.hostile(path, int(4_000 * share), patience=PATIENCE)
+        yield damage.bombs(path, patience=PATIENCE)
     if CONFORMANCE.is_dir():
-        yield damage.conformance(CONFORMANCE)
+        yield damage.conformance(CONFORMANCE, PATIENCE)
     else:
         yield Outcome('no conformance files beside this checkout', None)
 
@@ -30,3 +32,13 @@ def same(_share: float) -> Iterable[Outcome]:
     for name in ('packbot_pass', 'packbot_fail', 'packbot_gap'):
         with tempfile.TemporaryDirectory() as folder:
             yield sameness.trial(ROOT / 'bags' / name, Path(folder))
+
+
+def robots(share: float) -> Iterable[Outcome]:
+    """Load 10,000 fuzzed robots, hostile files, 500 links and 100 branches."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder)
+        yield robots_fuzzed.fuzz(path, int(10_000 * share), patience=PATIENCE)
+        yield robots_fuzzed.hostile(path, PATIENCE)
+        yield robots_fuzzed.large(path, 499, branches=False, patience=PATIENCE)
+        yield robots_fuzzed.large(path, 100, branches=True, patience=PATIENCE)

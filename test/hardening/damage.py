@@ -5,6 +5,7 @@ import time
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from random import Random
 
@@ -17,8 +18,6 @@ from mcap.writer import CompressionType
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.reader import open_bag
 
-# Seconds that any file may take.
-PATIENCE = 5.0
 GIB = 1 << 30
 
 
@@ -61,7 +60,7 @@ class Tally:
         if not guarded and not said and bag.protected != 'none':
             self.unsaid += 1
 
-    def outcome(self, name: str) -> Outcome:
+    def outcome(self, name: str, patience: float) -> Outcome:
         """Return the tally as one row."""
         first = [*self.crashed, *self.silent][:1]
         text = (
@@ -69,7 +68,7 @@ class Tally:
             f'{self.unsaid} not called unprotected, slowest {self.slowest:.2f} s'
         )
         held = not self.crashed and not self.silent and not self.unsaid
-        return Outcome('; '.join([text, *first]), held and self.slowest < PATIENCE)
+        return Outcome('; '.join([text, *first]), held and self.slowest < patience)
 
 
 def _recording(path: Path, shape: str, messages: list[Message]) -> list[object]:
@@ -77,7 +76,7 @@ def _recording(path: Path, shape: str, messages: list[Message]) -> list[object]:
     return list(expected(messages))
 
 
-def cuts(folder: Path, step: int = 1) -> Outcome:
+def cuts(folder: Path, step: int = 1, patience: float = inf) -> Outcome:
     """Cut small recordings after every `step`-th byte."""
     tally = Tally()
     for shape in ('zstd', 'uncompressed', 'no chunks'):
@@ -87,10 +86,10 @@ def cuts(folder: Path, step: int = 1) -> Outcome:
         for size in range(0, len(data), step):
             path.write_bytes(data[:size])
             tally.take(path, whole, f'{shape} cut at {size}', guarded=True)
-    return tally.outcome('cuts')
+    return tally.outcome('cuts', patience)
 
 
-def flips(folder: Path, count: int, seed: int = 0) -> Outcome:
+def flips(folder: Path, count: int, seed: int = 0, patience: float = inf) -> Outcome:
     """Flip one bit, `count` times, over recordings with and without checksums."""
     rng, tally = Random(seed), Tally()
     shapes = ('zstd', 'lz4', 'uncompressed', 'no checksums')
@@ -105,10 +104,10 @@ def flips(folder: Path, count: int, seed: int = 0) -> Outcome:
             path.write_bytes(broken)
             what = f'{shape} bit {bit}'
             tally.take(path, whole, what, guarded=shape != 'no checksums')
-    return tally.outcome('bit flips')
+    return tally.outcome('bit flips', patience)
 
 
-def hostile(folder: Path, count: int = 400, seed: int = 0) -> Outcome:
+def hostile(folder: Path, count: int, seed: int = 0, patience: float = inf) -> Outcome:
     """Write odd lengths and offsets over those of records; point indexes at each other."""
     rng, tally = Random(seed), Tally()
     path = folder / 'hostile.mcap'
@@ -123,7 +122,7 @@ def hostile(folder: Path, count: int = 400, seed: int = 0) -> Outcome:
         path.write_bytes(_resealed(broken))
         tally.take(path, whole, f'hostile {_}', guarded=False)
     tally.unsaid = 0  # lengths and offsets are not what a chunk's checksum covers
-    return tally.outcome('wrong lengths and looping indexes')
+    return tally.outcome('wrong lengths and looping indexes', patience)
 
 
 def _numbers(data: bytes) -> Iterator[int]:
@@ -148,7 +147,7 @@ def _resealed(data: bytearray) -> bytes:
     return bytes(data)
 
 
-def bombs(folder: Path, size: int = GIB) -> Outcome:
+def bombs(folder: Path, size: int = GIB, patience: float = inf) -> Outcome:
     """Chunks and files of a few kB that unpack to `size` bytes of zeros, said or not said."""
     made: list[tuple[str, Callable[[Path, int], Path]]] = [
         ('chunk that says so', _honest),
@@ -166,7 +165,7 @@ def bombs(folder: Path, size: int = GIB) -> Outcome:
         except BadBag:
             got, said = 0, True
         grown, took = memory() - before, time.perf_counter() - start
-        held = held and said and got == 0 and grown < 80 and took < PATIENCE
+        held = held and said and got == 0 and grown < 80 and took < patience
         told = 'refused' if said else 'NOT SAID'
         texts.append(f'{name} ({path.stat().st_size} bytes): {told}, {grown:+.0f} MB, {took:.2f} s')
     return Outcome('; '.join(texts), held)
@@ -208,7 +207,7 @@ def _whole(folder: Path, size: int) -> Path:
     return path
 
 
-def conformance(folder: Path) -> Outcome:
+def conformance(folder: Path, patience: float = inf) -> Outcome:
     """Open and read the conformance files of the format."""
     paths = sorted(folder.glob('*.mcap'))
     slowest, crashed = 0.0, []
@@ -222,4 +221,4 @@ def conformance(folder: Path) -> Outcome:
             crashed.append(f'{path.name}: {error!r}')
         slowest = max(slowest, time.perf_counter() - start)
     text = f'{len(paths)} conformance files: {len(crashed)} crashes, slowest {slowest:.2f} s'
-    return Outcome('; '.join([text, *crashed[:1]]), not crashed and slowest < PATIENCE)
+    return Outcome('; '.join([text, *crashed[:1]]), not crashed and slowest < patience)
