@@ -1,8 +1,10 @@
-"""Trials of messages: by the million, for a day."""
+"""Trials of messages: by the million, for a day, of wrong clocks and broken drivers."""
 
 from collections.abc import Iterable
 
+from hardening import clocks as wrong_clocks
 from hardening import decoding, long_day
+from hardening import values as broken
 from hardening.outcome import Outcome
 
 
@@ -14,3 +16,13 @@ def mutants(share: float) -> Iterable[Outcome]:
 def day(share: float) -> Iterable[Outcome]:
     """Evaluate a day."""
     yield long_day.trial(int(86_400 * share))
+
+
+def clocks(_share: float) -> Iterable[Outcome]:
+    """Try every wrong clock."""
+    return wrong_clocks.outcomes()
+
+
+def values(_share: float) -> Iterable[Outcome]:
+    """Send every broken message."""
+    return broken.outcomes()

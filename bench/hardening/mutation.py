@@ -12,9 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from random import Random
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 # File -> the tests that are about it.
@@ -36,15 +37,19 @@ _BINARY: dict[type[ast.operator], type[ast.operator]] = {
 }  # fmt: skip
 
 
-def mutants(source: str) -> Iterator[tuple[str, str]]:
-    """Yield (what was changed, the changed source) for every place that can be changed."""
-    count = sum(1 for _ in ast.walk(ast.parse(source)))
-    for place in range(count):
-        tree = ast.parse(source)
-        node = list(ast.walk(tree))[place]
-        before = ast.unparse(node) if isinstance(node, ast.expr) else ''
-        if isinstance(node, ast.expr) and _change(node):
-            yield f'{node.lineno}: {before} -> {ast.unparse(node)}', ast.unparse(tree)
+def places(source: str) -> list[int]:
+    """Return the numbers of the nodes, in ast.walk's order, that can be changed."""
+    nodes = enumerate(ast.walk(ast.parse(source)))
+    return [k for k, node in nodes if isinstance(node, ast.expr) and _change(node)]
+
+
+def mutant(source: str, place: int) -> tuple[str, str]:
+    """Return what was changed at a place, and the changed source."""
+    tree = ast.parse(source)
+    node: Any = list(ast.walk(tree))[place]
+    before = ast.unparse(node)
+    _change(node)
+    return f'{node.lineno}: {before} -> {ast.unparse(node)}', ast.unparse(tree)
 
 
 def _change(node: ast.expr) -> bool:
@@ -95,16 +100,18 @@ def try_some(names: Iterable[str], budget: float, seed: int) -> dict[str, tuple[
         for part in ('ugv_acceptance', 'test', 'msg_configs', 'urdf', 'bags'):
             shutil.copytree(ROOT / part, copy / part)
         shutil.copy(ROOT / 'pyproject.toml', copy)
-        waiting = {}
+        waiting, sources = dict[str, list[int]](), dict[str, str]()
         for name in found:
             source = (copy / 'ugv_acceptance' / name).read_text(encoding='utf-8')
             if killed(copy, name, source):
                 raise SystemExit(f'{name}: its tests fail without a mutant')
-            waiting[name] = rng.sample(every := list(mutants(source)), len(every))
+            waiting[name] = places(source)
+            rng.shuffle(waiting[name])
+            sources[name] = source
         end = time.monotonic() + budget
         while any(waiting.values()) and time.monotonic() < end:
             for name in (name for name, rest in waiting.items() if rest):
-                what, source = waiting[name].pop()
+                what, source = mutant(sources[name], waiting[name].pop())
                 dead = killed(copy, name, source)
                 found[name] = (found[name][0] + dead, found[name][1] + 1)
                 if not dead:

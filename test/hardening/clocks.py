@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from evaluation.streams import MS, STILL, T0, Imu, Message, S, give, run_of, settings
+from evaluation.streams import MS, STILL, T0, Carry, Imu, Message, S, give, run_of, settings
 from hardening.outcome import Outcome
 
 from ugv_acceptance.evaluation.live import LiveEvaluator
@@ -26,7 +26,7 @@ CLOCKS: dict[str, Callable[[int], int]] = {
 def wrong(message: Message, clock: Callable[[int], int]) -> Message:
     """Return a message with the stamp of a clock that goes wrong at WRONG."""
     t = message.time - T0
-    if t < WRONG or not hasattr(message, 'stamp'):
+    if t < WRONG or isinstance(message, Carry):
         return message
     return replace(message, stamp=clock(t))
 

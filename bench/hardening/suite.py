@@ -1,0 +1,52 @@
+"""Trials that the test suite makes against real ROS, processes and sockets: run and counted."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from hardening.outcome import Outcome
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def of_tests(*chosen: str, words: str = '') -> Callable[[float], Iterable[Outcome]]:
+    """Return a trial that runs these files of test/, of which those that match `words`."""
+
+    def run(_share: float) -> Iterable[Outcome]:
+        yield passed(chosen, words)
+
+    return run
+
+
+def passed(chosen: Iterable[str], words: str = '', *options: str) -> Outcome:
+    """Run tests and return how many passed."""
+    command = [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', *options]
+    command += [str(Path('test', name)) for name in chosen]
+    command += ['-k', words] if words else []
+    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=3600, env=env
+    )
+    counts = re.findall(r'\d+ (?:passed|failed|skipped|error)', done.stdout)
+    failed = re.findall(r'^(?:FAILED|ERROR) (\S+)', done.stdout, re.MULTILINE)
+    return Outcome('; '.join([', '.join(counts) or 'no test ran', *failed]), done.returncode == 0)
+
+
+def branches(_share: float) -> Iterable[Outcome]:
+    """Measure the coverage of branches of the three rooms by their own tests."""
+    rooms = ('model', 'evaluation', 'bag')
+    options = ['--cov-branch', '--cov-report=', *(f'--cov=ugv_acceptance.{r}' for r in rooms)]
+    yield passed([*rooms, 'hardening', 'cli'], '', *options)
+    for room in rooms:
+        yield Outcome(*_covered(room))
+
+
+def _covered(room: str) -> tuple[str, bool]:
+    command = [sys.executable, '-m', 'coverage', 'report', f'--include=*/{room}/*']
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    found = re.search(r'^TOTAL.* (\d+)%', done.stdout, re.MULTILINE)
+    share = int(found[1]) if found else 0
+    return f'{room}/: {share} % of lines and branches', share >= 95
