@@ -3,6 +3,7 @@
 import struct
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,6 +21,7 @@ from ugv_acceptance.nodes.following import KEPT, Follower
 from ugv_acceptance.nodes.parameters import knobs_of, unknown
 from ugv_acceptance.nodes.receipt import RESHIFT, ReceiptClock
 from ugv_acceptance.nodes.session import Session
+from ugv_acceptance.nodes.supervision import guarded
 
 CONFIG = load()
 NS = 1_000_000_000
@@ -76,6 +78,28 @@ def test_a_fault_of_ours_is_an_error_and_not_the_end() -> None:
     assert watched.level == STALE
     assert problems
     assert [alert.rule.code for alert in watched.faults.active] == ['MONITOR_FAULT']
+
+
+def test_a_fault_in_a_timer_is_an_error_and_not_the_end() -> None:
+    """What fails in a timer's work is told, leaves the margins unknown, and does not come out."""
+    told: list[str] = []
+    watched = session(told)
+
+    class Watching:
+        """A monitor as far as a timer needs one."""
+
+        session: Session | None = watched
+
+        def get_logger(self) -> Any:
+            return SimpleNamespace(error=lambda text, **_: told.append(text))
+
+    def tick() -> None:
+        raise ZeroDivisionError
+
+    guarded(Watching(), tick)()
+    assert watched.evaluator.margins is None
+    assert any('ZeroDivisionError' in text for text in told)
+    assert any(alert.rule.code == 'MONITOR_FAULT' for alert in watched.active)
 
 
 def test_margins_come_with_the_second_input() -> None:

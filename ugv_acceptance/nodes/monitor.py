@@ -40,7 +40,7 @@ from ugv_acceptance.nodes.receipt import ReceiptClock
 from ugv_acceptance.nodes.running import run
 from ugv_acceptance.nodes.session import Session
 from ugv_acceptance.nodes.status import Status, alert_status, verdict_of
-from ugv_acceptance.nodes.supervision import diagnostics_of, unavailable
+from ugv_acceptance.nodes.supervision import diagnostics_of, guarded, unavailable
 
 NAME = 'acceptance_monitor'
 INACTIVE = 'the monitor is not active'
@@ -70,7 +70,7 @@ class Monitor(LifecycleNode):
         self.add_post_set_parameters_callback(self._take_parameters)
         # Steady: a frozen /clock must not silence the diagnostics.
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1.0, self._every_second, clock=self.steady)
+        self.create_timer(1.0, guarded(self, self._every_second), clock=self.steady)
         self.create_service(Trigger, '~/acknowledge', self._acknowledge)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_subscription(DiagnosticStatus, '~/operator', self._on_operator, 10)
@@ -142,7 +142,7 @@ class Monitor(LifecycleNode):
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
-        self._tick = self.create_timer(tick, self._on_tick, clock=self.steady)
+        self._tick = self.create_timer(tick, guarded(self, self._on_tick), clock=self.steady)
 
     def _new_session(self, settings: Settings) -> Session:
         return Session(

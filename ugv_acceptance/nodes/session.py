@@ -170,12 +170,16 @@ class Session:
             except BadSample as error:
                 self._malformed(name, error)
             except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
-                self.evaluator.margins = None
-                self.faults.set(self.clock.now(), 'MONITOR_FAULT', name, 1.0, repr(error))
-                self.on_problem(f'{name}: fault of the monitor: {error!r}')
-                self._look()
+                self.fail(name, error)
 
         return guarded
+
+    def fail(self, where: str, error: Exception) -> None:
+        """Say that our own code failed: the margins are not known then, and never OK."""
+        self.evaluator.margins = None
+        self.faults.set(self.clock.now(), 'MONITOR_FAULT', where, 1.0, repr(error))
+        self.on_problem(f'{where}: fault of the monitor: {error!r}')
+        self._look()
 
     def _malformed(self, name: str, error: BadSample) -> None:
         count = self.counts[name]

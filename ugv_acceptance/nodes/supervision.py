@@ -1,6 +1,7 @@
 """Diagnostics of the monitor and its inputs: rates, ages, publishers, faults, version, files."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
@@ -70,3 +71,27 @@ def _input(name: str, session: Session, inputs: 'Inputs | None', active: list[Al
         level = STALE
     text = '; '.join(session.faults.sentence(a, session.settings) for a in mine)
     return Status(level, f'Input {name}', text or f'{rate:.1f} Hz', values)
+
+
+class Watcher(Protocol):
+    """What `guarded` needs of a monitor."""
+
+    session: Session | None
+
+    def get_logger(self) -> Any:  # noqa: ANN401 - rclpy's logger
+        """Return its logger."""
+
+
+def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
+    """Return a timer's work that outlives a fault of ours: the watch goes on, and says so."""
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+            text = f'{work.__name__}: fault of the monitor: {error!r}'
+            watcher.get_logger().error(text, throttle_duration_sec=5.0)
+            if watcher.session is not None:
+                watcher.session.fail(work.__name__, error)
+
+    return run
