@@ -12,7 +12,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help venv demo test lint pytest colcon clean distclean
+.PHONY: help venv demo test lint pytest colcon hardening clean distclean
 
 # The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
 # libraries load.
@@ -39,6 +39,7 @@ help:
 	@echo 'make lint       ruff and mypy --strict'
 	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
 	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
+	@echo 'make hardening  the faults of docs/threats.md, tried by the thousand: about an hour, by hand; ARGS="--only 1,2"'
 	@echo 'make clean      removes what was built; make distclean the virtual environments too'
 
 venv: .venv/.installed
@@ -98,6 +99,9 @@ colcon: .venv312/.installed
 	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
+
+hardening: venv
+	.venv/bin/python -m bench.hardening $(ARGS)
 
 clean:
 	rm -rf out build install log *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
