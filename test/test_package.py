@@ -15,7 +15,16 @@ from catkin_pkg.package import Package, parse_package
 
 import ugv_acceptance
 
-DATA_FOLDERS = ['msg_configs', 'urdf', 'launch', 'bags']
+DATA_FOLDERS = [
+    'bags',
+    'config',
+    'launch',
+    'layouts',
+    'msg_configs',
+    'rviz',
+    'schema',
+    'urdf',
+]
 
 # A requirement's rosdep key is python3-<its name>, except:
 ROSDEP_KEY = {'pyyaml': 'python3-yaml', 'rosbags': 'python3-rosbags-pip'}
