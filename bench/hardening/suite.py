@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
+from importlib.util import find_spec
 from pathlib import Path
 
 from hardening.outcome import Outcome
@@ -37,6 +38,9 @@ def passed(chosen: Iterable[str], words: str = '', *options: str) -> Outcome:
 
 def branches(_share: float) -> Iterable[Outcome]:
     """Measure the coverage of branches of the three rooms by their own tests."""
+    if find_spec('pytest_cov') is None:
+        yield Outcome('needs pytest-cov, which is not installed', None)
+        return
     rooms = ('model', 'evaluation', 'bag')
     options = ['--cov-branch', '--cov-report=', *(f'--cov=ugv_acceptance.{r}' for r in rooms)]
     yield passed([*rooms, 'hardening', 'cli'], '', *options)
