@@ -134,9 +134,7 @@ def give(evaluator: LiveEvaluator, message: Message) -> Margins | None:
         evaluator.carry(m.time, m.mass, m.com, m.frame)
         return None
     if isinstance(m, Joints):
-        return evaluator.joint_state(
-            m.time, stamp_of(m), m.names, m.position, m.velocity, m.effort
-        )
+        return evaluator.joint_state(m.time, stamp_of(m), m.names, m.position, m.velocity, m.effort)
     return evaluator.imu(
         m.time, stamp_of(m), m.orientation, m.covariance_0, m.omega, m.acceleration
     )

@@ -98,9 +98,7 @@ class _Live:
 
 def test_a_gap_is_not_evaluated() -> None:
     """Ten seconds with a silence of two: its first tenth of a second still counts."""
-    silent = [
-        m for m in run_of(10.0) if not (isinstance(m, Imu) and 4 * S < m.time - T0 < 6 * S)
-    ]
+    silent = [m for m in run_of(10.0) if not (isinstance(m, Imu) and 4 * S < m.time - T0 < 6 * S)]
     summary = summed(settings(), silent, [100, 700], T0 + 10 * S)
     assert summary.evaluated == pytest.approx(8.09 * S, abs=0.03 * S)
 
