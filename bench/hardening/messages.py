@@ -1,9 +1,9 @@
-"""Trials of messages: by the million, for a day, of wrong clocks and broken drivers."""
+"""Trials of messages: by the million, for a day, of wrong clocks, broken drivers, parameters."""
 
 from collections.abc import Iterable
 
 from hardening import clocks as wrong_clocks
-from hardening import decoding, long_day
+from hardening import decoding, long_day, parameter_sets
 from hardening import values as broken
 from hardening.outcome import Outcome
 
@@ -26,3 +26,8 @@ def clocks(_share: float) -> Iterable[Outcome]:
 def values(_share: float) -> Iterable[Outcome]:
     """Send every broken message."""
     return broken.outcomes()
+
+
+def parameters(share: float) -> Iterable[Outcome]:
+    """Put 10,000 sets to a running monitor."""
+    yield parameter_sets.trial(int(10_000 * share))

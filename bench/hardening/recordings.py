@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hardening import damage, robots_fuzzed, sameness
+from hardening import lossy as relays
 from hardening.outcome import Outcome
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,3 +43,11 @@ def robots(share: float) -> Iterable[Outcome]:
         yield robots_fuzzed.hostile(path, PATIENCE)
         yield robots_fuzzed.large(path, 499, branches=False, patience=PATIENCE)
         yield robots_fuzzed.large(path, 100, branches=True, patience=PATIENCE)
+
+
+def lossy(share: float) -> Iterable[Outcome]:
+    """Lose parts of two recordings in six ways, with 50 seeds each."""
+    for name in ('packbot_pass', 'packbot_fail'):
+        for way in relays.WAYS:
+            with tempfile.TemporaryDirectory() as folder:
+                yield relays.trial(ROOT / 'bags' / name, Path(folder), way, int(50 * share) or 1)

@@ -74,6 +74,12 @@ ROWS = (
         suite.of_tests('nodes/test_monitor_inputs.py', words='second_publisher or not_allowed'),
     ),
     Row(
+        10,
+        'recordings of which messages, bursts are lost, or all are late',
+        'the same verdict or INCONCLUSIVE',
+        recordings.lossy,
+    ),
+    Row(
         11,
         'kill -9 of run and black box',
         'all files readable, at most 1 s lost',
@@ -81,9 +87,9 @@ ROWS = (
     ),
     Row(
         12,
-        'random sets of parameters while running',
-        'wholly taken or wholly refused',
-        suite.of_tests('nodes/test_monitor_control.py', words='sets or cannot_be_taken'),
+        '10,000 random sets of parameters while running',
+        'wholly taken or wholly refused with the reason',
+        messages.parameters,
     ),
     Row(
         13,
