@@ -102,3 +102,18 @@ def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
         wrong.append(fresh.clock(T0 + k * 50 * MS, T0))
         fresh.message(T0 + k * 50 * MS)
     assert 500 < wrong.index(1.0) * 50 <= 600
+
+
+def test_columns_learn_the_period_of_a_slow_input() -> None:
+    """A hundred messages at 60 ms: stale after three periods."""
+    fresh = Freshness(Delays())
+    _, limits = fresh.messages(T0 + np.arange(100) * 60 * MS)
+    assert fresh.period == 60 * MS
+    assert limits[-1] == fresh.limit == 180 * MS
+
+
+def test_columns_of_a_frozen_clock_are_wrong_after_half_a_second() -> None:
+    """Not at half a second: only what is longer."""
+    times = T0 + np.arange(20) * 50 * MS
+    wrong = Freshness(Delays()).clocks(times, np.full(20, T0))
+    assert np.flatnonzero(wrong)[0] * 50 == 550

@@ -31,7 +31,7 @@ def same(a: Any, b: Any) -> bool:
 
 
 def trial(count: int, seed: int = 0) -> Outcome:
-    """Put `count` sets, with messages between them, and compare all that is told with what rules."""
+    """Put `count` sets, messages between them; compare what is told with what rules."""
     rng, taken, bad, seen = Random(seed), 0, list[str](), list[Margins]()
     with ros_context(), live_nodes() as live:
         monitor, driver = live.running()
