@@ -86,7 +86,7 @@ pytest: venv
 
 colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
 
-# Unless it is asked, colcon takes failing tests for a success; no test at all is one to it in any case.
+# Tests that need a browser run once, in `make pytest`. Unless it is asked, colcon takes failing tests for a success; no test at all is one to it in any case.
 colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log build \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --event-handlers console_direct+
@@ -96,7 +96,8 @@ colcon: .venv312/.installed
 	set +u; . $(COLCON)/install/setup.sh; cd /; '$(CURDIR)/$(INSTALLED)/lib/ugv_acceptance/ugv-acceptance' model > /dev/null
 	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
-	    --event-handlers console_direct+ --return-code-on-test-failure --pytest-args -n $(JOBS) $(ARGS)
+	    --event-handlers console_direct+ --return-code-on-test-failure \
+	    --pytest-args -n $(JOBS) '--ignore-glob=*test_page_of_*' $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
