@@ -23,12 +23,14 @@ _SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int], None]]:
     """Show how far a recording is read (log times, ns), where a person is watching."""
     console = Console(file=stream)
+    if not console.is_terminal:  # a disabled bar of older rich still prints an empty line
+        yield lambda _: None
+        return
     with Progress(
         *Progress.get_default_columns(),
         TextColumn('{task.fields[seconds]:.0f} s of the recording'),
         console=console,
         transient=True,
-        disable=not console.is_terminal,
     ) as progress:
         task = progress.add_task('reading', total=max(end - start, 1), seconds=0.0)
 
