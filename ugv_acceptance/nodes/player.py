@@ -26,7 +26,7 @@ from ugv_acceptance.nodes.running import BAD_INPUT, Stop, ros
 
 # Seconds to wait for subscribers at the start: discovery takes one or two.
 DISCOVERY = 3.0
-# Seconds until a subscriber that we know of knows of us too: before that it hears nothing.
+# Seconds until a subscriber that we know of knows of us too, and until it has what was on its way.
 SETTLING = 0.7
 _NS = 1_000_000_000
 # Seconds between two messages on /clock.
@@ -97,6 +97,7 @@ class Player:
             self._once(stop, clock, progress)
             if not self.play.loop:
                 break
+        time.sleep(SETTLING)  # best effort drops what is on its way when a publisher goes
 
     def _once(self, stop: Stop, clock: Publisher | None, progress: Callable[[float], None]) -> None:
         first, began = self.bag.start_ns, time.monotonic_ns()
