@@ -19,10 +19,10 @@ import pinocchio as pin
 from ugv_acceptance.config import load
 from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.planar import PAPER, planar_dynamics
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import margins, stability_of, stances_of
 from ugv_acceptance.model.statics import torque_of
+from ugv_acceptance.studies.planar import PAPER, planar_dynamics
 
 ROUNDS = 3
 LOOPS = 20_000  # postures a loop is timed with; its cost a posture does not depend on their number

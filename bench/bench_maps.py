@@ -14,17 +14,17 @@ from collections.abc import Callable
 import numpy as np
 
 from ugv_acceptance.config import load
-from ugv_acceptance.model.bilinear import grid_of
-from ugv_acceptance.model.maps import (
+from ugv_acceptance.model.stability import stability
+from ugv_acceptance.studies.bilinear import grid_of
+from ugv_acceptance.studies.maps import (
     rollover_map,
     stands,
     tip_forms,
     torque_forms,
     within_limits,
 )
-from ugv_acceptance.model.planar import PAPER, arm_robot
-from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.windows import Mask
+from ugv_acceptance.studies.planar import PAPER, arm_robot
+from ugv_acceptance.studies.windows import Mask
 
 LIMIT = 50.0
 ROUNDS = 5

@@ -9,10 +9,10 @@ import sys
 import time
 
 from ugv_acceptance.config import load
-from ugv_acceptance.model.planar import PAPER, arm_robot
-from ugv_acceptance.model.quadrature import saturation_probability
-from ugv_acceptance.model.risk import BLOCK, Study, run
-from ugv_acceptance.model.spread import Spread, generators, normal, uniform
+from ugv_acceptance.studies.planar import PAPER, arm_robot
+from ugv_acceptance.studies.quadrature import saturation_probability
+from ugv_acceptance.studies.risk import BLOCK, Study, run
+from ugv_acceptance.studies.spread import Spread, generators, normal, uniform
 
 
 def mebibytes() -> float:

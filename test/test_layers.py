@@ -15,19 +15,30 @@ PACKAGE = Path(__file__).resolve().parents[1] / 'ugv_acceptance'
 MODULES = sorted(PACKAGE.rglob('*.py'))
 
 # What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
-BELOW_RUN = {'model', 'evaluation', 'config', 'bag', 'simulation', 'report', 'plan', 'campaign'}
+BELOW_RUN = {
+    'model',
+    'studies',
+    'evaluation',
+    'config',
+    'bag',
+    'simulation',
+    'report',
+    'plan',
+    'campaign',
+}
 BELOW_NODES = BELOW_RUN | {'run', 'console'}
 MAY_IMPORT: dict[str, set[str]] = {
     '__init__': set(),
     'model': set(),
+    'studies': {'model'},
     'evaluation': {'model'},
     'config': {'model', 'evaluation'},
     'bag': {'model', 'evaluation'},
     'simulation': {'model'},
-    'campaign': {'model', 'evaluation', 'config', 'bag'},
-    'report': {'model', 'evaluation'},
-    'console': {'model', 'evaluation', 'bag', 'config'},
-    'plan': {'model', 'evaluation', 'config', 'report'},
+    'campaign': {'model', 'studies', 'evaluation', 'config', 'bag'},
+    'report': {'model', 'studies', 'evaluation'},
+    'console': {'model', 'studies', 'evaluation', 'bag', 'config'},
+    'plan': {'model', 'studies', 'evaluation', 'config', 'report'},
     'run': BELOW_RUN,
     'nodes': BELOW_NODES,
     'cli': BELOW_NODES | {'nodes'},
@@ -57,7 +68,7 @@ HOME_OF = {
     'websockets': {'console'},
 }
 # The pure part takes time, files and settings as arguments.
-PURE = {'model', 'evaluation'}
+PURE = {'model', 'studies', 'evaluation'}
 IMPURE_MODULES = {
     'time',
     'datetime',

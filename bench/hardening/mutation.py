@@ -23,7 +23,7 @@ TESTS = {
     'model/statics.py': ['model/test_statics.py', 'model/test_against_pinocchio.py'],
     'model/support.py': ['model/test_support.py'],
     'model/hull.py': ['model/test_support.py', 'model/test_stability.py'],
-    'model/stability.py': ['model/test_stability.py', 'model/test_planar.py'],
+    'model/stability.py': ['model/test_stability.py', 'studies/test_planar.py'],
     'evaluation/alerts.py': ['evaluation/test_alerts.py', 'evaluation/test_chatter.py'],
     'evaluation/freshness.py': ['evaluation/test_freshness.py'],
 }

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from ugv_acceptance.model.reliability import (
+from ugv_acceptance.studies.reliability import (
     availability,
     demonstrated_mtbf,
     hours_still_to_run,
@@ -17,7 +17,7 @@ from ugv_acceptance.model.reliability import (
     proportion,
     trend,
 )
-from ugv_acceptance.model.two_groups import (
+from ugv_acceptance.studies.two_groups import (
     compare_mtbf,
     compare_success,
     mtbf_power,

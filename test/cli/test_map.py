@@ -13,8 +13,8 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.cli.map import map as map_verb
 from ugv_acceptance.config import load
-from ugv_acceptance.model.planar import PAPER, planar_torque
 from ugv_acceptance.model.stability import stability
+from ugv_acceptance.studies.planar import PAPER, planar_torque
 
 app = typer.Typer()
 app.command('map')(map_verb)

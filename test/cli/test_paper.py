@@ -6,8 +6,8 @@ from rich.console import Console
 
 from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_joints, simulated_truth
 from ugv_acceptance.config import load
-from ugv_acceptance.model.offsets import table_2
-from ugv_acceptance.model.planar import PAPER, planar_torque
+from ugv_acceptance.studies.offsets import table_2
+from ugv_acceptance.studies.planar import PAPER, planar_torque
 
 
 def test_every_random_case_is_counted_once() -> None:

@@ -13,7 +13,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.risk import risk
 from ugv_acceptance.cli.risk_study import nominal, phases_from, spread_from
 from ugv_acceptance.config import load
-from ugv_acceptance.model.spread import normal, uniform
+from ugv_acceptance.studies.spread import normal, uniform
 
 app = typer.Typer()
 app.command('risk')(risk)

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.speed import speed
 from ugv_acceptance.config import load
-from ugv_acceptance.model.postures import joint_range, random_postures, sweeps
-from ugv_acceptance.model.validity import critical_value
+from ugv_acceptance.studies.postures import joint_range, random_postures, sweeps
+from ugv_acceptance.studies.validity import critical_value
 
 app = typer.Typer()
 app.command('speed')(speed)

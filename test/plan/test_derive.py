@@ -10,7 +10,6 @@ import pytest
 
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.evaluation.wording import WORDS
-from ugv_acceptance.model.orientations import ORIENTATIONS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
@@ -18,6 +17,7 @@ from ugv_acceptance.plan.card import card_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Step, read_plan, vector_of
+from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 CONFIG: Config = load()
 PLAN: Plan = derive(CONFIG)

@@ -9,7 +9,7 @@ from typing import Any
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.campaign.failures import Failure
 from ugv_acceptance.campaign.rows import Row
-from ugv_acceptance.model.two_groups import Compared, compare_mtbf, compare_success
+from ugv_acceptance.studies.two_groups import Compared, compare_mtbf, compare_success
 
 Json = dict[str, Any]
 

@@ -14,7 +14,7 @@ from ugv_acceptance import __version__
 from ugv_acceptance.campaign.failures import Failure, counts
 from ugv_acceptance.campaign.groups import comparison
 from ugv_acceptance.campaign.rows import VERDICTS, Row
-from ugv_acceptance.model.reliability import (
+from ugv_acceptance.studies.reliability import (
     Bounded,
     availability,
     demonstrated_mtbf,

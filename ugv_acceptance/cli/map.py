@@ -55,9 +55,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.config import load
-    from ugv_acceptance.model.maps import CLASSES, area_fraction, classes
     from ugv_acceptance.report.map_data import map_of
     from ugv_acceptance.report.map_figure import assumptions, write_map
+    from ugv_acceptance.studies.maps import CLASSES, area_fraction, classes
 
     loaded = load(config)
     wanted = Wanted(x, y, posture, orientation, slope, payload, limit, friction, steps)

@@ -47,7 +47,7 @@ def risk(
     from ugv_acceptance.cli.risk_study import phases_from
     from ugv_acceptance.cli.risk_tables import as_document, mission_lines, phase_lines
     from ugv_acceptance.config import load
-    from ugv_acceptance.model.risk import run
+    from ugv_acceptance.studies.risk import run
 
     phases = phases_from(load(config), posture, vary or [], mission)
     count = int(samples)

@@ -13,11 +13,11 @@ from ugv_acceptance.cli.robot_description import posture_from
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import quantity
 from ugv_acceptance.model.mechanics import mechanics_of
-from ugv_acceptance.model.postures import joint_range
-from ugv_acceptance.model.risk import Study
-from ugv_acceptance.model.risk_kernel import known_names
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.spread import Spread, normal, uniform
+from ugv_acceptance.studies.postures import joint_range
+from ugv_acceptance.studies.risk import Study
+from ugv_acceptance.studies.risk_kernel import known_names
+from ugv_acceptance.studies.spread import Spread, normal, uniform
 
 STEEPEST = math.radians(30.0)
 # The paper's typical operating speed.

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from ugv_acceptance.cli.risk_study import Phase
-from ugv_acceptance.model.risk import EVENTS, Risk, estimate
-from ugv_acceptance.model.spread import NORMAL, Spread, together
+from ugv_acceptance.studies.risk import EVENTS, Risk, estimate
+from ugv_acceptance.studies.spread import NORMAL, Spread, together
 
 # Inputs shown: those that matter most.
 SHOWN = 8

@@ -42,9 +42,9 @@ def speed(
     from ugv_acceptance.cli.robot_description import posture_from
     from ugv_acceptance.config import load
     from ugv_acceptance.config.units import quantity
-    from ugv_acceptance.model.postures import random_postures, sweeps
     from ugv_acceptance.model.robot import Payload
-    from ugv_acceptance.model.validity import critical_value, speed_limit
+    from ugv_acceptance.studies.postures import random_postures, sweeps
+    from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
     if reference <= 0.0:

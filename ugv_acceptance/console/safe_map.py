@@ -11,8 +11,11 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.console.frame import Plain, number
 from ugv_acceptance.console.snapshot import Snapshot
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.bilinear import Grid, grid_of
-from ugv_acceptance.model.maps import (
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.stability import SIDES, stability
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.studies.bilinear import Grid, grid_of
+from ugv_acceptance.studies.maps import (
     CAUTION,
     FAILURE,
     classes,
@@ -20,9 +23,6 @@ from ugv_acceptance.model.maps import (
     torque_forms,
     utilisation_map,
 )
-from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.stability import SIDES, stability
-from ugv_acceptance.model.statics import static_torque
 
 # What a cell says; the page's colours and hatches follow this order.
 SAFE_CELL, CAUTION_CELL, TORQUE_CELL, TIP_CELL, BOTH_CELL = range(5)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.capacity import gripper_point
 from ugv_acceptance.model.robot import Joint, Robot
+from ugv_acceptance.model.statics import gripper_point
 
 # A path is followed this long (s), in so many steps; a joint that moves contact points in finer
 # ones (rad), since a point counts only while it is within the ground's tolerance.

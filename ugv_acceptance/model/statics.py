@@ -103,3 +103,15 @@ def payload_capacity(
     mass = np.where(slope == 0.0, np.inf, mass)
     least: Floats = np.where(np.abs(empty) > limit, -np.inf, mass).min(axis=-1)
     return least
+
+
+def gripper_point(robot: Robot, q: ArrayLike) -> Floats:
+    """Return where the payload's centre of gravity is (m, `base_link`), shape (..., 3)."""
+    q = np.asarray(q, dtype=np.float64)
+    cog = robot.payload.cog
+    mechanics = mechanics_of(robot)
+    whole = float(posture_of(mechanics, [0.0] * len(robot.joint_names), 0.0, cog).mass)
+    # The robot with a load as heavy as itself: its centre of gravity lies half way to the load.
+    with_load = centre_of_gravity(robot, q, Payload(whole, cog))
+    point: Floats = 2.0 * with_load - centre_of_gravity(robot, q, Payload(0.0, cog))
+    return point

@@ -11,9 +11,9 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ugv_acceptance.model.orientations import ORIENTATIONS
 from ugv_acceptance.nodes.guard import Guard
 from ugv_acceptance.plan.plan import Step
+from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 SIM, ROBOT, OPERATOR = 'sim', 'robot', 'operator'
 SIMULATOR = 'packbot_simulator'

@@ -11,7 +11,6 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
-from ugv_acceptance.model.maps import Levels
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, look, roles_of
@@ -22,6 +21,7 @@ from ugv_acceptance.report.regions import (
     legend,
     svg_of,
 )
+from ugv_acceptance.studies.maps import Levels
 
 # Code -> what it means to the person at the robot.
 MEANINGS = {

@@ -12,12 +12,12 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.orientations import ORIENTATIONS
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
 from ugv_acceptance.plan.order import distance, ordered
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, Found, Mask, look, roles_of, safe, safe_way, spread_out
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
+from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Share of a limit (and 20 deg of tilt) by which tests on a robot stay inside, by default.
 SPARE = 0.05

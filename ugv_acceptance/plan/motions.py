@@ -7,8 +7,6 @@ import numpy as np
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.capacity import CAUSES, lift_capacity, pull_capacity
-from ugv_acceptance.model.orientations import grounding_angle
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Alerts, Step
 from ugv_acceptance.plan.search import Arm, Found, look, safe, spread_out
 from ugv_acceptance.plan.writing import (
@@ -19,6 +17,8 @@ from ugv_acceptance.plan.writing import (
     posture_deg,
     preparation,
 )
+from ugv_acceptance.studies.capacity import CAUSES, lift_capacity, pull_capacity
+from ugv_acceptance.studies.orientations import grounding_angle
 
 # Loads tried, as shares of the largest the model allows.
 LIGHTER, HEAVIER = 0.9, 1.12

@@ -17,8 +17,8 @@ from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.evaluation.alerts import LEVELS
 from ugv_acceptance.evaluation.wording import WORDS
-from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of
 from ugv_acceptance.model.robot import Robot, Vector
+from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of
 
 ROBOT: Literal['robot'] = 'robot'
 SIMULATION: Literal['simulation'] = 'simulation'

@@ -13,9 +13,9 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.orientations import gravity_of
 from ugv_acceptance.model.robot import Contact, Payload, Robot
 from ugv_acceptance.model.stability import STANDING, margins, stability
+from ugv_acceptance.studies.orientations import gravity_of
 
 Mask = NDArray[np.bool_]
 

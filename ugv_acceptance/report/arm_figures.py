@@ -9,17 +9,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
-from ugv_acceptance.model.bilinear import Grid, form_of, level_curves
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.intervals import length
-from ugv_acceptance.model.maps import torque_forms, within_limits
-from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
-from ugv_acceptance.model.planar import PAPER, arm_robot, paper_arm, planar_torque, safe_theta2
 from ugv_acceptance.model.statics import inverse_dynamics, static_torque
-from ugv_acceptance.model.validity import paper_sweep
-from ugv_acceptance.model.windows import Mask
 from ugv_acceptance.report.paper_numbers import DOWN, Simulated
 from ugv_acceptance.report.regions import degree_axes, figure
+from ugv_acceptance.studies.bilinear import Grid, form_of, level_curves
+from ugv_acceptance.studies.intervals import length
+from ugv_acceptance.studies.maps import torque_forms, within_limits
+from ugv_acceptance.studies.offsets import OFFSET1, OFFSET2
+from ugv_acceptance.studies.planar import PAPER, arm_robot, paper_arm, planar_torque, safe_theta2
+from ugv_acceptance.studies.validity import paper_sweep
+from ugv_acceptance.studies.windows import Mask
 
 THRESHOLDS = (30.0, 50.0, 70.0)
 TURN = 2.0 * math.pi

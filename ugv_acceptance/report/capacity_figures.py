@@ -10,7 +10,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.capacity import (
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.report.parts import PARTS, STOWED, posture
+from ugv_acceptance.report.regions import degree_axes, figure
+from ugv_acceptance.report.rollover_figures import arm_grid
+from ugv_acceptance.studies.capacity import (
     CAUSES,
     NOTHING,
     SATURATION,
@@ -19,11 +23,7 @@ from ugv_acceptance.model.capacity import (
     lift_capacity,
     pull_capacity,
 )
-from ugv_acceptance.model.orientations import grounding_angle
-from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.report.parts import PARTS, STOWED, posture
-from ugv_acceptance.report.regions import degree_axes, figure
-from ugv_acceptance.report.rollover_figures import arm_grid
+from ugv_acceptance.studies.orientations import grounding_angle
 
 Causes = NDArray[np.int8]
 

@@ -12,10 +12,10 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.maps import CLASSES, classes
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.report.regions import draw_regions, figure, legend, png_of, svg_of
+from ugv_acceptance.studies.maps import CLASSES, classes
 
 WORDS = {
     'torque': ('holds', 'caution: near the limit', 'saturates'),

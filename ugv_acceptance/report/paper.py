@@ -9,7 +9,6 @@ import numpy as np
 
 from ugv_acceptance.evaluation.taxonomy import HUMAN, FailureSource
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.arm_figures import (
     disagreement,
@@ -46,6 +45,7 @@ from ugv_acceptance.report.paper_prose import (
 from ugv_acceptance.report.parts import check_parts
 from ugv_acceptance.report.rollover_figures import figure_6, figure_7, level_figure
 from ugv_acceptance.report.safe_range import one_sided_table
+from ugv_acceptance.studies.offsets import OFFSET1, OFFSET2
 
 Extra = dict[str, Any]
 

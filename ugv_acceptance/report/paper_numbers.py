@@ -8,8 +8,8 @@ import numpy as np
 from scipy.special import fdtrc
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.intervals import length
-from ugv_acceptance.model.offsets import (
+from ugv_acceptance.studies.intervals import length
+from ugv_acceptance.studies.offsets import (
     OFFSET1,
     OFFSET2,
     TABLE_2,
@@ -19,14 +19,14 @@ from ugv_acceptance.model.offsets import (
     table_2,
     table_error,
 )
-from ugv_acceptance.model.planar import (
+from ugv_acceptance.studies.planar import (
     PAPER,
     PlanarArm,
     planar_torque,
     safe_theta2,
     worst_theta2,
 )
-from ugv_acceptance.model.validity import (
+from ugv_acceptance.studies.validity import (
     PAPER_CRITICAL,
     PAPER_SAMPLES,
     PAPER_SPEEDS_DEG_S,

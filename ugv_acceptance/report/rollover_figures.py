@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from ugv_acceptance.model.bilinear import Grid
-from ugv_acceptance.model.maps import Levels, area_fraction, rollover_map
-from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of, grounding_angle
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.report.parts import PARTS, STOWED, Parts, posture
 from ugv_acceptance.report.regions import degree_axes, draw_regions, figure, legend
+from ugv_acceptance.studies.bilinear import Grid
+from ugv_acceptance.studies.maps import Levels, area_fraction, rollover_map
+from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of, grounding_angle
 
 # Caution from 10 degrees of tilt left; at 0 the robot tips.
 TIP_LEVELS = Levels(10.0, 0.0)

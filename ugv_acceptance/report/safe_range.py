@@ -2,8 +2,8 @@
 
 import math
 
-from ugv_acceptance.model.intervals import Intervals
-from ugv_acceptance.model.planar import PAPER, safe_theta2
+from ugv_acceptance.studies.intervals import Intervals
+from ugv_acceptance.studies.planar import PAPER, safe_theta2
 
 
 def _words(intervals: Intervals) -> str:

@@ -7,11 +7,11 @@ from matplotlib.figure import Figure
 
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.strips import Strips
-from ugv_acceptance.model.bilinear import Grid
-from ugv_acceptance.model.maps import Levels, rollover_map, torque_forms, utilisation_map
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.report.regions import draw_regions, figure, legend
 from ugv_acceptance.report.run_charts import Json, judged_joints, plain
+from ugv_acceptance.studies.bilinear import Grid
+from ugv_acceptance.studies.maps import Levels, rollover_map, torque_forms, utilisation_map
 
 CELLS = 121
 

@@ -11,9 +11,9 @@ from math import pi, radians
 import numpy as np
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.capacity import gripper_point
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import margins
+from ugv_acceptance.model.statics import gripper_point
 from ugv_acceptance.simulation.scenario import Command, Scenario
 from ugv_acceptance.simulation.scenarios import STOWED
 from ugv_acceptance.simulation.vehicle import gravity_on_slope

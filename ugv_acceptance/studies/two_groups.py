@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom, binomtest, fisher_exact, hypergeom, norm, poisson
 
-from ugv_acceptance.model.spread import clopper_pearson
+from ugv_acceptance.studies.spread import clopper_pearson
 
 # Terms of a sum over counts are left out once they weigh less than this together.
 _TAIL = 1e-9

@@ -15,7 +15,7 @@ from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.rows import Rows
-from ugv_acceptance.model.statics import centre_of_gravity, static_torque
+from ugv_acceptance.model.statics import gripper_point, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
 
 # What ends a pull first; NOTHING: no finite force does.
@@ -43,18 +43,6 @@ class Capacity:
         """Number in CAUSES of what comes first, shape (...)."""
         first = self.bounds.argmin(axis=-1)
         return np.where(np.isinf(self.force), NOTHING, first).astype(np.int8)
-
-
-def gripper_point(robot: Robot, q: ArrayLike) -> Floats:
-    """Return where the payload's centre of gravity is (m, `base_link`), shape (..., 3)."""
-    q = np.asarray(q, dtype=np.float64)
-    cog = robot.payload.cog
-    mechanics = mechanics_of(robot)
-    whole = float(posture_of(mechanics, [0.0] * len(robot.joint_names), 0.0, cog).mass)
-    # The robot with a load as heavy as itself: its centre of gravity lies half way to the load.
-    with_load = centre_of_gravity(robot, q, Payload(whole, cog))
-    point: Floats = 2.0 * with_load - centre_of_gravity(robot, q, Payload(0.0, cog))
-    return point
 
 
 def pull_capacity(  # noqa: PLR0913, PLR0917 - two optional places of the pull

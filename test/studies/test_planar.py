@@ -7,7 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from ugv_acceptance.model.planar import (
+from ugv_acceptance.model.statics import inverse_dynamics, static_torque
+from ugv_acceptance.studies.planar import (
     PAPER,
     PlanarArm,
     arm_robot,
@@ -17,7 +18,6 @@ from ugv_acceptance.model.planar import (
     safe_theta2,
     worst_theta2,
 )
-from ugv_acceptance.model.statics import inverse_dynamics, static_torque
 
 DOWN = (0.0, 0.0, -9.81)
 TURN = 2.0 * math.pi

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from robots import random_robot
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model.intervals import length, where_cosine_between
-from ugv_acceptance.model.planar import PAPER, paper_arm, safe_theta2, worst_theta2
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.model.worst import safe_positions, torque_waves, worst_positions
+from ugv_acceptance.studies.intervals import length, where_cosine_between
+from ugv_acceptance.studies.planar import PAPER, paper_arm, safe_theta2, worst_theta2
+from ugv_acceptance.studies.worst import safe_positions, torque_waves, worst_positions
 
 DOWN = (0.0, 0.0, -9.81)
 TURN = 2.0 * math.pi

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtr, chdtri, fdtri, ndtr
 
-from ugv_acceptance.model.spread import clopper_pearson
+from ugv_acceptance.studies.spread import clopper_pearson
 
 # A growth slope of a single failure says nothing.
 LEAST_FAILURES = 3

@@ -11,15 +11,15 @@ from robots import tracked
 from scipy import stats
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model import risk as risk_module
-from ugv_acceptance.model.planar import PAPER, arm_robot
-from ugv_acceptance.model.quadrature import saturation_probability
-from ugv_acceptance.model.risk import Study, failures_of, run
-from ugv_acceptance.model.risk_kernel import known_names, risk_kernel
 from ugv_acceptance.model.robot import Link, Payload, Robot
-from ugv_acceptance.model.spread import clopper_pearson, normal, together, uniform
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import inverse_dynamics
+from ugv_acceptance.studies import risk as risk_module
+from ugv_acceptance.studies.planar import PAPER, arm_robot
+from ugv_acceptance.studies.quadrature import saturation_probability
+from ugv_acceptance.studies.risk import Study, failures_of, run
+from ugv_acceptance.studies.risk_kernel import known_names, risk_kernel
+from ugv_acceptance.studies.spread import clopper_pearson, normal, together, uniform
 
 TURN = uniform(-math.pi, math.pi)
 LIMITS = (math.inf, 60.0, 40.0, math.inf)

@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
-from ugv_acceptance.model.bilinear import Grid, along_rows, evaluate, form_of, is_sum_form
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import centre_of_gravity, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
-from ugv_acceptance.model.windows import Mask, window_between
+from ugv_acceptance.studies.bilinear import Grid, along_rows, evaluate, form_of, is_sum_form
+from ugv_acceptance.studies.windows import Mask, window_between
 
 SAFE, CAUTION, FAILURE = range(3)
 CLASSES = ('safe', 'caution', 'failure')

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.planar import (
+from ugv_acceptance.studies.planar import (
     PAPER,
     PlanarArm,
     arm_robot,
     planar_dynamics,
     planar_torque,
 )
-from ugv_acceptance.model.validity import (
+from ugv_acceptance.studies.validity import (
     PAPER_SAMPLES,
     PAPER_SPEEDS_DEG_S,
     SpeedError,

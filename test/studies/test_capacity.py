@@ -8,19 +8,18 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from robots import tracked
 
-from ugv_acceptance.model.capacity import (
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import stability
+from ugv_acceptance.model.statics import gripper_point, payload_capacity, static_torque
+from ugv_acceptance.studies.capacity import (
     CAUSES,
     NOTHING,
     SATURATION,
     SLIP,
     TIP,
-    gripper_point,
     lift_capacity,
     pull_capacity,
 )
-from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.statics import payload_capacity, static_torque
 
 ROBOT = tracked()
 LIMITS = np.array([np.inf, 60.0, 50.0, np.inf])

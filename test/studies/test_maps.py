@@ -8,8 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import random_robot, tracked
 
-from ugv_acceptance.model.bilinear import Grid, evaluate, form_of, grid_of, level_curves
-from ugv_acceptance.model.maps import (
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.stability import stability
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.studies.bilinear import Grid, evaluate, form_of, grid_of, level_curves
+from ugv_acceptance.studies.maps import (
     CAUTION,
     FAILURE,
     SAFE,
@@ -22,11 +25,8 @@ from ugv_acceptance.model.maps import (
     utilisation_map,
     within_limits,
 )
-from ugv_acceptance.model.planar import PAPER, arm_robot, planar_torque
-from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.model.windows import window_between
+from ugv_acceptance.studies.planar import PAPER, arm_robot, planar_torque
+from ugv_acceptance.studies.windows import window_between
 
 TURN = [[-math.pi, math.pi]] * 2
 

@@ -12,8 +12,8 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.polynomial.legendre import leggauss
 from scipy.special import ndtr
 
-from ugv_acceptance.model.planar import PAPER, PlanarArm
-from ugv_acceptance.model.spread import Spread
+from ugv_acceptance.studies.planar import PAPER, PlanarArm
+from ugv_acceptance.studies.spread import Spread
 
 # Nodes over theta_1, theta_2 and the load: an error below 1e-6 for spreads of a tenth.
 NODES = (48, 96, 12)

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from robots import tracked
 from scipy import stats
 
-from ugv_acceptance.model.offsets import matches, offset_family, table_2, table_error
-from ugv_acceptance.model.planar import PlanarArm, paper_arm, planar_dynamics, planar_torque
 from ugv_acceptance.model.statics import inverse_dynamics, static_torque
-from ugv_acceptance.model.validity import (
+from ugv_acceptance.studies.offsets import matches, offset_family, table_2, table_error
+from ugv_acceptance.studies.planar import PlanarArm, paper_arm, planar_dynamics, planar_torque
+from ugv_acceptance.studies.validity import (
     critical_value,
     mean_square,
     paper_sweep,

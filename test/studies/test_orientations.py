@@ -8,7 +8,7 @@ from robots import paper_arm, tracked
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.orientations import ORIENTATIONS, gravity_of, grounding_angle
+from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of, grounding_angle
 
 
 @pytest.mark.parametrize('name', ORIENTATIONS)
