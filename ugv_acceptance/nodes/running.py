@@ -26,6 +26,8 @@ from ugv_acceptance import AcceptanceError
 BAD_INPUT = 2
 # Seconds after which a signal is heard at the latest.
 PATIENCE = 0.5
+# Seconds after which a thread gives the interpreter to one that waits.
+TURN = 0.0002
 
 
 @dataclass(slots=True)
@@ -87,6 +89,8 @@ def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> N
     # What is there now stays: the garbage collector need not look through it between messages.
     gc.collect()
     gc.freeze()
+    # A message must not wait the usual 5 ms for a thread that works out advice.
+    sys.setswitchinterval(TURN)
     never: Future = Future()
     try:
         while ok() and not stop.asked and not until():
