@@ -15,7 +15,7 @@ from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.run.catalogue import Case
 from ugv_acceptance.run.messages import EPOCH
 from ugv_acceptance.run.record import SATURATED_FOR, lasting, play
-from ugv_acceptance.simulation.corruption import Corruption, overload
+from ugv_acceptance.simulation.corruption import DELAY, JITTER, Corruption, overload
 from ugv_acceptance.simulation.faults import fault_of
 from ugv_acceptance.simulation.repertoire import KINDS, SECONDS
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Recording
@@ -152,6 +152,9 @@ def _arrivals(
     np.ndarray[tuple[int, ...], np.dtype[np.intp]], np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 ]:
     """Return the rows of a log in the order in which they arrive, and when (ns)."""
+    if not corruption.faults:
+        rows = np.arange(len(log.stamp), dtype=np.intp)
+        return rows, _ns(log.stamp + DELAY + JITTER * rng.random(len(rows)))
     came = sorted(
         (due, k)
         for k, time in enumerate(log.stamp.tolist())

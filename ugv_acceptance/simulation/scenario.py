@@ -18,14 +18,16 @@ class Command:
     """What is asked from `time` (s) on; what is None or not named stays as it was.
 
     `joints` pairs joint names with targets (rad, m), reached smoothly at a peak rate of `speed`
-    (rad/s, m/s). `drive` is forward speed (m/s) and yaw rate (rad/s). `slope` is tilt and heading
-    (rad) of the ground, reached at `slope_rate` (rad/s). `payload` is in the hand from then on.
+    (rad/s, m/s). `drive` is forward speed (m/s) and yaw rate (rad/s), reached at a peak of
+    `drive_rate` (m/s2, rad/s2). `slope` is tilt and heading (rad) of the ground, reached at
+    `slope_rate` (rad/s). `payload` is in the hand from then on.
     """
 
     time: float
     joints: tuple[tuple[str, float], ...] = ()
     speed: float = 0.3
     drive: tuple[float, float] | None = None
+    drive_rate: float = 1.0
     slope: tuple[float, float] | None = None
     slope_rate: float = 0.05
     payload: Payload | None = None

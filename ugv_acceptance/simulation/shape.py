@@ -1,11 +1,13 @@
-"""What of a robot touches the ground: contact spheres, wheels, and its bulk after a tip-over."""
+"""What touches what: contact spheres, wheels, a robot's bulk after a tip-over, blocks to climb."""
 
+import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from ugv_acceptance.model.robot import Contact, Robot
+from ugv_acceptance.model.robot import Contact, Robot, Vector
 
 # Radius (m) of the sphere about a contact point: small, so that it stands where the point is.
 CONTACT_RADIUS = 1e-4
@@ -13,6 +15,40 @@ CONTACT_RADIUS = 1e-4
 WHEEL_WIDTH = 0.02
 # Radius (m) of the spheres at the joints and the payload, ground clearance (m) of the hull.
 BULK_RADIUS, CLEARANCE = 0.03, 0.03
+# Time constant (s) in which friction stops a slip, and share of a contact that is stiff. MuJoCo
+# lifts what slips by slip speed x friction time / contact time^2: with one time for both, a turning
+# robot hops from contact to contact, and its accelerometer feels more than 2 g.
+SLIP_TIME, STIFF = 0.1, 0.7
+# Time constant (s) and damping of a brake.
+BRAKE = (0.02, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A box on the ground: its middle and half its size (m), turned by `pitch` (rad) about y."""
+
+    middle: Vector
+    half: Vector
+    pitch: float = 0.0
+
+
+def step(at: float, height: float, length: float = 4.0) -> Block:
+    """Return a step up of `height` (m) that begins `at` x (m) and goes on for `length` (m)."""
+    return Block((at + length / 2.0, 0.0, 0.0), (length / 2.0, 2.0, height))
+
+
+def stairs(at: float, rise: float, run: float, count: int) -> tuple[Block, ...]:
+    """Return `count` stairs up from `at` x (m), each `rise` high and `run` deep (m)."""
+    return tuple(step(at + k * run, (k + 1) * rise) for k in range(count))
+
+
+def ramp(at: float, angle: float, length: float = 3.0) -> Block:
+    """Return a ramp up by `angle` (rad) from `at` x (m), its slope `length` (m) long."""
+    s, c = math.sin(angle), math.cos(angle)
+    depth = length / 2.0
+    # The upper face goes through (at, 0): half a length along it, then `depth` down its normal.
+    middle = (at + length / 2.0 * c + depth * s, 0.0, length / 2.0 * s - depth * c)
+    return Block(middle, (length / 2.0, 2.0, depth), -angle)
 
 
 def numbers(values: Iterable[float]) -> str:
@@ -54,13 +90,52 @@ def add_contacts(
         _add_wheel(bodies[contact.link], contact, wheel_radius or 0.0)
 
 
+def add_blocks(world: ET.Element, blocks: Iterable[Block]) -> None:
+    """Add what lies on the ground."""
+    for k, block in enumerate(blocks):
+        ET.SubElement(
+            world,
+            'geom',
+            name=f'block:{k}',
+            type='box',
+            contype='1',
+            pos=numbers(block.middle),
+            size=numbers(block.half),
+            euler=numbers((0.0, block.pitch, 0.0)),
+        )
+
+
+def add_pairs(
+    root: ET.Element, robot: Robot, blocks: int, friction: float, contact_time: float
+) -> None:
+    """Let wheels and contact points slip on the ground and the blocks without hopping."""
+    contact = ET.SubElement(root, 'contact')
+    wheels = wheel_contacts(robot)
+    for touching in robot.contacts:
+        name = f'{"wheel" if touching in wheels else "contact"}:{touching.name}'
+        for ground in ('ground', *(f'block:{k}' for k in range(blocks))):
+            ET.SubElement(
+                contact,
+                'pair',
+                geom1=name,
+                geom2=ground,
+                condim='3',
+                friction=numbers((friction, friction, 0.005, 0.0001, 0.0001)),
+                solref=numbers((contact_time, 1.0)),
+                solreffriction=numbers((SLIP_TIME, 1.0)),
+                solimp=numbers((STIFF, STIFF, 0.001)),
+            )
+
+
 def _add_wheel(body: ET.Element, contact: Contact, radius: float) -> None:
     """Add a wheel that stands on `contact`; it carries next to no mass: the link has it already."""
     x, y, z = contact.position
     name = f'wheel:{contact.name}'
     axle = numbers((x, y, z - CONTACT_RADIUS + radius))
     wheel = ET.SubElement(body, 'body', name=name, pos=axle)
-    ET.SubElement(wheel, 'joint', name=name, type='hinge', axis='0 1 0', armature='0.02')
+    # The brake is friction of the joint, stiff so that it does not creep.
+    stiff = {'solreffriction': numbers(BRAKE), 'solimpfriction': numbers((0.9999, 0.9999, 0.001))}
+    ET.SubElement(wheel, 'joint', stiff, name=name, type='hinge', axis='0 1 0', armature='0.02')
     ET.SubElement(wheel, 'inertial', pos='0 0 0', mass='1e-6', diaginertia='1e-6 1e-6 1e-6')
     size = numbers((radius, WHEEL_WIDTH, radius))
     ET.SubElement(wheel, 'geom', name=name, type='ellipsoid', size=size)

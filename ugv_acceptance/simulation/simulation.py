@@ -19,16 +19,26 @@ from ugv_acceptance.simulation.vehicle import (
     SERVO,
     Build,
     gravity_on_slope,
+    set_brakes,
     set_payload,
     vehicle_of,
 )
 
-BUILD = Build(wheels=True, bulk=True, armature=0.01, timestep=0.00125, contact_time=0.005)
+BUILD = Build(
+    wheels=True,
+    bulk=True,
+    armature=0.01,
+    timestep=0.0025,
+    contact_time=0.006,
+    impratio=1000.0,
+)
 # Steps between two looks at commands and targets.
 STEPS = 2
 SENSORS = ('orientation', 'gyro', 'accelerometer')
 # Time (s) to come to rest before the run begins.
 SETTLE = 1.0
+# Slack (s) of sums of time steps.
+_EARLY = 1e-9
 
 
 @dataclass(slots=True)
@@ -79,8 +89,9 @@ class Simulation:
         _check_joints(robot, first)
         self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
         self._slope = [_Move(part) for part in _parts(*slope)]
-        self._drive = (0.0, 0.0)
-        self._steered = False
+        self._drive = [_Move(0.0), _Move(0.0)]
+        self._steered_until = 0.0
+        self._braked = False
         self._sensors = [self.data.sensor(name).data for name in SENSORS]
         self._settle()
 
@@ -92,6 +103,7 @@ class Simulation:
         mujoco.mj_forward(vehicle.model, data)
         mujoco.mj_step(vehicle.model, data, nstep=round(SETTLE / vehicle.model.opt.timestep))
         data.time = 0.0
+        self._steered_until = 0.0
         self._steer(0.0)
         mujoco.mj_forward(vehicle.model, data)
 
@@ -104,14 +116,17 @@ class Simulation:
         """Take a command now. Raises BadConfig where it names a joint the robot does not move."""
         targets = dict(command.joints)
         _check_joints(self.robot, targets)
-        self._steered = False
         now = self.time
+        self._steered_until = now
         for k, name in enumerate(self.robot.joint_names):
             if name in targets:
                 at = self._moves[k].at(now)[0]
                 self._moves[k] = _move(at, targets[name], command.speed, now)
-        if command.drive is not None:
-            self._drive = command.drive
+        for k, speed in enumerate(command.drive or ()):
+            before = self._drive[k]
+            # The same speed told again, as remote controls do, does not begin a new ramp.
+            if speed != before.start + before.change:
+                self._drive[k] = _move(before.at(now)[0], speed, command.drive_rate, now)
         if command.slope is not None:
             parts = zip(self._slope, _parts(*command.slope), strict=True)
             self._slope = [_move(m.at(now)[0], to, command.slope_rate, now) for m, to in parts]
@@ -124,21 +139,25 @@ class Simulation:
         left = round(duration / model.opt.timestep)
         while left > 0:
             steps = min(left, STEPS)
-            self._steer(self.time + steps * model.opt.timestep)
+            if self.time >= self._steered_until:
+                self._steer(self.time + STEPS * model.opt.timestep)
             mujoco.mj_step(model, data, nstep=steps)
             left -= steps
 
     def _steer(self, time: float) -> None:
-        """Set the servos' targets and gravity for `time`, unless they have come to their ends."""
-        if self._steered:
-            return
-        self._steered = all(m.begin + m.length <= time for m in (*self._moves, *self._slope))
+        """Set the servos' targets and gravity for `time`; they last until a motion goes on."""
+        moves = (*self._moves, *self._slope, *self._drive)
+        over = all(m.begin + m.length <= time for m in moves)
+        self._steered_until = math.inf if over else time - _EARLY
         control, vehicle = self.data.ctrl, self.vehicle
         for motor, move in zip(vehicle.motor, self._moves, strict=True):
             target, rate = move.at(time)
             # The damper of a critically damped servo then brakes only what differs from this rate.
             control[motor] = target + rate * 2.0 / SERVO
-        forward, yaw = self._drive
+        forward, yaw = (move.at(time)[0] for move in self._drive)
+        if self._braked != (forward == yaw == 0.0):
+            self._braked = not self._braked
+            set_brakes(vehicle, on=self._braked)
         for wheel, y in vehicle.wheels:
             control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
         gravity = gravity_on_slope(self.robot.gravity, *self._slope_at(time))

@@ -23,8 +23,8 @@ LEAST = 1e-12
 # Own frequency (rad/s) of the position servos on the inertia they see at the zero posture, or on
 # this (kg m2, kg) if that is more: a flipper's drive also lifts the robot.
 SERVO, SERVO_INERTIA = 50.0, 2.0
-# Bounds of the wheels' velocity servos: gain (N m s/rad), torque (N m) of one wheel.
-WHEEL_GAIN, WHEEL_TORQUE = 200.0, 40.0
+# One wheel's velocity servo: gain (N m s/rad) and most torque (N m); its brake holds as much.
+WHEEL_GAIN, WHEEL_TORQUE = 20.0, 40.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,8 @@ class Build:
     contacts of other links. `motors` drive the joints, limited to the joint's effort, with
     `armature` (kg m2) as the rotor's share of inertia. `bulk` adds what touches the ground only
     after a tip-over. `contact_time` (s) is the time constant of a contact: short is hard;
-    `impratio` is how much harder friction is than contact: more creeps less.
+    `impratio` is how much harder friction is than contact: more creeps less. `blocks` lie on the
+    ground.
     """
 
     base: str = 'free'
@@ -49,6 +50,7 @@ class Build:
     timestep: float = 0.001
     contact_time: float = 0.004
     impratio: float = 10.0
+    blocks: tuple[shape.Block, ...] = ()
     imu_position: Vector = (0.0, 0.0, 0.0)
     imu_rotation: tuple[Vector, Vector, Vector] = IDENTITY
 
@@ -123,7 +125,10 @@ def mjcf_of(robot: Robot, build: Build) -> str:
     world = ET.SubElement(root, 'worldbody')
     if build.base == 'free':
         ET.SubElement(world, 'geom', name='ground', type='plane', size='0 0 1', contype='1')
+        shape.add_blocks(world, build.blocks)
     _add_bodies(world, robot, build)
+    if build.wheels:
+        shape.add_pairs(root, robot, len(build.blocks), build.friction, build.contact_time)
     _add_motors(root, robot, build)
     _add_sensors(root, robot)
     return ET.tostring(root, encoding='unicode')
@@ -229,6 +234,13 @@ def _add_sensors(root: ET.Element, robot: Robot) -> None:
     for name in robot.joint_names:
         for kind in ('force', 'torque'):
             ET.SubElement(sensors, kind, name=f'{kind}:{name}', site=f'joint:{name}')
+
+
+def set_brakes(vehicle: Vehicle, *, on: bool) -> None:
+    """Put the wheels' brakes on or take them off."""
+    model = vehicle.model
+    joints = model.actuator_trnid[[k for k, _ in vehicle.wheels], 0]
+    model.dof_frictionloss[model.jnt_dofadr[joints]] = WHEEL_TORQUE if on else 0.0
 
 
 def set_payload(vehicle: Vehicle, payload: Payload) -> None:
