@@ -90,6 +90,7 @@ class Imu:
     acceleration: tuple[float, ...] = REST
     covariance_0: float = 0.0
     stamp: int | None = None
+    frame: str = 'imu_link'
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +137,7 @@ def give(evaluator: LiveEvaluator, message: Message) -> Margins | None:
     if isinstance(m, Joints):
         return evaluator.joint_state(m.time, stamp_of(m), m.names, m.position, m.velocity, m.effort)
     return evaluator.imu(
-        m.time, stamp_of(m), m.orientation, m.covariance_0, m.omega, m.acceleration
+        m.time, stamp_of(m), m.orientation, m.covariance_0, m.omega, m.acceleration, m.frame
     )
 
 
@@ -172,9 +173,13 @@ def batch_of(messages: Sequence[Message]) -> Batch:
     joints = [m for m in messages if isinstance(m, Joints)]
     keys = list(dict.fromkeys(map(_shape, joints)))
     carried = [m for m in messages if isinstance(m, Carry)]
+    felt = [m for m in messages if isinstance(m, Imu)]
     return Batch(
         joints=[joint_columns([m for m in joints if _shape(m) == key]) for key in keys],
-        imu=[imu_columns([m for m in messages if isinstance(m, Imu)])],
+        imu=[
+            imu_columns([m for m in felt if m.frame == frame])
+            for frame in dict.fromkeys(m.frame for m in felt)
+        ],
         payload=[
             payload_columns([m for m in carried if m.frame == frame])
             for frame in dict.fromkeys(m.frame for m in carried)
@@ -207,7 +212,7 @@ def imu_columns(messages: Sequence[Imu]) -> ImuColumns:
     n = len(messages)
     zero = np.zeros(n)
     return ImuColumns(
-        'imu_link',
+        messages[0].frame if messages else '',
         np.array([m.time for m in messages], np.int64),
         np.array([stamp_of(m) for m in messages], np.int64),
         np.array([m.orientation for m in messages]).reshape(n, 4),
@@ -301,7 +306,9 @@ def imu_messages(draw: st.DrawFn) -> Imu:
         )
     )
     omega = draw(st.one_of(st.just(STILL), st.tuples(*[mostly(st.floats(-0.2, 0.2))] * 3)))
-    return Imu(0, orientation, omega, acceleration, draw(st.sampled_from([0.0, 0.0, 0.01, -1.0])))
+    frame = draw(st.sampled_from(['imu_link', 'imu_link', '/imu_link', 'r/imu_link', '', 'other']))
+    covariance_0 = draw(st.sampled_from([0.0, 0.0, 0.01, -1.0]))
+    return Imu(0, orientation, omega, acceleration, covariance_0, frame=frame)
 
 
 carries = st.builds(

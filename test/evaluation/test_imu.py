@@ -29,8 +29,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ugv_acceptance.evaluation.imu import ImuTracker, Vector
+from ugv_acceptance.evaluation.imu import ImuTracker
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.low_pass import LowPass, Vector
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.evaluation.watch import Watch
 
@@ -41,10 +42,10 @@ QUARTER_ROLL = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 def tracker(imu: ImuInput | None = None) -> ImuTracker:
     """Return a tracker of the small robot."""
     told = settings(imu)
-    return ImuTracker(told, Watch(told).disagreement)
+    return ImuTracker(told, Watch(told).attitude)
 
 
-def step(of: ImuTracker, m: Imu) -> tuple[Vector, float, bool]:
+def step(of: ImuTracker, m: Imu) -> tuple[Vector, bool]:
     """Give a tracker one message."""
     return of.step(m.time, stamp_of(m), m.orientation, m.covariance_0, m.omega, m.acceleration)
 
@@ -76,14 +77,14 @@ def test_columns_give_the_rows_of_single_messages(
     one, many = tracker(told), tracker(told)
     expected = [step(one, m) for m in messages]
     places = [0, *sorted(min(c, len(messages)) for c in cuts), len(messages)]
-    got: list[tuple[Sequence[float], float, bool]] = []
+    got: list[tuple[Sequence[float], bool]] = []
     for a, b in pairwise(places):
         rows = many.columns([imu_columns(messages[a:b])])
-        got += list(zip(rows.gravity.tolist(), rows.strange, rows.unusable, strict=True))
-    for (gravity, strange, unusable), (g, s, u) in zip(expected, got, strict=True):
+        got += list(zip(rows.gravity.tolist(), rows.unusable, strict=True))
+    for (gravity, unusable), (g, u) in zip(expected, got, strict=True):
         np.testing.assert_allclose(gravity, g, rtol=1e-12, atol=1e-11)
-        np.testing.assert_allclose(strange, s, rtol=1e-12, atol=1e-12)
         assert unusable == u
+    assert many.taken == one.taken
 
 
 @pytest.mark.parametrize('hz', [50.0, 400.0])
@@ -97,8 +98,7 @@ def test_low_pass_is_that_of_scipy(hz: float) -> None:
     messages = [
         Imu(T0 + round(k * S / hz), acceleration=tuple(a)) for k, a in enumerate(x.tolist())
     ]
-    of = tracker()
-    smooth = of._filter_columns(
+    smooth = LowPass(0.2).columns(
         np.array([m.time for m in messages]), np.array([m.acceleration for m in messages]).T
     )
     np.testing.assert_allclose(smooth.T, expected, rtol=1e-12, atol=1e-11)
@@ -120,25 +120,72 @@ def outcome(imu: ImuInput, orientation: Sequence[float], acceleration: Sequence[
 
 
 @pytest.mark.parametrize(
-    ('orientation', 'covariance_0'),
+    ('orientation', 'covariance_0', 'named'),
     [
-        (LEVEL, 0.0),
-        ((0.0, 0.0, 0.0, 0.0), 0.0),
-        ((100.0, 100.0, 100.0, 92.0), 0.0),
-        ((math.nan, 0.0, 0.0, 1.0), 0.0),
-        (tilted(0.5), -1.0),
+        (LEVEL, 0.0, {'IMU_ORIENTATION'}),
+        ((0.0, 0.0, 0.0, 0.0), 0.0, {'IMU_ORIENTATION'}),
+        ((100.0, 100.0, 100.0, 92.0), 0.0, {'IMU_ORIENTATION'}),
+        ((math.nan, 0.0, 0.0, 1.0), 0.0, {'IMU_ORIENTATION'}),
+        (tilted(0.5), -1.0, set()),
     ],
     ids=['identity', 'zero', 'norm 196', 'not a number', 'covariance -1'],
 )
 def test_an_orientation_that_tells_nothing_leaves_it_to_the_accelerometer(
-    orientation: Sequence[float], covariance_0: float
+    orientation: Sequence[float], covariance_0: float, named: set[str]
 ) -> None:
-    """In four ways, of which only covariance -1 announces itself."""
+    """In five ways, of which only covariance -1 announces itself: the others are a fault."""
     lean = upright(tilted(0.2, 0.1))
     margins, codes = outcome(ImuInput(), orientation, lean, covariance_0)
     assert margins is not None
     np.testing.assert_allclose(margins.gravity, -np.array(lean), rtol=1e-9)
-    assert not codes - {'TIP_OVER', 'TORQUE_LIMIT'}
+    assert codes - {'TIP_OVER', 'TORQUE_LIMIT'} == named
+
+
+def test_an_identity_that_the_accelerometer_confirms_is_no_fault() -> None:
+    """A robot that stands level tells the identity, and need not be suspected."""
+    margins, codes = outcome(ImuInput(), LEVEL, REST)
+    assert margins is not None
+    assert not codes - {'TORQUE_LIMIT'}
+
+
+def test_only_one_bad_orientation_is_no_alert() -> None:
+    """A glitch leaves one message to the accelerometer; the fault has to last."""
+    told = settings()
+    watch = Watch(told)
+    of = ImuTracker(told, watch.attitude)
+    for k in range(300):
+        orientation = (0.0,) * 4 if k == 50 else tilted(0.1)
+        m = Imu(T0 + k * 10 * MS, orientation, acceleration=upright(tilted(0.1)))
+        gravity, unusable = step(of, m)
+        np.testing.assert_allclose(gravity, -np.array(upright(tilted(0.1))), rtol=1e-9)
+        assert not unusable
+    assert not watch.log
+    assert of.taken == [299, 0, 1]
+
+
+@pytest.mark.parametrize('frame', ['imu_link', '/imu_link', 'robot_1/imu_link', ''])
+def test_a_frame_that_is_the_configured_one_is_no_fault(frame: str) -> None:
+    """Also with a slash before it, in a robot's namespace, or not named at all."""
+    margins, codes = framed(frame)
+    assert margins is not None
+    assert not codes - {'TORQUE_LIMIT'}
+
+
+@pytest.mark.parametrize('frame', ['imu', 'other_imu_link', 'imu_link/x'])
+def test_another_frame_is_a_fault_without_margins(frame: str) -> None:
+    """Its mounting is not the one that is given."""
+    margins, codes = framed(frame)
+    assert margins is None
+    assert 'IMU_FRAME' in codes
+
+
+def framed(frame: str) -> tuple[Margins | None, set[str]]:
+    """Return the margins after messages of a frame, where imu_link is expected."""
+    evaluator = LiveEvaluator(settings(ImuInput(frame='imu_link')))
+    evaluator.start(T0)
+    give(evaluator, Joints(T0))
+    margins = give(evaluator, Imu(T0 + 1, tilted(0.1), STILL, upright(tilted(0.1)), frame=frame))
+    return margins, {alert.rule.code for alert in evaluator.watch.log}
 
 
 def test_an_orientation_that_disagrees_at_rest_is_a_fault_without_margins() -> None:
@@ -167,21 +214,37 @@ def test_a_number_beyond_belief_is_a_fault_and_soon_forgotten(bad: float) -> Non
     """It does not stay in the low-pass."""
     of = tracker(ImuInput(attitude='accelerometer'))
     step(of, Imu(T0))
-    gravity, _, unusable = step(of, Imu(T0 + 10 * MS, acceleration=(bad, 0.0, 9.81)))
+    gravity, unusable = step(of, Imu(T0 + 10 * MS, acceleration=(bad, 0.0, 9.81)))
     assert unusable
     assert math.isnan(gravity[0])
-    gravity, _, unusable = step(of, Imu(T0 + 20 * MS))
+    gravity, unusable = step(of, Imu(T0 + 20 * MS))
     assert not unusable
     assert gravity == (0.0, 0.0, -9.81)
 
 
 def test_a_good_orientation_beside_a_broken_accelerometer_is_named() -> None:
-    """Margins come from the orientation; that nothing checks it is said."""
-    margins, codes = outcome(ImuInput(), tilted(0.1), (math.nan,) * 3)
-    assert margins is not None
-    assert 'INPUT_INVALID' in codes
-    margins, codes = outcome(ImuInput(), tilted(0.1), (0.0, 0.0, 1.0))
-    assert 'IMU_GRAVITY' in codes
+    """Nothing checks the orientation then: no margins, unless it alone was asked for."""
+    for attitude in ('auto', 'orientation'):
+        told = ImuInput(attitude=attitude)
+        margins, codes = outcome(told, tilted(0.1), (math.nan,) * 3)
+        assert (margins is None) is (attitude == 'auto')
+        assert 'INPUT_INVALID' in codes
+        for force in ((0.0, 0.0, 1.0), (0.01, 0.0, 0.02)):
+            margins, codes = outcome(told, tilted(0.1), force)
+            assert (margins is None) is (attitude == 'auto')
+            assert 'IMU_GRAVITY' in codes
+
+
+@pytest.mark.parametrize('force', [(0.0, 0.0, 1.0), (0.01, 0.0, 0.02), (0.0, 0.0, 0.0)])
+def test_specific_force_that_is_none_gives_no_margins_at_all(force: Sequence[float]) -> None:
+    """In g or without gravity it would make every margin look large: not one is computed."""
+    evaluator = LiveEvaluator(settings(ImuInput(specific_force=True)))
+    evaluator.start(T0)
+    for k in range(300):
+        give(evaluator, Joints(T0 + k * 10 * MS))
+        give(evaluator, Imu(T0 + k * 10 * MS + 1, tilted(0.1), STILL, tuple(force)))
+    assert evaluator.evaluated == 0
+    assert 'INPUT_INVALID' in {alert.rule.code for alert in evaluator.watch.log}
 
 
 @pytest.mark.parametrize('orientation', [ON_ITS_BACK, tilted(math.pi / 2)])
@@ -206,5 +269,5 @@ def test_specific_force_takes_gravitys_place_and_the_spin_is_undone() -> None:
     """A sensor 1 m ahead on a robot that turns feels 1 m/s2 towards the axis; the base does not."""
     of = tracker(ImuInput(specific_force=True, position=(1.0, 0.0, 0.0)))
     moving: NDArray[np.float64] = np.array((-1.0, 0.0, 9.81))
-    gravity, _, _ = step(of, Imu(T0, LEVEL, (0.0, 0.0, 1.0), tuple(moving.tolist())))
+    gravity, _ = step(of, Imu(T0, LEVEL, (0.0, 0.0, 1.0), tuple(moving.tolist())))
     np.testing.assert_allclose(gravity, (0.0, 0.0, -9.81), atol=1e-12)

@@ -1,15 +1,17 @@
 """Joint states: found by name, in robot convention, partial ones merged, odd ones told apart."""
 
 import math
+from dataclasses import replace
 
 import hypothesis
 import numpy as np
 import pytest
-from evaluation.streams import MS, T0, Joints, batch_of, joint_messages, settings, split
+from evaluation.streams import MS, T0, Joints, S, batch_of, joint_messages, settings, split
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.joints import JointMerger
+from ugv_acceptance.evaluation.watch import Watch
 
 
 def merged(message: Joints) -> JointMerger:
@@ -96,3 +98,54 @@ def test_empty_velocity_and_effort_are_unknown_not_zero() -> None:
     """As many drivers leave them empty."""
     merger = merged(Joints(T0))
     assert all(map(math.isnan, [*merger.qd, *merger.effort]))
+
+
+def turning(unit: float, wrapped: float = 0.0) -> tuple[list[float], list[str]]:
+    """Return what is known of an endless joint that turns at 1 of its 2 rad/s, and the alerts.
+
+    `unit` is what a message says of a radian; positions are wrapped at that many of them.
+    """
+    told = settings()
+    lift = replace(told.robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf)
+    told = replace(told, robot=replace(told.robot, joints=(lift, told.robot.joints[1])))
+    watch = Watch(told)
+    merger, known = JointMerger(told, watch.leaps), []
+    for k in range(1000):
+        angle = k * 0.01
+        angle = angle - wrapped * round(angle / wrapped) if wrapped else angle
+        merger.merge(T0 + k * 10 * MS, ('lift', 'hand_slide'), (unit * angle, 0.1), (), ())
+        known.append(merger.q[0])
+    return known, [f'{a.rule.code} {a.rule.subject}' for a in watch.log]
+
+
+@pytest.mark.parametrize('wrapped', [0.0, math.tau])
+def test_an_endless_joint_may_turn(wrapped: float) -> None:
+    """Wrapped at a turn or not, its position stays known."""
+    known, alerts = turning(1.0, wrapped)
+    assert not alerts
+    assert not any(map(math.isnan, known))
+
+
+@pytest.mark.parametrize('wrapped', [0.0, math.tau])
+def test_degrees_of_an_endless_joint_are_found_by_its_motion(wrapped: float) -> None:
+    """It moves 57 times faster than it seems to the driver: from the second second on, a fault."""
+    known, alerts = turning(180.0 / math.pi, wrapped)
+    assert set(alerts) == {'POSITION_LEAP lift'}
+    assert all(map(math.isnan, known[101:]))
+
+
+def test_a_leap_is_forgotten_when_the_joint_is_slow_again() -> None:
+    """A joint that was homed leaps once: unknown for a while, then known where it is now."""
+    slide = [0.0] * 150 + [0.3] * 450
+    told = [replace(j, velocity=0.01) for j in settings().robot.joints]
+    slow = replace(settings(), robot=replace(settings().robot, joints=tuple(told)))
+    watch = Watch(slow)
+    merger, known = JointMerger(slow, watch.leaps), []
+    for k, q in enumerate(slide):
+        merger.merge(T0 + k * 10 * MS, ('lift', 'hand_slide'), (0.1, q), (), ())
+        known.append(merger.q[1])
+    assert [a.rule.subject for a in watch.log] == ['slide']
+    assert watch.log[0].start == T0 + 2 * S
+    assert watch.log[0].end == T0 + 4 * S
+    assert all(map(math.isnan, known[200:400]))
+    assert known[400:] == [0.3] * 200

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -79,6 +80,7 @@ def compare(
     st.integers(0, 3 * S),
     st.sampled_from(LIVE_INPUTS),
     st.booleans(),
+    st.booleans(),
 )
 def test_margins_and_alerts_are_equal(
     messages: list[Message],
@@ -87,14 +89,19 @@ def test_margins_and_alerts_are_equal(
     rest: int,
     attitude: str,
     specific_force: bool,  # noqa: FBT001 - drawn
+    slow: bool,  # noqa: FBT001 - drawn: joints so slow that positions leap
 ) -> None:
     """Whatever comes, in whatever batches, whenever the clock ticks."""
     imu = ImuInput(
         attitude=attitude, specific_force=specific_force, position=(0.1, 0.0, 0.2),
-        agreement_delay=0.05,
+        agreement_delay=0.05, frame='imu_link',
     )  # fmt: skip
     delays = Delays(tip_on=0.02, torque_on=0.03, off=0.1)
-    compare(settings(imu, delays), messages, cuts, [T0 + t * MS for t in ticks], rest)
+    told = settings(imu, delays)
+    if slow:
+        joints = tuple(replace(joint, velocity=0.02) for joint in told.robot.joints)
+        told = replace(told, robot=replace(told.robot, joints=joints))
+    compare(told, messages, cuts, [T0 + t * MS for t in ticks], rest)
 
 
 @hypothesis.settings(max_examples=20)

@@ -153,5 +153,6 @@ def _inputs_result(
             'first_gaps_s': [[(a - start) / 1e9, (b - start) / 1e9] for a, b in gaps[:20]],
             'faults': sorted(faults),
         }
+    result['imu']['orientation'] = evaluator.orientations
     result['late_messages'] = facts.late
     return result

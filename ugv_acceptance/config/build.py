@@ -199,7 +199,8 @@ def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:
 
 def _imu(file: File) -> ImuInput:
     values = file.imu.model_dump()
-    return ImuInput(mounting=rotation_from_rpy(values.pop('mounting_rpy')), **values)
+    mounting = rotation_from_rpy(values.pop('mounting_rpy'))
+    return ImuInput(mounting=mounting, frame=(file.topics.imu.frame_id or '').lstrip('/'), **values)
 
 
 def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:

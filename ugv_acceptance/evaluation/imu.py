@@ -1,21 +1,24 @@
 """IMU messages to the gravity vector in `base_link`, and what is wrong with them.
 
 The orientation is used where the message claims it and it is a rotation that says something; else
-the low-passed accelerometer. Orientation and accelerometer must agree at rest. The same steps are
-written for one message and for columns; a property test holds that both give the same rows.
+the low-passed accelerometer, and unless the message says that it has none, that is a fault.
+Orientation and accelerometer must agree at rest, and the accelerometer must show gravity: while
+they do not, there is no gravity. The same steps are written for one message and for columns; a
+property test holds that both give the same rows.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts import Signal, feed
+from ugv_acceptance.evaluation.alerts import WARN, Signal, feed
+from ugv_acceptance.evaluation.low_pass import BELIEVABLE, NOWHERE, LowPass, Vector
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
+from ugv_acceptance.evaluation.watch import AttitudeSignals
 from ugv_acceptance.model.attitude import (
     angle_between,
     up_from_acceleration,
@@ -26,47 +29,48 @@ from ugv_acceptance.model.rows import Values
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
-Vector = tuple[float, float, float]
+Mask = NDArray[np.bool_]
 
-NOWHERE: Vector = (math.nan, math.nan, math.nan)
-# Seconds between stamps over which the low-pass may be carried; else it starts again.
-LONGEST_STEP = 1.0
 # A unit quaternion's norm may be this far from 1 (single precision, rounding).
 NORM_SLACK = 0.01
 # Share of g by which the accelerometer may differ from g and still show where up is.
 GRAVITY_SLACK = 0.15
-# Larger than any acceleration (m/s2) or rate (rad/s) of a vehicle: the number is something else.
-BELIEVABLE = 1e3
+# A specific force below this share of g is that of a fall, or no specific force.
+FALL = 0.5
+# What came of the orientations of messages.
+ORIENTATIONS = ('used', 'not_given', 'told_nothing')
 
 
 @dataclass(frozen=True, slots=True)
 class ImuRows:
     """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
 
-    `disagreement` (n,) is the angle (rad) between orientation and accelerometer, NaN while moving;
-    `strange` (n,) the share of g by which acceleration differs from g at rest, NaN while moving;
     `unusable` (n,) says that gravity cannot be told or that a number cannot be believed.
     """
 
     time: Times
     stamp: Times
     gravity: Floats
-    disagreement: Floats
-    strange: Floats
     unusable: NDArray[np.bool_]
 
 
 @dataclass(slots=True)
 class ImuTracker:
-    """The low-pass filter's state, and the fault that orientation and acceleration disagree.
+    """The smooth acceleration, and the faults of what messages say about the attitude.
 
-    While `fault` has an active alert there is no gravity.
+    While one of them is active and not just a warning there is no gravity. `taken` counts messages
+    as ORIENTATIONS says; not given is covariance -1.
     """
 
     settings: Settings
-    fault: Signal
-    smooth: Vector = NOWHERE
-    stamp: int = 0
+    faults: AttitudeSignals
+    low_pass: LowPass = field(init=False)
+    taken: list[int] = field(default_factory=lambda: [0, 0, 0])
+    _frame: str | None = None
+    _foreign: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.low_pass = LowPass(self.settings.imu.low_pass)
 
     def step(
         self,
@@ -76,53 +80,62 @@ class ImuTracker:
         covariance_0: float,
         omega: Sequence[float],
         acceleration: Sequence[float],
-    ) -> tuple[Vector, float, bool]:
-        """Take one message; return its gravity, strange and unusable as in ImuRows."""
-        size = self._filter(stamp, acceleration)
+        frame: str = '',
+    ) -> tuple[Vector, bool]:
+        """Take one message; return its gravity and unusable as in ImuRows."""
+        smooth = self.low_pass.step(stamp, acceleration)
+        size = _norm(smooth)
         imu, g = self.settings.imu, self.settings.robot.gravity
+        if frame != self._frame:
+            self._frame, self._foreign = frame, _foreign(frame, imu.frame)
         x, y, z, w = orientation
-        spin = _norm(omega)
+        spin, off = _norm(omega), abs(size - g)
         still = spin <= imu.rest_rate
-        told = _orientation_tells(x, y, z, w, covariance_0, imu.attitude)
-        shown = abs(size - g) <= GRAVITY_SLACK * g
-        by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if told else NOWHERE
-        by_acceleration = up_from_acceleration(*self.smooth, imu.mounting) if shown else NOWHERE
-        disagreement = math.nan
-        if told and shown and still and abs(size - g) <= imu.rest_acceleration:
-            disagreement = angle_between(by_orientation, by_acceleration)
-        self.fault.step(now, disagreement)
-        self.fault.advance(now)
-        strange = abs(size - g) / g if still else math.nan
-        believable = size == size and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
-        if self.fault.alert is not None:
-            return NOWHERE, strange, True
+        rotation = covariance_0 != -1.0 and _is_rotation(x, y, z, w)
+        told = rotation and not (imu.attitude == 'auto' and x == y == z == 0.0)
+        shown = off <= GRAVITY_SLACK * g
+        by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if rotation else NOWHERE
+        by_acceleration = up_from_acceleration(*smooth, imu.mounting) if shown else NOWHERE
+        apart = math.nan
+        if rotation and shown and still and off <= imu.rest_acceleration:
+            apart = angle_between(by_orientation, by_acceleration)
+        self.taken[0 if told else 1 if covariance_0 == -1.0 else 2] += 1
+        empty = 0.0 if told or covariance_0 == -1.0 else _empty(rotation, apart, imu)
+        strange = off / g if still else math.nan
+        believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
+        if self._judge(now, empty, strange, apart if told else math.nan):
+            return NOWHERE, True
         if imu.specific_force:
-            if not believable or size == 0.0:
-                return NOWHERE, strange, True
-            return _force(self.smooth, omega, imu), strange, False
+            if not believable or size < FALL * g:
+                return NOWHERE, True
+            return _force(smooth, omega, imu), False
+        if not believable and imu.attitude == 'auto':
+            return NOWHERE, True
         up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
-        return (-g * up[0], -g * up[1], -g * up[2]), strange, not believable or up[0] != up[0]
+        return (-g * up[0], -g * up[1], -g * up[2]), not believable or up[0] != up[0]
 
-    def _filter(self, stamp: int, acceleration: Sequence[float]) -> float:
-        """Low-pass an acceleration; return the size of what comes out, NaN if that is unknown."""
-        ax, ay, az = acceleration
-        if not ax * ax + ay * ay + az * az <= BELIEVABLE * BELIEVABLE:
-            ax = ay = az = math.nan
-        step = (stamp - self.stamp) * 1e-9
-        self.stamp = stamp
-        sx, sy, sz = self.smooth
-        if 0.0 < step <= LONGEST_STEP and sx == sx:  # noqa: PLR0124 - not NaN
-            keep = math.exp(-step / self.settings.imu.low_pass)
-            ax, ay, az = ax + keep * (sx - ax), ay + keep * (sy - ay), az + keep * (sz - az)
-        self.smooth = (ax, ay, az)
-        return math.sqrt(ax * ax + ay * ay + az * az)
+    def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
+        """Feed the faults with a message; return whether one of them takes gravity away."""
+        of, lost = self.faults, False
+        pairs = (
+            (of.frame, self._foreign), (of.orientation, empty), (of.strange, strange),
+            (of.disagreement, apart),
+        )  # fmt: skip
+        for signal, value in pairs:
+            # A quiet signal has nothing to do with a small value: most calls are saved.
+            if value >= signal.on or not signal.quiet:
+                signal.step(now, value)
+                signal.advance(now)
+                alert = signal.alert
+                lost = lost or (alert is not None and alert.rule.level > WARN)
+        return lost
 
     def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
         """Take many messages: the same rows as `step` one at a time, in order of receipt."""
         columns = [s for s in segments if len(s.log_time)]
         if not columns:
-            none, nothing = np.empty(0, np.int64), np.empty(0)
-            return ImuRows(none, none, np.empty((0, 3)), nothing, nothing, nothing != 0.0)
+            none = np.empty(0, np.int64)
+            return ImuRows(none, none, np.empty((0, 3)), none != 0)
         time = np.concatenate([s.log_time for s in columns])
         order = np.argsort(time, kind='stable') if (np.diff(time) < 0).any() else slice(None)
         time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
@@ -130,89 +143,106 @@ class ImuTracker:
         covariance_0 = np.concatenate([s.orientation_covariance_0 for s in columns])[order]
         omega = _lines([s.angular_velocity for s in columns])[:, order]
         acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
+        frame = self.settings.imu.frame
+        lengths = [len(s.log_time) for s in columns]
+        foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
         with np.errstate(all='ignore'):
-            smooth = self._filter_columns(stamp, acceleration)
-            return self._rows(time, stamp, (q, covariance_0, omega), smooth)
+            smooth = self.low_pass.columns(stamp, acceleration)
+            return self._rows(time, stamp, (q, covariance_0, omega), smooth, foreign)
 
     def _rows(
-        self, time: Times, stamp: Times, told_by: tuple[Floats, Floats, Floats], smooth: Floats
+        self,
+        time: Times,
+        stamp: Times,
+        told_by: tuple[Floats, Floats, Floats],
+        smooth: Floats,
+        foreign: Floats,
     ) -> ImuRows:
         """Return the rows of orientation, its covariance and rate, and the smooth acceleration."""
         imu, g = self.settings.imu, self.settings.robot.gravity
         q, covariance_0, omega = told_by
         size, spin = _norms(smooth), _norms(omega)
-        still = spin <= imu.rest_rate
-        told = _orientation_tells(q[0], q[1], q[2], q[3], covariance_0, imu.attitude)
-        shown = np.abs(size - g) <= GRAVITY_SLACK * g
-        oriented = np.where(told, up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting), np.nan)
+        off, still = np.abs(size - g), spin <= imu.rest_rate
+        given = covariance_0 != -1.0
+        rotation = given & _is_rotation(q[0], q[1], q[2], q[3])
+        told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
+        self._count(told, given)
+        by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
+        oriented = np.where(rotation, by_orientation, np.nan)
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
-        leaning = np.where(shown, up, np.nan)
-        rest = still & (np.abs(size - g) <= imu.rest_acceleration)
-        disagreement = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
-        strange = np.where(still, np.abs(size - g) / g, np.nan)
-        believable = (size == size) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
+        leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
+        rest = still & (off <= imu.rest_acceleration)
+        apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
+        believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
             force = np.array(_force(tuple(smooth), tuple(omega), imu))
-            gravity = np.where(believable & (size != 0.0), force, np.nan)
+            gravity = np.where(believable & ~(size < FALL * g), force, np.nan)
         else:
-            use = told if imu.attitude != 'accelerometer' else np.zeros(len(time), np.bool_)
+            use = told & (imu.attitude != 'accelerometer')
             gravity = -g * np.where(use, oriented, leaning)
-        self._judge(time, disagreement, gravity)
-        unusable = ~believable | np.isnan(gravity[0])
-        return ImuRows(time, stamp, gravity.T, disagreement, strange, unusable)
+            if imu.attitude == 'auto' and not believable.all():
+                gravity[:, ~believable] = np.nan
+        faults = (foreign, np.zeros(len(time)), np.where(still, off / g, np.nan), apart)
+        if not told.all():
+            faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
+            faults[3][~told] = np.nan
+        self._judge_rows(time, faults, gravity)
+        return ImuRows(time, stamp, gravity.T, ~believable | np.isnan(gravity[0]))
 
-    def _judge(self, time: Times, disagreement: Floats, gravity: Floats) -> None:
-        """Feed the fault and take gravity away while it is active."""
-        before, seen = self.fault.alert, len(self.fault.log)
-        feed(self.fault, time, disagreement)
-        for alert in [before, *self.fault.log[seen:]]:
-            if alert is not None and alert.rule is self.fault.rule:
-                end = np.inf if alert.end is None else alert.end
-                gravity[:, (time >= alert.start) & (time < end)] = np.nan
+    def _count(self, told: Mask, given: Mask) -> None:
+        used, none = int(told.sum()), len(given) - int(given.sum())
+        self.taken = [
+            a + b for a, b in zip(self.taken, (used, none, len(told) - used - none), strict=True)
+        ]
 
-    def _filter_columns(self, stamp: Times, x: Floats) -> Floats:
-        """Low-pass many accelerations (3, n): the recursion of `_filter` in closed form.
-
-        Stretches of a few time constants at a time, so that the products of the decay factors stay
-        far from the ends of the number range.
-        """
-        step = np.diff(stamp, prepend=self.stamp) * 1e-9
-        self.stamp = int(stamp[-1])
-        finite = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] <= BELIEVABLE * BELIEVABLE
-        if not finite.all():
-            x = np.where(finite, x, np.nan)
-        carried = (step > 0.0) & (step <= LONGEST_STEP) & np.concatenate(([True], finite[:-1]))
-        decay = np.where(carried, step / self.settings.imu.low_pass, 0.0)
-        elapsed = np.cumsum(decay)
-        starts = ~carried
-        starts[1:] |= np.diff(np.floor(elapsed / 8.0)) > 0
-        starts[0] = True
-        edges = np.append(np.flatnonzero(starts), len(stamp))
-        y = np.empty_like(x)
-        last = np.array(self.smooth)
-        for first, end in pairwise(edges.tolist()):
-            part, w = x[:, first:end], y[:, first:end]
-            # What the output lacks of the input decays, and grows by each step of the input.
-            fresh = not carried[first] or not np.isfinite(last).all()
-            since = elapsed[first] if fresh else elapsed[first] - decay[first]
-            keep = np.exp(since - elapsed[first:end])
-            w[:, 0] = 0.0 if fresh else last - part[:, 0]
-            w[:, 1:] = (part[:, :-1] - part[:, 1:]) / keep[:-1]
-            y[:, first:end] = part + keep * np.cumsum(w, axis=1)
-            last = y[:, end - 1]
-        self.smooth = (float(last[0]), float(last[1]), float(last[2]))
-        return y
+    def _judge_rows(self, time: Times, faults: Sequence[Floats], gravity: Floats) -> None:
+        """Feed the faults; take gravity away while one is active that is not just a warning."""
+        of = self.faults
+        signals = (of.frame, of.orientation, of.strange, of.disagreement)
+        for signal, values in zip(signals, faults, strict=True):
+            for start, end in feed_spans(signal, time, values):
+                if signal.rule.level > WARN:
+                    gravity[:, (time >= start) & (time < end)] = np.nan
 
 
-def _orientation_tells(
-    x: Values, y: Values, z: Values, w: Values, covariance_0: Values, attitude: str
-) -> Values:
-    """Return whether a quaternion is claimed, is a rotation, and is not just a default identity."""
-    size = x * x + y * y + z * z + w * w
-    told = (abs(size - 1.0) <= 2.0 * NORM_SLACK) & (covariance_0 != -1.0)
-    if attitude == 'auto':
-        told = told & ((x != 0.0) | (y != 0.0) | (z != 0.0))
-    return told
+def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[float, float]]:
+    """Feed a signal; yield from when until before when (ns) each of its alerts is active."""
+    before, seen = signal.alert, len(signal.log)
+    feed(signal, time, values)
+    for alert in [before, *signal.log[seen:]]:
+        if alert is not None and alert.rule is signal.rule:
+            yield alert.start, math.inf if alert.end is None else alert.end
+
+
+def _foreign(frame: str, expected: str) -> float:
+    """Return 1 where a message names another frame than it should; a prefix of names is none."""
+    named = frame.lstrip('/')
+    same = named in ('', expected) or named.endswith(f'/{expected}')
+    return 0.0 if same or not expected else 1.0
+
+
+def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:
+    return abs(x * x + y * y + z * z + w * w - 1.0) <= 2.0 * NORM_SLACK
+
+
+def _empty(rotation: bool, apart: float, imu: ImuInput) -> float:  # noqa: FBT001 - as of rows
+    """Return 1 where an orientation that is given tells nothing; NaN where that is not known.
+
+    The identity may be true: it tells nothing where the accelerometer at rest denies it.
+    """
+    if imu.attitude == 'accelerometer':
+        return 0.0
+    if not rotation:
+        return 1.0
+    return math.nan if math.isnan(apart) else float(apart >= imu.agreement)
+
+
+def _empty_rows(rotation: Mask, apart: Floats, imu: ImuInput) -> Floats:
+    """Return `_empty` of many."""
+    if imu.attitude == 'accelerometer':
+        return np.zeros(len(apart))
+    denied = np.where(np.isnan(apart), np.nan, apart >= imu.agreement)
+    return np.where(rotation, denied, 1.0)
 
 
 def _norm(v: Sequence[float]) -> float:

@@ -1,4 +1,8 @@
-"""Joint states to the robot's joints: names matched, signs undone, partial messages merged."""
+"""Joint states to the robot's joints: names matched, signs undone, partial messages merged.
+
+Once a second every joint's position is compared with that of the second before: what moves faster
+than the joint can is another unit or another joint, and counts for nothing.
+"""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.alerts import Signal
 from ugv_acceptance.evaluation.samples import JointStateColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Joint
@@ -19,6 +24,8 @@ BEYOND = 0.1
 # Larger than any position a turning joint can have gathered: the number is not an angle.
 ABSURD = 1e5
 NEVER = -1
+# Positions are compared in every one of these stretches of time (ns), if so much lies between them.
+SECOND, APART = 1_000_000_000, 500_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,36 +47,59 @@ class JointRows:
 
 
 @dataclass(slots=True)
+class Layout:
+    """The robot's joints in messages of some names, and the second last looked at for leaps.
+
+    `pairs` are (joint number, place in the message).
+    """
+
+    pairs: list[tuple[int, int]]
+    second: int = NEVER
+
+
+@dataclass(slots=True)
 class JointMerger:
-    """Holds the newest position, rate and effort of every joint, in robot convention."""
+    """Holds the newest position, rate and effort of every joint, in robot convention.
+
+    `leaps` are the signals of the joints; while one has an alert its joint's position is unknown.
+    """
 
     settings: Settings
+    leaps: Sequence[Signal] = ()
     q: list[float] = field(init=False)
     qd: list[float] = field(init=False)
     effort: list[float] = field(init=False)
     seen: list[int] = field(init=False)
-    _layouts: dict[tuple[str, ...], list[tuple[int, int]]] = field(default_factory=dict)
+    _layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
     _range: list[tuple[float, float]] = field(init=False)
+    _before: list[tuple[int, float]] = field(init=False)
+    _turn: list[float] = field(init=False)
+    _leapt: bool = False
 
     def __post_init__(self) -> None:
         n = len(self.settings.joints)
         self.q, self.qd, self.effort = ([math.nan] * n for _ in range(3))
         self.seen = [NEVER] * n
         robot = self.settings.robot
-        self._range = [_believable(robot.joint(name)) for name in robot.joint_names]
+        joints = [robot.joint(name) for name in robot.joint_names]
+        self._range = list(map(_believable, joints))
+        self._before = [(NEVER, math.nan)] * n
+        self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
 
-    def layout(self, names: tuple[str, ...]) -> list[tuple[int, int]]:
-        """Return (joint number, place in the message) of the robot's joints among `names`.
+    def layout(self, names: tuple[str, ...]) -> Layout:
+        """Return where the robot's joints stand among `names`.
 
         A name that stands twice in a message cannot be told apart and is left out.
         """
         found = self._layouts.get(names)
         if found is None:
-            found = [
-                (j, names.index(joint.topic_name))
-                for j, joint in enumerate(self.settings.joints)
-                if names.count(joint.topic_name) == 1
-            ]
+            found = Layout(
+                [
+                    (j, names.index(joint.topic_name))
+                    for j, joint in enumerate(self.settings.joints)
+                    if names.count(joint.topic_name) == 1
+                ]
+            )
             if len(self._layouts) < 64:
                 self._layouts[names] = found
         return found
@@ -84,10 +114,11 @@ class JointMerger:
     ) -> bool:
         """Take one message; return whether it carries a position of one of the robot's joints."""
         layout = self.layout(names)
-        if not layout or len(position) != len(names):
+        pairs = layout.pairs
+        if not pairs or len(position) != len(names):
             return False
         rates, efforts = len(velocity) == len(names), len(effort) == len(names)
-        for j, k in layout:
+        for j, k in pairs:
             joint, (lower, upper) = self.settings.joints[j], self._range[j]
             q = joint.sign * position[k] + joint.offset
             self.q[j] = q if lower <= q <= upper else math.nan
@@ -96,29 +127,80 @@ class JointMerger:
             self.qd[j] = qd if -ABSURD <= qd <= ABSURD else math.nan
             scale = joint.effort_sign * joint.effort_scale
             self.effort[j] = scale * effort[k] if efforts else math.nan
+        if now // SECOND != layout.second or self._leapt:
+            self._look(now, layout)
         return True
+
+    def _look(self, now: int, layout: Layout) -> None:
+        """Look for leaps of the joints that a message named; forget the positions of those."""
+        if now // SECOND != layout.second:
+            layout.second = now // SECOND
+            for j, _ in layout.pairs:
+                self._compare(j, now, self.q[j])
+        for j, _ in layout.pairs:
+            if self.leaps:
+                self.leaps[j].advance(now)
+                if self.leaps[j].alert is not None:
+                    self.q[j] = math.nan
+        self._leapt = not all(signal.quiet for signal in self.leaps)
+
+    def _compare(self, j: int, now: int, q: float) -> None:
+        """Compare joint number j's position with the one before; a turn of it may be wrapped."""
+        then, before = self._before[j]
+        if not self.leaps or math.isnan(q) or (then != NEVER and now - then < APART):
+            return
+        self._before[j] = now, q
+        if then != NEVER:
+            way = abs(q - before)
+            self.leaps[j].step(now, min(way, abs(way - self._turn[j])) / (now - then) * SECOND)
 
     def merge_columns(self, segments: Sequence[JointStateColumns]) -> JointRows:
         """Take many messages: the same rows as `merge` one at a time, in order of receipt."""
-        useful = [s for s in segments if self.layout(s.names) and s.position.shape[1]]
+        useful = [s for s in segments if self.layout(s.names).pairs and s.position.size]
         time = np.concatenate([s.log_time for s in useful] or [np.empty(0, np.int64)])
         stamp = np.concatenate([s.stamp for s in useful] or [np.empty(0, np.int64)])
         joints, n = len(self.settings.joints), len(time)
         tables, named = np.empty((3, joints, n)), np.empty((joints, n), np.bool_)
-        first = 0
+        first, of = 0, np.zeros(n, np.intp)
+        numbers = {names: k for k, names in enumerate(dict.fromkeys(s.names for s in useful))}
         for segment in useful:
             rows = slice(first, first + len(segment.log_time))
             self._fill(tables[:, :, rows], named[:, rows], segment)
+            of[rows] = numbers[segment.names]
             first = rows.stop
         if len(useful) > 1 and (np.diff(time) < 0).any():
             order = np.argsort(time, kind='stable')
             time, stamp = time[order], stamp[order]
-            tables, named = tables[:, :, order], named[:, order]
+            tables, named, of = tables[:, :, order], named[:, order], of[order]
+        if self.leaps and n:
+            rows_of = [(self.layout(x), np.flatnonzero(of == k)) for x, k in numbers.items()]
+            self._look_at(time, tables[0], rows_of)
         return self._carry(time, stamp, tables, named)
+
+    def _look_at(
+        self, time: Times, q: Floats, rows_of: Sequence[tuple[Layout, NDArray[np.intp]]]
+    ) -> None:
+        """Look for leaps in the positions (j, n) that messages name, as `_look` at each of them."""
+        before, seen = [signal.alert for signal in self.leaps], len(self.leaps[0].log)
+        looks: list[tuple[int, int]] = []
+        for layout, rows in rows_of:
+            seconds = time[rows] // SECOND
+            firsts = rows[np.flatnonzero(np.diff(seconds, prepend=layout.second))]
+            layout.second = int(seconds[-1])
+            looks += [(row, j) for row in firsts.tolist() for j, _ in layout.pairs]
+        for row, j in sorted(looks):
+            self._compare(j, int(time[row]), float(q[j, row]))
+        for j, signal in enumerate(self.leaps):
+            signal.advance(int(time[-1]))
+            for alert in [before[j], *signal.log[seen:]]:
+                if alert is not None and alert.rule is signal.rule:
+                    end = np.inf if alert.end is None else alert.end
+                    q[j, (time >= alert.start) & (time < end)] = np.nan
+        self._leapt = not all(signal.quiet for signal in self.leaps)
 
     def _fill(self, tables: Floats, named: NDArray[np.bool_], segment: JointStateColumns) -> None:
         """Write a segment's positions, rates and efforts, and which joints it names."""
-        layout = self.layout(segment.names)
+        layout = self.layout(segment.names).pairs
         if len(layout) < len(named) or not (segment.velocity.size and segment.effort.size):
             tables.fill(np.nan)
             named[:] = False

@@ -7,8 +7,9 @@ from typing import Any
 
 from ugv_acceptance.evaluation.alerts import OK, STALE
 from ugv_acceptance.evaluation.freshness import Freshness
-from ugv_acceptance.evaluation.imu import NOWHERE, ImuTracker, Vector
+from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.joints import NEVER, JointMerger
+from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
 from ugv_acceptance.evaluation.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.watch import InputSignals, Watch
@@ -57,8 +58,8 @@ class LiveEvaluator:
         self.watch = Watch(self.settings)
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
-        self._joints = JointMerger(self.settings)
-        self._imu = ImuTracker(self.settings, self.watch.disagreement)
+        self._joints = JointMerger(self.settings, self.watch.leaps)
+        self._imu = ImuTracker(self.settings, self.watch.attitude)
         delays = self.settings.delays
         self._fresh = (Freshness(delays), Freshness(delays))
 
@@ -109,13 +110,13 @@ class LiveEvaluator:
         covariance_0: float,
         omega: Sequence[float],
         acceleration: Sequence[float],
+        frame: str = '',
     ) -> Margins | None:
-        """Take an Imu message (sensor axes); return as `joint_state` does."""
+        """Take an Imu message (axes of the sensor `frame`); return as `joint_state` does."""
         self._arrived(1, now, stamp, self.watch.imu)
-        gravity, strange, unusable = self._imu.step(
-            now, stamp, orientation, covariance_0, omega, acceleration
+        gravity, unusable = self._imu.step(
+            now, stamp, orientation, covariance_0, omega, acceleration, frame
         )
-        self.watch.strange.step(now, strange)
         self.watch.imu.invalid.step(now, 1.0 if unusable else 0.0)
         self._gravity = gravity
         return self._evaluate(now, stamp)
@@ -155,6 +156,11 @@ class LiveEvaluator:
     def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Newest rates and efforts of the joints (rad/s, N m; m/s, N); NaN where not reported."""
         return tuple(self._joints.qd), tuple(self._joints.effort)
+
+    @property
+    def orientations(self) -> dict[str, int]:
+        """How many messages' orientation was used, not given, told nothing."""
+        return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     @property
     def level(self) -> int:

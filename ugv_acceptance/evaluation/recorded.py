@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts import feed
 from ugv_acceptance.evaluation.freshness import Freshness
-from ugv_acceptance.evaluation.imu import ImuRows, ImuTracker
+from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.payload import PayloadHistory, payload_from
 from ugv_acceptance.evaluation.rows import Floats, MarginRows, Pairs, Times
@@ -67,16 +67,20 @@ class RecordedEvaluator:
         self.watch = Watch(self.settings)
         robot = self.settings.robot
         self._mechanics = mechanics_of(robot)
-        self._joints = JointMerger(self.settings)
-        self._imu = ImuTracker(self.settings, self.watch.disagreement)
+        self._joints = JointMerger(self.settings, self.watch.leaps)
+        self._imu = ImuTracker(self.settings, self.watch.attitude)
         self.fresh = (Freshness(self.settings.delays), Freshness(self.settings.delays))
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
-        nothing = np.full(1, np.nan)
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
-        imu = ImuRows(never, never, np.full((1, 3), np.nan), nothing, nothing, never < 0)
+        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0)
         self._carry = _Newest(joints, never, imu, never)
+
+    @property
+    def orientations(self) -> dict[str, int]:
+        """How many messages' orientation was used, not given, told nothing."""
+        return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     def start(self, now: int) -> None:
         """Say when the recording began: an input that never comes is stale from then on."""
@@ -138,7 +142,6 @@ class RecordedEvaluator:
         for signal, rate in zip(self.watch.speed, joints.qd.T, strict=True):
             if signal.on < np.inf:
                 feed(signal, joints.time, np.abs(rate))
-        feed(self.watch.strange, imu.time, imu.strange)
         feed(self.watch.imu.invalid, imu.time, imu.unusable)
 
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:

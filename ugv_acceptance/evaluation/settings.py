@@ -30,6 +30,7 @@ class ImuInput:
     `mounting` turns sensor axes into `base_link`, `position` is the sensor in `base_link` (m).
     `attitude` is auto (orientation where it can be trusted, else accelerometer), orientation or
     accelerometer. With `specific_force` the accelerometer takes gravity's place in every margin.
+    `frame` is the frame its messages name; '': not checked.
     """
 
     mounting: Matrix = IDENTITY
@@ -41,6 +42,7 @@ class ImuInput:
     rest_rate: float = 0.1
     agreement: float = 0.0872664625997165
     agreement_delay: float = 1.0
+    frame: str = ''
 
 
 @dataclass(frozen=True, slots=True)

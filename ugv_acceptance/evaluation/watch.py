@@ -10,6 +10,8 @@ from ugv_acceptance.model.stability import SIDES
 FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
+# Times its greatest speed at which a joint cannot move: the numbers are of another unit or joint.
+LEAP = 10.0
 
 
 @dataclass(slots=True)
@@ -29,8 +31,8 @@ class Watch:
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
     missing: Signal = field(init=False)
-    strange: Signal = field(init=False)
-    disagreement: Signal = field(init=False)
+    leaps: list[Signal] = field(init=False)
+    attitude: 'AttitudeSignals' = field(init=False)
 
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
@@ -55,11 +57,8 @@ class Watch:
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
-        imu = self.settings.imu
-        delay = imu.agreement_delay
-        self.strange = self._signal('IMU_GRAVITY', 'imu', WARN, (STRANGE, STRANGE), delay)
-        apart = (imu.agreement, imu.agreement / 2)
-        self.disagreement = self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay)
+        self.leaps = [self._leap(name) for name in names]
+        self.attitude = self._attitude()
 
     def _signal(
         self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
@@ -82,6 +81,24 @@ class Watch:
         delay = self.settings.delays.fault_on if on_delay is None else on_delay
         return self._signal(code, subject, level, (0.5, 0.5), delay)
 
+    def _leap(self, joint: str) -> Signal:
+        limit = LEAP * self.settings.robot.joint(joint).velocity
+        delay = self.settings.delays.fault_on
+        return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+
+    def _attitude(self) -> 'AttitudeSignals':
+        imu = self.settings.imu
+        delay = imu.agreement_delay
+        apart = (imu.agreement, imu.agreement / 2)
+        # Who asks for the orientation alone is told, and gets its margins.
+        level = WARN if imu.attitude == 'orientation' and not imu.specific_force else ERROR
+        return AttitudeSignals(
+            self._fault('IMU_FRAME', 'imu', ERROR),
+            self._fault('IMU_ORIENTATION', 'imu', WARN, delay),
+            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), delay),
+            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay),
+        )
+
     def _input(self, subject: str) -> 'InputSignals':
         return InputSignals(
             self._fault('INPUT_STALE', subject, STALE, 0.0),
@@ -99,8 +116,10 @@ class Watch:
         """Return all signals."""
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
         inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
-        faults = [self.support, self.payload, self.missing, self.strange, self.disagreement]
-        return [*pairs, *self.speed, *inputs, *faults]
+        of = self.attitude
+        attitude = [of.frame, of.orientation, of.strange, of.disagreement]
+        faults = [self.support, self.payload, self.missing, *attitude]
+        return [*pairs, *self.speed, *self.leaps, *inputs, *faults]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,3 +129,13 @@ class InputSignals:
     stale: Signal
     invalid: Signal
     clock: Signal
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSignals:
+    """What is watched of the way to gravity: where the IMU sits, what it says, what contradicts."""
+
+    frame: Signal
+    orientation: Signal
+    strange: Signal
+    disagreement: Signal

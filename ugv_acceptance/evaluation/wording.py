@@ -39,6 +39,18 @@ WORDS = {
         'header stamps of {subject} are over a second from the time of receipt, jump or stand',
         'check the clocks and use_sim_time',
     ),
+    'POSITION_LEAP': (
+        'the position of {subject} changes by {peak:.1f} {rate}, ten times faster than it can move',
+        'check its unit (rad, not degrees), its name, and that nobody else publishes it',
+    ),
+    'IMU_FRAME': (
+        'messages of {subject} come from another frame than the configuration names',
+        'see that this is the IMU whose mounting is given; else mend topics.imu.frame_id',
+    ),
+    'IMU_ORIENTATION': (
+        'the orientation of {subject} is no rotation, or level while its acceleration is not',
+        'mend its driver; if it has no orientation, it should say so (covariance -1, REP-145)',
+    ),
     'IMU_GRAVITY': (
         'at rest the acceleration differs from gravity by {peak:.0%}',
         'check its unit (m/s2, not g) and that gravity is not removed from it',

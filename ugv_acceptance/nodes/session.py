@@ -135,11 +135,11 @@ class Session:
 
         def take(data: bytes) -> None:
             now = time.monotonic_ns() + clock.offset
-            stamp, _, orientation, omega, acceleration, covariance_0, _, _ = decode(data)
+            stamp, frame, orientation, omega, acceleration, covariance_0, _, _ = decode(data)
             count.taken += 1
             count.last = now
             local = clock.stamp(now, stamp) if clock.simulated else stamp
-            margins = evaluate(now, local, orientation, covariance_0, omega, acceleration)
+            margins = evaluate(now, local, orientation, covariance_0, omega, acceleration, frame)
             if margins is not None:
                 see(margins)
                 self.on_margins(stamp, margins)

@@ -64,6 +64,9 @@ def _input(name: str, session: Session, inputs: 'Inputs | None', active: list[Al
         'publishers': len(nodes),
         'published_by': ', '.join(nodes),
     }
+    if name == 'imu':
+        of = session.evaluator.orientations
+        values |= {f'orientation_{how}': number for how, number in of.items()}
     if count.reason:
         values['last_malformed'] = count.reason
     level = max([a.rule.level for a in mine], default=OK)
