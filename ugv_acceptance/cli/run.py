@@ -12,7 +12,10 @@ __all__ = ['CONTEXT', 'run']
 
 def run(
     context: typer.Context,
-    plan: Annotated[Path, typer.Argument(help='A plan made by `ugv-acceptance plan`.')],
+    plan: Annotated[
+        Path | None,
+        typer.Argument(help='A plan made by `ugv-acceptance plan`; none: its --short one.'),
+    ] = None,
     *,
     sim: Annotated[bool, typer.Option('--sim', help='Start a simulated robot and use it.')] = False,
     robot: Annotated[
@@ -21,9 +24,14 @@ def run(
     operator: Annotated[
         bool, typer.Option('--operator', help='A person moves the robot and is told how.')
     ] = False,
+    fast: Annotated[
+        bool,
+        typer.Option('--fast', help='With --sim: in simulated time, as fast as it goes, no ROS.'),
+    ] = False,
     out: Annotated[
-        Path, typer.Option('--out', '-o', help='New folder for recordings and results.')
-    ] = Path('run'),
+        Path | None,
+        typer.Option('--out', '-o', help='New folder for recordings and results. [default: run]'),
+    ] = None,
     resume: Annotated[
         bool, typer.Option('--resume', help='Continue an interrupted run in that folder.')
     ] = False,
@@ -37,6 +45,10 @@ def run(
         Path | None,
         typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
     ] = None,
+    attempts: Annotated[
+        int,
+        typer.Option(min=1, max=100, help='Times a step is tried that messages were missing in.'),
+    ] = 5,
     seed: Annotated[int, typer.Option(help='Seed of the simulated sensors.')] = 1,
     fault: Annotated[
         list[str] | None, typer.Option(help='A fault of the simulated robot, as of simulate.')
@@ -49,7 +61,8 @@ def run(
 
     \b
     Examples:
-      ugv-acceptance run plan.yaml --sim --out out/sim --skip endurance
+      ugv-acceptance run --sim
+      ugv-acceptance run plan.yaml --sim --fast --out out/sim --skip endurance
       ugv-acceptance run plan.yaml --robot --out runs/robot7
       ugv-acceptance run plan.yaml --operator --out runs/robot7 --resume
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
@@ -58,16 +71,22 @@ def run(
         raise typer.BadParameter(
             f'expected one of --sim, --robot, --operator, got {modes or "none"}'
         )
+    if fast and not sim:
+        raise typer.BadParameter('expected --fast with --sim: a real robot has its own time')
+    if plan is None and not sim:
+        raise typer.BadParameter('expected a plan for a robot; only --sim goes without one')
     from ugv_acceptance.cli.running_plan import Asked, execute
 
     asked = Asked(
         plan=plan,
         mode=modes[0],
         out=out,
+        fast=fast,
         resume=resume,
         only=tuple(only or ()),
         skip=tuple(skip or ()),
         config=config,
+        attempts=attempts,
         seed=seed,
         faults=tuple(fault or ()),
         ros_args=tuple(ros_arguments(context)),

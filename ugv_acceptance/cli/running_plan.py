@@ -1,9 +1,10 @@
-"""The parts of `run`: a robot, a monitor, the runner between them, and what is said on the way."""
+"""The parts of `run`: a robot, a monitor, the runner between them, and the folder of the run."""
 
 import math
 import os
 import random
-import sys
+import signal
+import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -12,34 +13,37 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress, TextColumn
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.run_text import Steps, ask, print_result, say_stop
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
-    from ugv_acceptance.nodes.runner import Runner
     from ugv_acceptance.plan.plan import Plan, Step
     from ugv_acceptance.run.folder import RunFolder
+    from ugv_acceptance.run.runner import Runner
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 INTERRUPTED = 3
 # Seconds for robot and monitor to be there.
 START = 30.0
-COLOURS = {'PASS': 'green', 'FAIL': 'red', 'INCONCLUSIVE': 'yellow', 'SKIPPED': 'dim'}
+# ROS domains: above 101 DDS ports meet those Linux lends to any program.
+DOMAINS = range(1, 102)
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What the command line asks for; `mode` is sim, robot or operator."""
 
-    plan: Path
+    plan: Path | None
     mode: str
-    out: Path
+    out: Path | None = None
+    fast: bool = False
     resume: bool = False
     only: tuple[str, ...] = ()
     skip: tuple[str, ...] = ()
     config: Path | None = None
+    attempts: int = 5
     seed: int = 1
     faults: tuple[str, ...] = ()
     ros_args: tuple[str, ...] = ()
@@ -48,13 +52,14 @@ class Asked:
 def execute(asked: Asked) -> int:
     """Run the plan; return the exit code."""
     from ugv_acceptance.config import load
-    from ugv_acceptance.plan.plan import read_plan
     from ugv_acceptance.run.folder import open_folder
 
     config = load(asked.config)
-    plan = read_plan(asked.plan, config.settings.robot)
+    plan = plan_of(asked, config)
     chosen = steps_of(plan, asked)
-    folder = open_folder(asked.out, plan, asked.plan, asked.mode, config, resume=asked.resume)
+    mode = f'{asked.mode}-fast' if asked.fast else asked.mode
+    out = folder_of(asked)
+    folder = open_folder(out, plan, asked.plan, mode, config, resume=asked.resume)
     waiting = [step for step in chosen if folder.done(step) is None]
     console = Console(highlight=False)
     console.print(f'plan {escape(plan.plan)}, sha256 {plan.sha256}', soft_wrap=True)
@@ -62,9 +67,34 @@ def execute(asked: Asked) -> int:
         console.print("[yellow]The plan was derived from another state of the robot's files.[/]")
     if len(waiting) < len(chosen):
         console.print(f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
-    interrupted = bool(waiting) and _live(asked, config, folder, waiting, console)
+    interrupted = bool(waiting) and _do(asked, config, folder, Steps(console, plan, waiting))
     result = folder.finish(config, coverage(config, folder))
-    return conclude(result, folder, console, interrupted=interrupted)
+    folder.note('interrupted' if interrupted else 'finished', verdict=result['verdict'])
+    print_result(result, folder, console)
+    if interrupted:
+        console.print('interrupted: --resume continues where it ended')
+        return INTERRUPTED
+    return EXIT[result['verdict']]
+
+
+def plan_of(asked: Asked, config: 'Config') -> 'Plan':
+    """Return the plan that was named, else the short one of the robot."""
+    from ugv_acceptance.plan.derive import Wanted, derive
+    from ugv_acceptance.plan.plan import read_plan
+
+    if asked.plan is None:
+        return derive(config, Wanted(short=True))
+    return read_plan(asked.plan, config.settings.robot)
+
+
+def folder_of(asked: Asked) -> Path:
+    """Return the folder that was named, else the first of run, run-2, run-3 that is not there."""
+    if asked.out is not None or asked.resume:
+        return asked.out or Path('run')
+    number = 1
+    while (out := Path('run' if number == 1 else f'run-{number}')).exists():
+        number += 1
+    return out
 
 
 def steps_of(plan: 'Plan', asked: Asked) -> list['Step']:
@@ -72,7 +102,7 @@ def steps_of(plan: 'Plan', asked: Asked) -> list['Step']:
     names = {name for step in plan.steps for name in (step.id, step.group)}
     unknown = [name for name in (*asked.only, *asked.skip) if name not in names]
     if unknown:
-        raise BadConfig(f'{asked.plan}: expected a step or a group of the plan, got {unknown[0]!r}')
+        raise BadConfig(f'{plan.plan}: expected a step or a group of the plan, got {unknown[0]!r}')
     return [
         step
         for step in plan.steps
@@ -81,93 +111,106 @@ def steps_of(plan: 'Plan', asked: Asked) -> list['Step']:
     ]
 
 
-def _live(
-    asked: Asked, config: 'Config', folder: 'RunFolder', waiting: list['Step'], console: Console
-) -> bool:
+def _do(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> bool:
     """Do the steps that wait; return whether that was interrupted."""
-    if asked.mode == 'sim':
-        # Nobody else's robot moves, nobody else's messages are recorded.
-        os.environ['ROS_DOMAIN_ID'] = str(random.SystemRandom().randint(1, 101))
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    with runner(asked, config, folder, console) as made, _bar(len(waiting), console) as bar:
-        for step in waiting:
-            bar.update(bar.task_ids[0], description=escape(step.id))
-            result = made.run(step)
+    world = _offline if asked.fast else _live
+    with shown.bar, world(asked, config, folder, shown) as runner:
+        for step in shown.waiting:
+            shown.begin(step)
+            result = runner.run(step)
             if result is None:
                 return True
-            bar.advance(bar.task_ids[0])
-            _print_step(result, console)
-            if made.guard.watched.dead:
-                console.print('[bold red]The monitor is dead: the run ends here.[/]')
+            shown.end(result)
+            if runner.over:
+                shown.console.print(f'[bold red]The run ends here:[/] {runner.over}')
                 return True
     return False
 
 
 @contextmanager
-def runner(
-    asked: Asked, config: 'Config', folder: 'RunFolder', console: Console
-) -> Iterator['Runner']:
+def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> Iterator['Runner']:
     """Start the robot (if simulated), the monitor and the runner; end them all, come what may."""
     from ugv_acceptance.nodes.child import child
-    from ugv_acceptance.nodes.guard import Guard
-    from ugv_acceptance.nodes.hands import Hands
-    from ugv_acceptance.nodes.runner import Runner, spinning
+    from ugv_acceptance.nodes.guard import Guard, spinning
     from ugv_acceptance.nodes.running import ros
+    from ugv_acceptance.run.hands import Hands
+    from ugv_acceptance.run.runner import Runner
 
     args = list(asked.ros_args) or ['--ros-args']
     named = ['-p', f'config:={config.path}']
     with ExitStack() as stack:
         if asked.mode == 'sim':
-            stack.enter_context(
-                child('simulator', [*args, *named, *_simulated(asked, config, folder)])
-            )
+            # Nobody else's robot moves, nobody else's messages are recorded.
+            os.environ['ROS_DOMAIN_ID'] = str(_free_domain())
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+            simulated = [*args, *named, *_simulated(asked, config, folder)]
+            stack.enter_context(child('simulator', simulated))
         stack.enter_context(child('monitor', [*args, *named]))
         stop = stack.enter_context(ros(list(asked.ros_args)))
-        guard = Guard(config, lambda reason: _say_stop(console, reason))
+        guard = Guard(config, lambda reason: say_stop(shown.console, reason), shown.moved)
         stack.callback(guard.destroy_node)
         stack.enter_context(spinning(guard))
-        hands = Hands(guard, asked.mode, _ask)
-        made = Runner(config, folder, guard, hands, stop)
+        hands = Hands(guard, asked.mode, ask)
+        made = Runner(config, folder, guard, hands, lambda: stop.asked, asked.attempts)
         made.wait_for_all(START)
         yield made
 
 
+@contextmanager
+def _offline(
+    asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps
+) -> Iterator['Runner']:
+    """Make robot, monitor and runner in this process and in simulated time."""
+    from ugv_acceptance.run.hands import Hands
+    from ugv_acceptance.run.offline import Offline
+    from ugv_acceptance.run.runner import Runner
+    from ugv_acceptance.run.virtual import VirtualRobot
+    from ugv_acceptance.simulation.faults import fault_from
+
+    stopped: list[int] = []
+    faults = tuple(fault_from(text, config.settings.robot) for text in asked.faults)
+    virtual = VirtualRobot(config, asked.seed, faults, _home(config, folder))
+    before = {
+        number: signal.signal(number, lambda number, _: stopped.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        world = Offline(
+            virtual,
+            lambda reason: say_stop(shown.console, reason),
+            shown.moved,
+            lambda: bool(stopped),
+        )
+        hands = Hands(world, asked.mode, ask)
+        yield Runner(config, folder, world, hands, world.asked, asked.attempts)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _free_domain() -> int:
+    """Return a ROS domain whose discovery port nobody listens on."""
+    domains = random.SystemRandom().sample(DOMAINS, len(DOMAINS))
+    for domain in domains:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(('', 7400 + 250 * domain))
+            except OSError:
+                continue
+            return domain
+    return domains[0]
+
+
+def _home(config: 'Config', folder: 'RunFolder') -> tuple[float, ...]:
+    home = folder.plan.home_deg
+    return tuple(math.radians(home.get(n, 0.0)) for n in config.settings.robot.joint_names)
+
+
 def _simulated(asked: Asked, config: 'Config', folder: 'RunFolder') -> list[str]:
     """Return the simulator's parameters."""
-    home = folder.plan.home_deg
-    positions = [math.radians(home.get(n, 0.0)) for n in config.settings.robot.joint_names]
-    given = ['-p', f'seed:={asked.seed}', '-p', f'home:=[{", ".join(map(repr, positions))}]']
+    positions = ', '.join(map(repr, _home(config, folder)))
+    given = ['-p', f'seed:={asked.seed}', '-p', f'home:=[{positions}]']
     return [*given, *(['-p', f'faults:=[{", ".join(asked.faults)}]'] if asked.faults else [])]
-
-
-def _ask(text: str) -> None:
-    sys.stderr.write(f'\n{text}\npress Enter when it is done: ')
-    sys.stderr.flush()
-    sys.stdin.readline()
-
-
-def _say_stop(console: Console, reason: str) -> None:
-    console.print(f'[bold red]STOP[/] motion is frozen: {escape(reason)}', soft_wrap=True)
-
-
-def _bar(total: int, console: Console) -> Progress:
-    bar = Progress(
-        *Progress.get_default_columns(),
-        TextColumn('{task.completed:.0f} of {task.total:.0f} steps'),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
-    bar.add_task('starting', total=total)
-    return bar
-
-
-def _print_step(result: dict[str, Any], console: Console) -> None:
-    verdict = result['verdict']
-    console.print(f'[{COLOURS[verdict]}]{verdict:<13}[/]{escape(result["id"])}', soft_wrap=True)
-    if verdict != 'PASS':
-        for reason in result['reasons']:
-            console.print(f'             {escape(reason)}', soft_wrap=True)
 
 
 def coverage(config: 'Config', folder: 'RunFolder') -> dict[str, Any]:
@@ -177,20 +220,3 @@ def coverage(config: 'Config', folder: 'RunFolder') -> dict[str, Any]:
 
     recordings = [folder.path / 'steps' / s.id for s in folder.plan.steps if folder.done(s)]
     return coverage_of(config, [seen_in(path, config) for path in recordings if path.is_dir()])
-
-
-def conclude(
-    result: dict[str, Any], folder: 'RunFolder', console: Console, *, interrupted: bool
-) -> int:
-    """Print what came of the run; return the exit code."""
-    counts = ', '.join(f'{count} {word}' for word, count in result['counts'].items() if count)
-    verdict, covered = result['verdict'], result['coverage']
-    console.print(f'[bold {COLOURS[verdict]}]{verdict}[/]: {counts}')
-    console.print(
-        '{cells_visited} of {cells_reachable} cells of the failure map visited'.format(**covered)
-    )
-    console.print(f'{escape(str(folder.path))}/report.txt, result.json, steps/', soft_wrap=True)
-    if interrupted:
-        console.print('interrupted: --resume continues where it ended')
-        return INTERRUPTED
-    return EXIT[verdict]

@@ -4,49 +4,42 @@ What freezes: an alert that the step in hand does not expect, and a monitor that
 It runs on the thread that takes messages, so it does not wait for anything the runner does.
 """
 
-import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import InertiaStamped, Twist
+from geometry_msgs.msg import InertiaStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState
-from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import joint_state_decoder
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
+from ugv_acceptance.nodes.hands import RosCommands
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.outputs import LATCHED
-from ugv_acceptance.plan.plan import matches
+from ugv_acceptance.nodes.running import PATIENCE
+from ugv_acceptance.run.world import Brake, Commands, Positions
 
 MONITOR = 'acceptance_monitor'
-# A monitor that said nothing for this long (s) is taken for dead.
-SILENCE = 1.0
-# Seconds between two looks of the watchdog, and of recorded data handed to the system.
-LOOK = 0.1
-_FLUSH = 5
-Active = set[tuple[str, str, str]]
-
-
-@dataclass(slots=True)
-class Watched:
-    """What is unwanted now: alert patterns; `stopped` says why motion was frozen."""
-
-    unwanted: tuple[str, ...] = ()
-    armed: bool = False
-    stopped: str = ''
-    dead: bool = False
+# Seconds between two looks of the watchdog; looks without a word after which the monitor is dead,
+# and after which recorded data is handed to the system. Looks are counted, not seconds: while this
+# process itself stands still it hears nobody and blames nobody.
+LOOK, SILENT, FLUSH = 0.1, 10, 5
+# A pause between joint states (s) beyond which no time counts as fed.
+GAP = 0.1
 
 
 @dataclass(slots=True)
@@ -56,29 +49,29 @@ class _Recording:
 
 
 class Guard(Node):
-    """A node that records the robot's topics and the alerts, and can freeze the robot.
+    """The live world of a runner: a node that records and hears, and can freeze the robot.
 
-    `position` holds the newest joint positions by the robot's joint names (rad), `active` the
-    monitor's active alerts as (level, code, subject).
+    `on_stop(reason)` is told what froze it, `progress(now)` the time while the runner waits.
     """
 
-    def __init__(self, config: Config, on_stop: Callable[[str], None], **node: Any) -> None:  # noqa: ANN401 - as Node does
+    def __init__(
+        self,
+        config: Config,
+        on_stop: Callable[[str], None],
+        progress: Callable[[float], None] = lambda _: None,
+        **node: Any,  # noqa: ANN401 - as Node does
+    ) -> None:
         super().__init__('acceptance_runner', **node)
-        self.config = config
-        self.watched = Watched()
-        self.position: dict[str, float] = {}
-        self.position_at = 0.0
-        self.active: Active = set()
-        self.heard = self.heard_margin = 0.0
-        self._on_stop = on_stop
+        self.config, self._progress = config, progress
+        self.positions = Positions(config)
+        self.commands: Commands = RosCommands(self, config)
+        self.brake = Brake(self.commands.freeze, on_stop)
         self._recording = _Recording()
-        self._looks = 0
+        self._looks = self._silent = 0
+        self._fed, self._fed_at = 0.0, -1.0
+        self._heard = False
         self._topics: list[tuple[str, str, Qos]] = []
         self._subscribe()
-        self.trajectory = self.create_publisher(
-            JointTrajectory, 'arm_controller/joint_trajectory', 10
-        )
-        self.velocity = self.create_publisher(Twist, 'cmd_vel', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK, self._look, clock=steady)
 
@@ -95,16 +88,15 @@ class Guard(Node):
             (DiagnosticArray, f'{MONITOR}/alerts', 'diagnostic_msgs/msg/DiagnosticArray',
              QoSProfile(depth=100), Qos(), self._on_alerts),
             (DiagnosticStatus, f'{MONITOR}/verdict', 'diagnostic_msgs/msg/DiagnosticStatus',
-             LATCHED, Qos(durability='transient_local'), self._on_verdict),
+             LATCHED, Qos(durability='transient_local'), self._on_word),
         ]  # fmt: skip
         for kind, name, type_, qos, offered, take in rows:
             full = self.resolve_topic_name(name)
             self._topics.append((full, type_, offered))
             self.create_subscription(kind, name, self._recorder(full, take), qos, raw=True)
         margins = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.create_subscription(
-            JointState, f'{MONITOR}/static_torque', self._on_margin, margins, raw=True
-        )
+        name = f'{MONITOR}/static_torque'
+        self.create_subscription(JointState, name, self._on_word, margins, raw=True)
 
     # Recording
 
@@ -139,84 +131,95 @@ class Guard(Node):
 
     def _on_joints(self) -> Callable[[bytes], None]:
         decode = joint_state_decoder().one
-        settings = self.config.settings
-        known = {
-            j.topic_name: (name, j)
-            for j, name in zip(settings.joints, settings.robot.joint_names, strict=True)
-        }
 
         def take(data: bytes) -> None:
             try:
                 _, _, names, position, *_ = decode(data)
             except BadSample:
                 return  # the monitor counts and tells it
-            for told, value in zip(names, position, strict=False):
-                if told in known and math.isfinite(value):
-                    name, joint = known[told]
-                    self.position[name] = joint.sign * value + joint.offset
-            self.position_at = time.monotonic()
+            self.positions.take(names, position)
+            now = time.monotonic()
+            if self._fed_at >= 0.0:
+                self._fed += min(now - self._fed_at, GAP)
+            self._fed_at = now
 
         return take
 
-    def _on_verdict(self, _: bytes) -> None:
-        self.heard = time.monotonic()
-
-    def _on_margin(self, _: bytes) -> None:
-        self.heard = self.heard_margin = time.monotonic()
+    def _on_word(self, _: bytes) -> None:
+        self._silent, self._heard = 0, True
 
     def _on_alerts(self, data: bytes) -> None:
-        self.heard = time.monotonic()
+        self._silent = 0
         for status in deserialize_message(data, DiagnosticArray).status:
             values = {v.key: v.value for v in status.values}
             alert = values.get('level', ''), values.get('code', ''), values.get('subject', '')
             if values.get('state') == 'raised':
-                self.active.add(alert)
-                if self.watched.armed and self.unwanted(alert):
-                    self.stop(f'{" ".join(alert)}: {status.message}')
+                self.brake.raised(alert, status.message)
             elif values.get('state') == 'cleared':
-                self.active.discard(alert)
-
-    # The brake
-
-    def unwanted(self, alert: tuple[str, str, str]) -> bool:
-        """Return whether an alert stops the step in hand: ERROR or STALE, and not expected."""
-        level, code, subject = alert
-        return level in {'ERROR', 'STALE'} and any(
-            matches(pattern, level, code, subject) for pattern in self.watched.unwanted
-        )
-
-    def arm(self, unwanted: tuple[str, ...]) -> None:
-        """Watch from now on; what freezes is named by alert patterns."""
-        self.watched.unwanted, self.watched.stopped = unwanted, ''
-        self.watched.armed = True
-
-    def disarm(self) -> None:
-        """Let everything pass, as while a person changes the set-up."""
-        self.watched.armed = False
-
-    def stop(self, reason: str) -> None:
-        """Freeze all motion now and say why; only the first reason of a step counts."""
-        self.freeze()
-        if not self.watched.stopped:
-            self.watched.stopped = reason
-            self._on_stop(reason)
-
-    def freeze(self) -> None:
-        """Tell arm and tracks to hold still: an empty trajectory, no speed."""
-        self.trajectory.publish(JointTrajectory())
-        self.velocity.publish(Twist())
+                self.brake.active.discard(alert)
 
     def _look(self) -> None:
         self._looks += 1
-        if self._looks % _FLUSH == 0:
+        self._silent += 1
+        if self._looks % FLUSH == 0:
             with self._recording.lock:
                 if self._recording.bag is not None:
                     self._recording.bag.flush()
-        silent = time.monotonic() - self.heard
-        self.watched.dead = silent > SILENCE
-        if self.watched.armed and self.watched.dead and not self.watched.stopped:
-            self.stop(f'the monitor has said nothing for {silent:.1f} s')
+        if self.brake.armed and self.dead() and not self.brake.stopped:
+            silent = self._silent * LOOK
+            self.brake.stop(f'the monitor has said nothing for {silent:.1f} s')
+
+    # The world of a runner
+
+    def missing(self) -> str:
+        """Return who was not heard yet, empty when everything is there."""
+        if not self.positions.now:
+            return 'joint states of the robot'
+        return '' if self._heard else 'the monitor'
+
+    def dead(self) -> bool:
+        """Return whether the monitor has fallen silent."""
+        return self._silent >= SILENT
+
+    def now(self) -> float:
+        """Return the steady time (s)."""
+        return time.monotonic()
+
+    def fed(self) -> float:
+        """Return for how long (s) joint states kept coming."""
+        return self._fed
+
+    def stamp(self) -> int:
+        """Return the time (ns) at which a message that comes now is recorded."""
+        return time.time_ns()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        time.sleep(seconds)
+        self._progress(time.monotonic())
 
 
 def _nothing(_: bytes) -> None:
     """Take a message that is only recorded."""
+
+
+@contextmanager
+def spinning(guard: Guard) -> Iterator[None]:
+    """Take messages on a thread of its own, so that recording and brake wait for nobody."""
+    executor, over = EventsExecutor(), threading.Event()
+    executor.add_node(guard)
+    never: Future = Future()
+
+    def spin() -> None:
+        while not over.is_set():
+            executor.spin_until_future_complete(never, timeout_sec=PATIENCE)
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+        executor.remove_node(guard)
+        executor.shutdown()

@@ -5,16 +5,13 @@ arm_controller/joint_trajectory. What a person does on a test ground comes on to
 ~/ground tilts what it stands on, ~/load puts a load into its hand, ~/reset stands it up again.
 """
 
-import heapq
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import Inertia, Twist, Vector3
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -26,20 +23,14 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from ugv_acceptance import BadConfig, BadSample
+from ugv_acceptance import BadSample
 from ugv_acceptance.config import load
-from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import run
-from ugv_acceptance.run.messages import Driver
-from ugv_acceptance.run.record import build_of
-from ugv_acceptance.simulation.corruption import Corruption, overload, weakened
-from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
+from ugv_acceptance.run.virtual import VirtualRobot
 from ugv_acceptance.simulation.faults import fault_from
-from ugv_acceptance.simulation.scenario import Noise, Scenario
-from ugv_acceptance.simulation.scenarios import STOWED
-from ugv_acceptance.simulation.stretches import Rows, Sensors, stride_of
 
 NAME = 'packbot_simulator'
 # Behind by more than this (s), the simulation lets time slip instead of catching up.
@@ -58,22 +49,17 @@ class Simulator(Node):
         config = load(Path(self._value('config')))
         robot = config.settings.robot
         faults = tuple(fault_from(text, robot) for text in self._value('faults') if text)
-        seed = int(self._value('seed'))
-        rates = self._value('joint_rate'), self._value('imu_rate')
-        self._stride = stride_of(
-            Scenario('live', 1.0, joint_rate=rates[0], imu_rate=rates[1]), build_of(config)
+        unset = Parameter('home', Parameter.Type.DOUBLE_ARRAY, [])
+        self.virtual = VirtualRobot(
+            config,
+            int(self._value('seed')),
+            faults,
+            tuple(self.get_parameter_or('home', unset).value),
+            self._value('joint_rate'),
+            self._value('imu_rate'),
+            epoch=0,
         )
-        self._tick = 1.0 / rates[1]
-        self._count = 0
-        self.remote = RemoteRobot(
-            weakened(robot, faults), build_of(config), self._home(robot), overload(faults)
-        )
-        self._corruption = Corruption(faults, robot.joint_names)
-        self._rng = np.random.default_rng(seed)
-        self._sensors = Sensors(Noise(), np.random.default_rng(seed))
         self._clocked = bool(self._value('clock'))
-        self._driver = Driver(config, self._corruption, Noise(), 0)
-        self._outgoing: list[tuple[float, int, str, bytes]] = []
         topics = config.topics
         self._outputs: dict[str, Publisher] = {
             'joint_states': self.create_publisher(
@@ -87,15 +73,6 @@ class Simulator(Node):
         self._subscribe()
         self._began = 0.0
         self._next_clock = 0.0
-
-    def _home(self, robot: Robot) -> tuple[tuple[str, float], ...]:
-        """Return the posture at the start: stowed, unless the parameter says another."""
-        names, stowed = robot.joint_names, dict(STOWED)
-        unset = Parameter('home', value=[stowed.get(n, 0.0) for n in names])
-        home = list(self.get_parameter_or('home', unset).value)
-        if len(home) != len(names):
-            raise BadConfig(f'home: expected {len(names)} positions, got {len(home)}')
-        return tuple(zip(names, home, strict=True))
 
     def _declare(self) -> None:
         declare = self.declare_parameter
@@ -133,14 +110,14 @@ class Simulator(Node):
         """Start the time of the simulation."""
         self._began = time.monotonic()
         if not self._clocked:
-            self._driver = replace(self._driver, epoch=time.time_ns())
+            self.virtual.shift(time.time_ns())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(self._tick / self._value('rate'), self._on_time, clock=steady)
+        self.create_timer(self.virtual.tick / self._value('rate'), self._on_time, clock=steady)
 
     # Commands
 
     def _on_drive(self, message: Twist) -> None:
-        self.remote.drive(message.linear.x, message.angular.z)
+        self.virtual.remote.drive(message.linear.x, message.angular.z)
 
     def _on_trajectory(self, message: JointTrajectory) -> None:
         names = {j.topic_name: n for j, n in self._joint_names()}
@@ -156,71 +133,50 @@ class Simulator(Node):
             )
             for p in message.points
         ]
-        self.remote.follow([names[n] for n in message.joint_names], points)
+        self.virtual.remote.follow([names[n] for n in message.joint_names], points)
 
     def _joint_names(self) -> list[tuple[Any, str]]:
-        settings = self._driver.config.settings
+        settings = self.virtual.config.settings
         return list(zip(settings.joints, settings.robot.joint_names, strict=True))
 
     def _on_ground(self, message: Vector3) -> None:
-        self.remote.tilt(message.x, message.y, message.z)
+        self.virtual.remote.tilt(message.x, message.y, message.z)
 
     def _on_load(self, message: Inertia) -> None:
-        self.remote.take(Payload(message.m, (message.com.x, message.com.y, message.com.z)))
+        self.virtual.remote.take(Payload(message.m, (message.com.x, message.com.y, message.com.z)))
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.remote.reset()
+        self.virtual.remote.reset()
         response.success, response.message = True, 'stands on level ground, arm stowed, no load'
         return response
 
     # Time
 
     def _on_time(self) -> None:
-        now = (time.monotonic() - self._began) * self._value('rate')
-        behind = now - self.remote.elapsed
+        virtual, rate = self.virtual, self._value('rate')
+        now = (time.monotonic() - self._began) * rate
+        behind = now - virtual.elapsed
         if behind > SLIP:
-            self._began += behind / self._value('rate')
+            self._began += behind / rate
             self.slipped += behind
-            self._shift(behind)
             now -= behind
-        while self.remote.elapsed + self._tick <= now:
-            self._step()
-        while self._outgoing and self._outgoing[0][0] <= now:
-            _, _, source, data = heapq.heappop(self._outgoing)
-            self._outputs[source].publish(data)
+            if not self._clocked:
+                virtual.shift(int(behind * 1e9))
+        while virtual.elapsed + virtual.tick <= now:
+            virtual.step()
+            for source, data in virtual.due(now):
+                self._outputs[source].publish(data)
         self._tell_time()
 
-    def _shift(self, behind: float) -> None:
-        if not self._clocked:
-            later = self._driver.epoch + int(behind * 1e9)
-            self._driver = replace(self._driver, epoch=later)
-
-    def _step(self) -> None:
-        self.remote.advance(self._tick)
-        simulation, now = self.remote.simulation, self.remote.elapsed
-        rows = Rows(imu=[(now, *simulation.imu())])
-        self._count += 1
-        if self._count % self._stride == 0:
-            rows.joints.append((now, *simulation.joints()))
-            self._send('joint_states', self._driver.joint_states(self._sensors.joints(rows)))
-        self._send('imu', self._driver.imu(self._sensors.imu(rows)))
-
-    def _send(self, source: str, messages: Iterable[tuple[float, bytes]]) -> None:
-        for at, data in messages:
-            if not self._corruption.faults:
-                self._outputs[source].publish(data)
-                continue
-            for due in self._corruption.arrivals(source, at, self._rng):
-                heapq.heappush(self._outgoing, (due, self._count, source, data))
-
     def _tell_time(self) -> None:
-        if self._clock_publisher is None or self.remote.elapsed < self._next_clock:
+        elapsed = self.virtual.elapsed
+        if self._clock_publisher is None or elapsed < self._next_clock:
             return
         message = ClockMessage()
-        fraction, whole = math.modf(self.remote.elapsed)
+        fraction, whole = math.modf(elapsed)
         message.clock.sec, message.clock.nanosec = int(whole), int(fraction * 1e9)
         self._clock_publisher.publish(message)
-        self._next_clock = self.remote.elapsed + CLOCK_STEP
+        self._next_clock = elapsed + CLOCK_STEP
 
     def _value(self, name: str) -> Any:  # noqa: ANN401 - a parameter's value
         return self.get_parameter(name).value

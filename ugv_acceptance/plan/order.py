@@ -53,12 +53,18 @@ def way(steps: Sequence[Step], home: Posture) -> float:
     return float(np.sum([distance(a, b) for a, b in pairwise(places)]))
 
 
+def durations(plan: Plan) -> list[float]:
+    """Return how long (s) motions and hold of each step take, without what a person does."""
+    found, at = [], plan.home_deg
+    for step in plan.steps:
+        seconds = step.hold_s
+        for stop in (*step.via_deg, step.posture_deg):
+            seconds += distance(at, stop) * np.pi / (2.0 * step.speed_degps)
+            at = {**plan.home_deg, **stop}
+        found.append(float(seconds))
+    return found
+
+
 def duration(plan: Plan) -> float:
     """Return how long (s) the motions and holds of a plan take, without what a person does."""
-    total, at = 0.0, plan.home_deg
-    for step in plan.steps:
-        for stop in (*step.via_deg, step.posture_deg):
-            total += distance(at, stop) * np.pi / (2.0 * step.speed_degps)
-            at = {**plan.home_deg, **stop}
-        total += step.hold_s
-    return total
+    return sum(durations(plan))

@@ -1,22 +1,24 @@
 """The folder of a run: what is done already, one recording and one result a step, the report.
 
-    plan.yaml  run.json  result.json  report.txt  steps/ID/{ID_0.mcap,metadata.yaml}  steps/ID.json
+    plan.yaml  run.json  journal.jsonl  result.json  report.txt
+    steps/ID/{ID_0.mcap,metadata.yaml}  steps/ID.json
 
-A step counts as done once its JSON is there; what was recorded before an interruption is kept under
-another name, never written over.
+A step counts as done once its JSON is there; what was recorded before an interruption, or in an
+attempt that showed nothing, is kept under another name, never written over. The journal has a line
+for whatever began or ended, written at once.
 """
 
 import json
-import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import BadConfig, __version__
-from ugv_acceptance.bag.result import write_json
+from ugv_acceptance.bag.result import write_json, write_text
 from ugv_acceptance.config import Config
-from ugv_acceptance.plan.plan import Plan, Step
+from ugv_acceptance.plan.plan import Plan, Step, write_plan
 from ugv_acceptance.run.verdicts import VERDICTS, whole
 
 RESULT_VERSION = 1
@@ -30,15 +32,23 @@ class RunFolder:
     plan: Plan
     mode: str
 
-    def recording(self, step: Step) -> Path:
-        """Return the folder to record a step into; what an interruption left there moves aside."""
+    def recording(self, step: Step, before: str = 'interrupted') -> Path:
+        """Return the folder to record a step into; what is there moves aside as ID.BEFORE-1."""
         folder = self.path / 'steps' / step.id
         if folder.exists():
             number = 1
-            while (aside := folder.with_name(f'{step.id}.interrupted-{number}')).exists():
+            while (aside := folder.with_name(f'{step.id}.{before}-{number}')).exists():
                 number += 1
             folder.rename(aside)
         return folder
+
+    def note(self, event: str, **values: object) -> None:
+        """Add a line to the journal: the time, what happened, and more."""
+        now = datetime.now(timezone.utc).isoformat(timespec='milliseconds')
+        line = json.dumps({'time': now, 'event': event, **values}, default=str)
+        # One write of a whole line: a killed process leaves no half of it.
+        with (self.path / 'journal.jsonl').open('ab', buffering=0) as file:
+            file.write(f'{line}\n'.encode())
 
     def result_path(self, step: Step) -> Path:
         """Return where a step's result is."""
@@ -74,28 +84,53 @@ class RunFolder:
             'steps': results,
         }
         write_json(self.path / 'result.json', result)
-        (self.path / 'report.txt').write_text(report_of(result), 'utf-8')
+        write_text(self.path / 'report.txt', report_of(result))
         return result
 
 
 def open_folder(
-    path: Path, plan: Plan, plan_file: Path, mode: str, config: Config, *, resume: bool
+    path: Path, plan: Plan, source: Path | None, mode: str, config: Config, *, resume: bool
 ) -> RunFolder:
     """Return a new folder for a run, or with `resume` one that was interrupted.
+
+    The plan is copied from its file `source`, comments and all; None: it is written.
 
     Raises BadConfig where the folder holds something else or a run of another plan or robot.
     """
     state = path / 'run.json'
     head = {'plan_sha256': plan.sha256, 'config_sha256': config.sha256, 'mode': mode}
-    if path.exists() and any(path.iterdir()):
+    folder = RunFolder(path, plan, mode)
+    if path.exists() and not _unborn(path):
         if not resume:
-            raise BadConfig(f'{path}: expected a new or empty folder; --resume continues a run')
+            raise BadConfig(
+                f'{path}: expected a new or empty folder; --resume continues a run,'
+                ' --out names another folder'
+            )
         _check_same(state, head)
+        folder.note('resumed')
+        return folder
+    try:
+        (path / 'steps').mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadConfig(f'{path}: expected a folder to record into, got: {error}') from None
+    if source is None:
+        write_plan(plan, path / 'plan.yaml')
     else:
-        (path / 'steps').mkdir(parents=True)
-        shutil.copyfile(plan_file, path / 'plan.yaml')
-        write_json(state, head)
-    return RunFolder(path, plan, mode)
+        write_text(path / 'plan.yaml', source.read_text('utf-8'))
+    folder.note('begun', plan_sha256=plan.sha256, mode=mode)
+    # Last: a folder with this file is a run.
+    write_json(state, head)
+    return folder
+
+
+def _unborn(path: Path) -> bool:
+    """Return whether a folder is empty or holds what a run killed while it made it has left."""
+    known = {'steps', 'plan.yaml', 'plan.yaml.part', 'journal.jsonl', 'run.json.part'}
+    return (
+        path.is_dir()
+        and {p.name for p in path.iterdir()} <= known
+        and not any((path / 'steps').glob('*'))
+    )
 
 
 def _check_same(state: Path, head: dict[str, str]) -> None:
@@ -122,10 +157,17 @@ def report_of(result: dict[str, Any]) -> str:
         '',
         'failure map: {cells_visited} of {cells_reachable} cells of {cell_deg:g} deg visited'
         ' ({share:.1%})'.format(**coverage),
+        *approaches(coverage),
+    ]
+    return '\n'.join(lines) + '\n'
+
+
+def approaches(coverage: Mapping[str, Any]) -> list[str]:
+    """Return how close a run came to each limit on either side, a line each."""
+    return [
         _approach_line('torque limit', coverage['torque_limit'], 100.0, '%'),
         _approach_line('tilt limit', coverage['tip_limit_deg'], 1.0, ' deg'),
     ]
-    return '\n'.join(lines) + '\n'
 
 
 def _step_lines(step: dict[str, Any]) -> Sequence[str]:
@@ -135,7 +177,8 @@ def _step_lines(step: dict[str, Any]) -> Sequence[str]:
         for _ in ('tilt',)
         if 'tilt_left_deg' in told and 'tilt_left_deg' in found
     ]
-    reasons = [f'    {reason}' for reason in (*step['reasons'], *numbers)]
+    tried = [f'an attempt before: {"; ".join(e["reasons"])}' for e in step.get('earlier', ())]
+    reasons = [f'    {reason}' for reason in (*step['reasons'], *numbers, *tried)]
     return [f'{step["verdict"]:<13}{step["id"]}: {step["title"]}', *reasons]
 
 

@@ -26,14 +26,14 @@ class Done:
     """What the runner saw of a step; times are ns of the recording's clock.
 
     `begin` is when the motion began, `hold` and `end` bound the time in which nothing unwanted may
-    be active. `stopped` says why the motion was frozen; empty: it was not. `reached` says whether
-    the posture was.
+    be active. `wrong` says how the posture was not reached or held, `stopped` why the motion was
+    frozen, `fault` what was missing, so that nothing was shown; empty: nothing.
     """
 
     begin: int
     hold: int
     end: int
-    reached: bool = True
+    wrong: str = ''
     stopped: str = ''
     fault: str = ''
 
@@ -123,7 +123,7 @@ def decide(
         return INCONCLUSIVE, [done.fault]
     if done.stopped:
         return FAIL, [f'stopped: {done.stopped}']
-    wrong = [*missing, *unwanted, *([] if done.reached else ['the posture was not reached'])]
+    wrong = [*missing, *unwanted, *([done.wrong] if done.wrong else [])]
     if wrong:
         return FAIL, [*wrong, *unknown]
     if unknown:

@@ -1,0 +1,227 @@
+"""A plan done step by step: set up, move, hold, record; judged from the recording.
+
+A step's recording begins before its set-up and ends after what it is for: all that moves is in it.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance.config import Config
+from ugv_acceptance.plan.plan import SIMULATION, Step, vector_of
+from ugv_acceptance.plan.search import Arm, roles_of, safe_way
+from ugv_acceptance.run.folder import RunFolder
+from ugv_acceptance.run.hands import SIM, Hands
+from ugv_acceptance.run.moving import REFUSED, Moves, holds
+from ugv_acceptance.run.verdicts import INCONCLUSIVE, SKIPPED, Done, judge_step
+from ugv_acceptance.run.world import Brake, World
+
+# Seconds for alerts to be over, and recorded after a stop.
+CALM, AFTER = 10.0, 1.0
+# Times a step is tried that showed nothing because messages were missing.
+ATTEMPTS = 5
+# Unwanted in every motion between steps.
+ALWAYS = ('ERROR', 'STALE')
+# Speed (rad/s) of motions to and from home.
+HOME_SPEED = math.radians(35.0)
+
+
+@dataclass(slots=True)
+class Runner:
+    """Does the steps of a plan one after the other; `asked()` says when to freeze and end.
+
+    `over` says why no further step can be done; empty: they can.
+    """
+
+    config: Config
+    folder: RunFolder
+    world: World
+    hands: Hands
+    asked: Callable[[], bool] = lambda: False
+    attempts: int = ATTEMPTS
+    over: str = ''
+    _setup: Any = None
+    _lying: bool = True
+    moves: Moves = field(init=False)
+
+    def __post_init__(self) -> None:
+        tolerance = math.radians(self.folder.plan.tolerance_deg)
+        self.moves = Moves(self.world, self.hands, tolerance, self.asked)
+        self.hands.going = lambda: self.moves.going
+
+    @property
+    def brake(self) -> Brake:
+        """The brake of the world."""
+        return self.world.brake
+
+    def run(self, step: Step) -> dict[str, Any] | None:
+        """Do one step and return its result, which is written; None if the run was interrupted.
+
+        A step that showed nothing because messages were missing is done again; the result tells
+        how often and why.
+        """
+        refused = self._refused(step)
+        if refused:
+            return self._finish(step, {'verdict': SKIPPED, 'reasons': [refused]}, [])
+        earlier: list[dict[str, Any]] = []
+        for number in range(self.attempts):
+            self.folder.note('attempt', step=step.id, number=number + 1)
+            result = self._alive() or self._attempt(step, number)
+            if result is None:
+                self.folder.note('interrupted', step=step.id)
+                return None
+            earlier.append(result)
+            if result['verdict'] != INCONCLUSIVE or self.over or self.hands.refused:
+                break
+        return self._finish(step, earlier.pop(), earlier)
+
+    def _refused(self, step: Step) -> str:
+        if step.action == 'pull' and self.hands.mode == SIM:
+            return 'needs a person who pulls'
+        if step.where == SIMULATION and self.hands.mode != SIM:
+            return 'would pass a limit: in simulation only'
+        return ''
+
+    def _finish(
+        self, step: Step, result: dict[str, Any], earlier: list[dict[str, Any]]
+    ) -> dict[str, Any]:
+        self.hands.refused = False
+        tried = [{'verdict': e['verdict'], 'reasons': e['reasons']} for e in earlier]
+        result = {'id': step.id, 'title': step.title, 'alerts': [], **result, 'earlier': tried}
+        self.folder.finish_step(step, result)
+        self.folder.note('result', step=step.id, verdict=result['verdict'])
+        return result
+
+    def _attempt(self, step: Step, number: int) -> dict[str, Any] | None:
+        recording = self.folder.recording(step, 'attempt' if number else 'interrupted')
+        done, problem = None, ''
+        self.world.record(recording)
+        try:
+            self.world.commands.declare(self._setup[1] if self._setup else 0.0)
+            problem = self._prepare(step)
+            done = None if problem else self._perform(step)
+        finally:
+            self.brake.disarm()
+            self.world.stop_recording()
+        if self.asked():
+            self.brake.freeze()
+            return None
+        # After what cannot be held, or was stopped, the robot is set up from the start.
+        self._lying = done is None or step.where == SIMULATION or bool(done.stopped or done.fault)
+        if done is None:
+            return {'verdict': INCONCLUSIVE, 'reasons': [problem]}
+        try:
+            return judge_step(step, recording, self.config, done)
+        except AcceptanceError as error:
+            return {'verdict': INCONCLUSIVE, 'reasons': [f'recording: {error}']}
+
+    # Before a step
+
+    def wait_for_all(self, seconds: float) -> None:
+        """Wait until robot and monitor are there; BadConfig says which of them was not."""
+        if not self.moves.until(lambda: not self.world.missing(), seconds) and not self.asked():
+            raise BadConfig(f'expected {self.world.missing()} within {seconds:g} s, got nothing')
+
+    def _alive(self) -> dict[str, Any] | None:
+        """Return the result of a step that nobody would watch; None: the monitor is there."""
+        if self.moves.until(lambda: not self.world.dead(), CALM) or self.asked():
+            return None
+        self.over = 'the monitor says nothing'
+        return {'verdict': INCONCLUSIVE, 'reasons': [self.over]}
+
+    def _prepare(self, step: Step) -> str:
+        """Bring the robot home and set it up where anything changes; return what was wrong."""
+        setup = (step.ground, step.payload_kg)
+        if self._lying:
+            self._setup, self.moves.trail = None, []
+            if not self.hands.stand_up():
+                return REFUSED
+            self._lying = False
+        if setup != self._setup:
+            wrong = self._go_home()
+            self.brake.disarm()
+            if wrong:
+                return f'on the way home: {wrong}'
+            if not self.hands.set_up(step):
+                return REFUSED
+            self._setup = setup
+        self.brake.unwanted = step.alerts.must_not
+        self.world.wait(0.2)
+        calm = self.moves.until(lambda: not self.brake.trouble, CALM)
+        return '' if calm else f'active before it began: {", ".join(self.brake.trouble)}'
+
+    def _go_home(self) -> str:
+        """Go home straight where that is safe, else the way the arm came; return what is wrong."""
+        self.brake.arm(ALWAYS)
+        home, ways = self.folder.plan.home_deg, self.moves.trail[-2::-1]
+        robot = self.config.settings.robot
+        if self.moves.trail and self._setup:
+            arm = Arm(self.config.settings, roles_of(self.config.settings))
+            straight = [np.array(vector_of(robot, home, p)) for p in (self.moves.trail[-1], home)]
+            ground, load = self._setup
+            slope = ground.orientation, math.radians(ground.tilt_deg)
+            if safe_way(arm, straight, slope, load):
+                ways = []
+        for posture in (*ways, home):
+            if wrong := self.moves.go(posture, HOME_SPEED):
+                return wrong
+        self.moves.trail = []
+        return ''
+
+    # A step
+
+    def _perform(self, step: Step) -> Done:
+        begin = hold = self.world.stamp()
+        self.brake.arm(step.alerts.must_not)
+        for alert in self.brake.trouble:
+            self.brake.stop(f'{alert} is active')
+        speed = math.radians(step.speed_degps)
+        sweeps = step.action == 'sweep'
+        wrong = ''
+        slow = min(speed, HOME_SPEED / 2.0) if sweeps else speed
+        for posture in () if step.action == 'cycle' else step.via_deg:
+            wrong = wrong or self.moves.go(posture, slow)
+        if sweeps:
+            self.moves.pause(0.5)
+            hold = self.world.stamp()
+        wrong = wrong or self.moves.go(step.posture_deg, speed, step)
+        if not sweeps and not wrong:
+            self.moves.pause(self._settle)
+            hold = self.world.stamp()
+        wrong = wrong or self._act(step)
+        done = self._done(begin, hold, wrong if holds(step) else '')
+        if self.brake.stopped:
+            # That it stands still from now on is in the recording too.
+            self.world.wait(AFTER)
+        return done
+
+    def _act(self, step: Step) -> str:
+        """Do what the step is for; return what was wrong."""
+        if step.action == 'drive' and step.drive is not None:
+            self.hands.drive(step, step.drive[0], math.radians(step.drive[1]), step.hold_s)
+        elif step.action == 'pull':
+            self.hands.told(f'{step.id}: pull with {step.force_n:g} N, then let go')
+        elif step.action == 'cycle':
+            return self.moves.cycle(step)
+        elif holds(step):
+            return self.moves.hold(step)
+        else:
+            self.moves.pause(step.hold_s)
+        return ''
+
+    def _done(self, begin: int, hold: int, wrong: str) -> Done:
+        stopped = self.brake.stopped
+        # Missing data neither passes nor fails.
+        missing = self.world.dead() or stopped.startswith('STALE')
+        fault = REFUSED if self.hands.refused else stopped if missing else ''
+        return Done(begin, hold, self.world.stamp(), wrong, '' if fault else stopped, fault)
+
+    @property
+    def _settle(self) -> float:
+        """Seconds after which alerts of the way are over."""
+        delays = self.config.settings.delays
+        return max(delays.off, delays.tip_off) + max(delays.tip_on, delays.torque_on) + 0.2

@@ -1,0 +1,100 @@
+"""A simulated robot that publishes and obeys as a real one does; no clock, no ROS of its own."""
+
+import heapq
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config import Config
+from ugv_acceptance.run.messages import EPOCH, Driver
+from ugv_acceptance.run.record import build_of
+from ugv_acceptance.simulation.corruption import Corruption, overload, weakened
+from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
+from ugv_acceptance.simulation.faults import Fault
+from ugv_acceptance.simulation.scenario import Noise, Scenario
+from ugv_acceptance.simulation.scenarios import STOWED
+from ugv_acceptance.simulation.stretches import Rows, Sensors, stride_of
+
+# Source ('joint_states' or 'imu') and serialised content of a message.
+Sent = tuple[str, bytes]
+
+
+@dataclass(slots=True)
+class VirtualRobot:
+    """The robot, its sensors, its driver and the faults in them; `step` is one period of the IMU.
+
+    `home` are positions (rad) at the start in the order of the configuration, none: stowed. Stamps
+    begin at `epoch` (ns). Raises BadConfig where rates or positions do not fit.
+    """
+
+    config: Config
+    seed: int = 1
+    faults: tuple[Fault, ...] = ()
+    home: tuple[float, ...] = ()
+    joint_rate: float = 100.0
+    imu_rate: float = 200.0
+    epoch: int = EPOCH
+    tick: float = field(init=False)
+    remote: RemoteRobot = field(init=False)
+    _driver: Driver = field(init=False)
+    _stride: int = field(init=False)
+    _count: int = 0
+    _waiting: list[tuple[float, int, str, bytes]] = field(default_factory=list)
+    _rng: np.random.Generator = field(init=False)
+    _sensors: Sensors = field(init=False)
+
+    def __post_init__(self) -> None:
+        robot, build = self.config.settings.robot, build_of(self.config)
+        rates = Scenario('live', 1.0, joint_rate=self.joint_rate, imu_rate=self.imu_rate)
+        self._stride = stride_of(rates, build)
+        self.tick = 1.0 / self.imu_rate
+        real = weakened(robot, self.faults)
+        self.remote = RemoteRobot(real, build, self._start(), overload(self.faults))
+        corruption = Corruption(self.faults, robot.joint_names)
+        self._driver = Driver(self.config, corruption, Noise(), self.epoch)
+        self._rng = np.random.default_rng(self.seed)
+        self._sensors = Sensors(Noise(), np.random.default_rng(self.seed))
+
+    def _start(self) -> tuple[tuple[str, float], ...]:
+        names, stowed = self.config.settings.robot.joint_names, dict(STOWED)
+        home = self.home or tuple(stowed.get(name, 0.0) for name in names)
+        if len(home) != len(names):
+            raise BadConfig(f'home: expected {len(names)} positions, got {len(home)}')
+        return tuple(zip(names, home, strict=True))
+
+    @property
+    def elapsed(self) -> float:
+        """Simulated time (s) since the start."""
+        return self.remote.elapsed
+
+    def shift(self, nanoseconds: int) -> None:
+        """Move the stamps of all that follows, as time that slipped away."""
+        self.epoch += nanoseconds
+        self._driver = replace(self._driver, epoch=self.epoch)
+
+    def step(self) -> None:
+        """Simulate one period of the IMU; what is sent waits until it is due."""
+        self.remote.advance(self.tick)
+        simulation, now = self.remote.simulation, self.remote.elapsed
+        rows = Rows(imu=[(now, *simulation.imu())])
+        self._count += 1
+        if self._count % self._stride == 0:
+            rows.joints.append((now, *simulation.joints()))
+            self._send('joint_states', self._driver.joint_states(self._sensors.joints(rows)))
+        self._send('imu', self._driver.imu(self._sensors.imu(rows)))
+
+    def _send(self, source: str, messages: Iterable[tuple[float, bytes]]) -> None:
+        corruption = self._driver.corruption
+        for at, data in messages:
+            due = corruption.arrivals(source, at, self._rng) if corruption.faults else (at,)
+            for when in due:
+                heapq.heappush(self._waiting, (when, self._count, source, data))
+
+    def due(self, now: float = math.inf) -> Iterator[Sent]:
+        """Yield what arrives until `now` (s, simulated)."""
+        while self._waiting and self._waiting[0][0] <= now:
+            _, _, source, data = heapq.heappop(self._waiting)
+            yield source, data
