@@ -68,6 +68,7 @@ class ImuTracker:
     taken: list[int] = field(default_factory=lambda: [0, 0, 0])
     _frame: str | None = None
     _foreign: float = 0.0
+    _busy: bool = False
 
     def __post_init__(self) -> None:
         self.low_pass = LowPass(self.settings.imu.low_pass)
@@ -91,7 +92,7 @@ class ImuTracker:
         x, y, z, w = orientation
         spin, off = _norm(omega), abs(size - g)
         still = spin <= imu.rest_rate
-        rotation = covariance_0 != -1.0 and _is_rotation(x, y, z, w)
+        rotation = covariance_0 != -1.0 and bool(_is_rotation(x, y, z, w))
         told = rotation and not (imu.attitude == 'auto' and x == y == z == 0.0)
         shown = off <= GRAVITY_SLACK * g
         by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if rotation else NOWHERE
@@ -103,7 +104,11 @@ class ImuTracker:
         empty = 0.0 if told or covariance_0 == -1.0 else _empty(rotation, apart, imu)
         strange = off / g if still else math.nan
         believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
-        if self._judge(now, empty, strange, apart if told else math.nan):
+        doubted = apart if told else math.nan
+        of, seen = self.faults, self._busy or self._foreign or empty >= 0.5
+        # Quiet signals have nothing to do with small values: most calls are saved.
+        seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
+        if seen and self._judge(now, empty, strange, doubted):
             return NOWHERE, True
         if imu.specific_force:
             if not believable or size < FALL * g:
@@ -117,17 +122,12 @@ class ImuTracker:
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
         """Feed the faults with a message; return whether one of them takes gravity away."""
         of, lost = self.faults, False
-        pairs = (
-            (of.frame, self._foreign), (of.orientation, empty), (of.strange, strange),
-            (of.disagreement, apart),
-        )  # fmt: skip
-        for signal, value in pairs:
-            # A quiet signal has nothing to do with a small value: most calls are saved.
-            if value >= signal.on or not signal.quiet:
-                signal.step(now, value)
-                signal.advance(now)
-                alert = signal.alert
-                lost = lost or (alert is not None and alert.rule.level > WARN)
+        signals = (of.frame, of.orientation, of.strange, of.disagreement)
+        for signal, value in zip(signals, (self._foreign, empty, strange, apart), strict=True):
+            signal.step(now, value)
+            signal.advance(now)
+            lost = lost or (signal.alert is not None and signal.alert.rule.level > WARN)
+        self._busy = not all(signal.quiet for signal in signals)
         return lost
 
     def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
@@ -187,6 +187,7 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
+        self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable | np.isnan(gravity[0]))
 
     def _count(self, told: Mask, given: Mask) -> None:
