@@ -1,9 +1,10 @@
 """Does the advice help? Random cases in which a margin is too small, and the robot does as told.
 
 The share of cases in which the margin the advice is for is larger afterwards, in the simulation;
-how far the gain came out as promised; and what it costs to find the advice.
+how many robots tipped on the way, and how near the others came to it; how far the gain came out as
+promised; and what it costs to find the advice.
 
-    python bench/bench_advice.py [trials of each kind]
+    python bench/bench_advice.py [trials of each kind] [kinds]
 """
 
 import math
@@ -28,17 +29,21 @@ def main() -> None:
     """Print the table."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 150
     settings = load().settings
-    print('advice    trials  margin larger   tip: promised, came   torque: promised, came')
-    for kind in ('joint', 'turn', 'payload'):
+    print('advice    trials  margin larger  tipped   tip: promised, came   torque: promised, came')
+    for kind in sys.argv[2:] or ('joint', 'turn', 'payload'):
         found = list(trials(settings, count, SEED, (kind,)))
-        helped = sum(trial.helped for trial in found)
+        helped, tipped = (sum(getattr(t, name) for t in found) for name in ('helped', 'tipped'))
         print(
-            f'{kind:8} {count:7} {helped:7} ({helped / count:.1%})'
+            f'{kind:8} {count:7} {helped:7} ({helped / count:.1%}) {tipped:6}'
             f'   {gains(found, tips=True):>17}   {gains(found, tips=False):>20}'
         )
         for trial in found:
-            if not trial.helped:
-                print(f'    not: {trial.advice.sentence}; {trial.before:.3f} -> {trial.after:.3f}')
+            if trial.tipped or not trial.helped:
+                print(
+                    f'    {"tipped" if trial.tipped else "not"}: {trial.advice.sentence}; '
+                    f'{trial.before:.3f} -> {trial.after:.3f}, least {trial.least:.3f} rad'
+                )
+        print(f'{"":8} least tilt left on the way: {least_of(found)}', flush=True)
     print(f'one advice: {cost(settings):.1f} ms (median)')
 
 
@@ -52,6 +57,15 @@ def gains(found: Sequence[Trial], *, tips: bool) -> str:
     if tips:
         return f'{math.degrees(promised):.1f}, {math.degrees(came):.1f} deg'
     return f'{promised:.1f}, {came:.1f} N m'
+
+
+def least_of(found: Sequence[Trial]) -> str:
+    """Return the least tilt of all trials on the way, beside that at the start of those."""
+    worst = min(found, key=lambda t: t.least)
+    began = (
+        f', {math.degrees(worst.before):.1f} at its start' if worst.advice.margin in SIDES else ''
+    )
+    return f'{math.degrees(worst.least):.1f} deg{began}'
 
 
 def cost(settings: Settings) -> float:

@@ -3,7 +3,7 @@
 Each candidate is a path, followed step by step with the compiled model: it is left where another
 margin falls below its warning limit, where a motor would have to lift more than it can, or where
 the robot would come to stand on other points. Of the paths that bring the margin back the fastest
-comes first, then the others by what they gain.
+comes first, then the others by what they gain; turning, which shakes the robot, comes last.
 """
 
 import math
@@ -107,7 +107,13 @@ def advise(
     if case is None or not case.scores[case.worst] < 1.0:
         return ()
     found = [*_moves(case), *_load(case)]
-    return tuple(sorted(found, key=lambda a: (not a.enough, a.seconds if a.enough else -a.gain)))
+    return tuple(sorted(found, key=_order))
+
+
+def _order(advice: Advice) -> tuple[bool, bool, float]:
+    """Enough comes first, then what is no turn, then the fastest; else what gains most."""
+    by = advice.seconds if advice.enough else -advice.gain
+    return not advice.enough, advice.kind == 'turn', by
 
 
 def _case_of(
@@ -145,7 +151,8 @@ def _ends(case: _Case) -> Iterator[tuple[Path, int, float, bool]]:
     """Yield every path that gains something, and where to stop as `_end` says."""
     paths = joint_paths(case.settings, case.q, case.gravity, case.torque)
     # Turning helps against tipping on a slope, but shakes a robot that is past its ERROR limit.
-    paths += turn_paths(case.q, case.gravity) if case.tips and case.scores[case.worst] > 0.0 else ()
+    if case.tips and case.scores[case.worst] > 0.0:
+        paths += turn_paths(case.settings.robot, case.q, case.gravity, case.payload)
     if not paths:
         return
     q, down = (np.vstack([getattr(p, name) for p in paths]) for name in ('q', 'gravity'))

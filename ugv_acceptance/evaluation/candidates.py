@@ -2,22 +2,33 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.robot import Joint, Robot
-from ugv_acceptance.model.statics import gripper_point
+from ugv_acceptance.model.expressions import Scalar
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
+from ugv_acceptance.model.robot import Joint, Payload, Robot
+from ugv_acceptance.model.stability import STANDING, stability
+from ugv_acceptance.model.tree import point_of, pose_of
 
 # A path is followed this long (s), in so many steps; a joint that moves contact points in finer
 # ones (rad), since a point counts only while it is within the ground's tolerance.
 HORIZON, STEPS, FINE = 4.0, 16, 0.01
 # Speed of a joint (rad/s; m/s) whose speed is not known, and the share of a known one to be used.
 CAREFUL, SHARE = 0.3, 0.9
+# What an arm stays above the ground (m): joints, hand and load are no points.
+CLEARANCE = 0.06
 # Turning on the spot: rate and step (rad/s, rad), and the slope (as sin) from which it matters.
-TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(15.0)), 0.05
+TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(5.0)), 0.05
+# Share of the weight on the lighter track below which it slips: the robot then drives off instead
+# of turning (bench/bench_advice.py).
+GRIP = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,18 +91,47 @@ def _moves_contacts(robot: Robot, link: str) -> bool:
 
 
 def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
-    """Return the paths, forbidden where the gripper goes below the ground (and where it is now)."""
-    if robot.payload_link is None or not paths:
+    """Return the paths, forbidden where the arm comes lower than CLEARANCE and than it is now."""
+    if not paths:
         return paths
-    height = gripper_point(robot, np.vstack((q, *(path.q for path in paths))))[:, 2]
-    below = height[1:] < min(robot.ground, float(height[0])) - 1e-6
+    height = _lowest(robot, np.vstack((q, *(path.q for path in paths))))
+    below = height[1:] < min(robot.ground + CLEARANCE, float(height[0])) - 1e-6
     ends = np.cumsum([len(path.q) for path in paths])[:-1]
     parts = zip(paths, np.split(below, ends), strict=True)
     return [replace(path, forbidden=part) for path, part in parts]
 
 
-def turn_paths(q: Floats, gravity: Floats) -> Iterator[Path]:
-    """Yield a path to the left and one to the right, half a turn each; none on level ground."""
+def _lowest(robot: Robot, q: Floats) -> Floats:
+    """Return the height (n,) in m, `base_link`, of the lowest joint of the arm, or of its load."""
+    heights = _arm_heights(mechanics_of(robot)).run(*q.T)
+    lowest: Floats = np.min([np.broadcast_to(z, len(q)) for z in (np.inf, *heights)], axis=0)
+    return lowest
+
+
+@lru_cache(maxsize=16)
+def _arm_heights(mechanics: Mechanics) -> Kernel:
+    """Compile the heights (m) of the arm's joints and its load; what carries contacts is no arm."""
+    robot, tree = mechanics.robot, mechanics.tree
+    names = [body.joint for body in tree.bodies]
+    arm = [
+        k for k in range(1, len(names)) if not _moves_contacts(robot, robot.joint(names[k]).child)
+    ]
+
+    def formula(*q: Scalar) -> tuple[Any, ...]:
+        pose = pose_of(tree, [q[robot.joint_names.index(name)] for name in names[1:]])
+        found = [pose.origin[k] for k in arm]
+        if robot.payload_link is not None:
+            found.append(point_of(tree, pose, robot.payload_link, robot.payload.cog)[1])
+        return tuple(z for _, _, z in found)
+
+    return compile_kernel(formula, robot.joint_names)
+
+
+def turn_paths(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> Iterator[Path]:
+    """Yield a path to the left and one to the right, half a turn each; none on level ground.
+
+    Forbidden where the tracks do not share the weight: skid steering turns only what both push.
+    """
     across = float(np.hypot(gravity[0], gravity[1]))
     if across < LEVEL * float(np.linalg.norm(gravity)):
         return
@@ -102,5 +142,16 @@ def turn_paths(q: Floats, gravity: Floats) -> Iterator[Path]:
         x, y = c * gravity[0] + s * gravity[1], c * gravity[1] - s * gravity[0]
         down = np.column_stack((x, y, np.full(len(amount), gravity[2])))
         path = np.tile(q, (len(amount), 1))
-        free = np.zeros(len(amount), dtype=bool)
-        yield Path('robot', path, down, amount, np.abs(amount) / TURN_RATE, free)
+        slips = _slips(robot, np.vstack((q, path)), np.vstack((gravity, down)), payload)
+        seconds = np.abs(amount) / TURN_RATE
+        yield Path('robot', path, down, amount, seconds, slips[1:] | slips[0])
+
+
+def _slips(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> NDArray[np.bool_]:
+    """Return where (n,) one track carries too little, or the robot stands on other points."""
+    found = stability(robot, q, gravity, payload)
+    left, right = (np.asarray(found.moment[k], dtype=np.float64) for k in (1, 3))
+    # What holds a robot down on one side is carried by the other.
+    shared = np.minimum(left, right) >= GRIP * (left + right)
+    slips: NDArray[np.bool_] = ~(shared & (np.asarray(found.state) == STANDING))
+    return slips

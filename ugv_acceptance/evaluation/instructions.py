@@ -42,7 +42,7 @@ def turn_words(amount: float, gravity: Floats) -> str:
         faces = ', to face downhill'
     elif abs(downhill) >= 150.0:
         faces = ', to face uphill'
-    return f'turn the robot {abs(math.degrees(amount)):.0f} deg to the {side}{faces}'
+    return f'turn the robot slowly by {abs(math.degrees(amount)):.0f} deg to the {side}{faces}'
 
 
 def load_words(mass: float, holds: float | None) -> str:

@@ -1,4 +1,4 @@
-"""Advice tried out: the simulated robot does as it was told, and its margins are taken anew."""
+"""Advice tried out: the simulated robot does as it was told, and its margins are watched."""
 
 import math
 from collections.abc import Iterator
@@ -20,8 +20,8 @@ from ugv_acceptance.simulation.tip_cases import TipCase, random_cases
 CALM = 0.8
 STEEPEST = 0.5
 # Skid steering: what is asked for (rad/s), of which the ground leaves a part; how often (s) an
-# operator looks how far the robot has turned, and how often at most.
-YAW_RATE, TICK, LONGEST = 1.5, 0.05, 400
+# operator looks how far the robot has turned, and how much longer than was said he tries.
+YAW_RATE, TICK, PATIENCE = 0.6, 0.05, 2.0
 # A case begins with at least this margin (rad), so that the robot stands until it can be told, and
 # with motors that give what the model says (N m; N): else the arm leans on the ground or the body.
 STANDS, LEANS = math.radians(2.0), 2.0
@@ -31,18 +31,25 @@ STANDS, LEANS = math.radians(2.0), 2.0
 class Trial:
     """Advice that was followed: the margin it was for, in the simulation before and after.
 
-    In rad of tilt, or N m (N) between limit and what the motor was measured to give.
+    In rad of tilt, or N m (N) between limit and what the motor was measured to give. `least` is the
+    smallest tilt left (rad) to any side on the way, -inf where there was no margin at all.
     """
 
     case: TipCase
     advice: Advice
     before: float
     after: float
+    least: float
 
     @property
     def helped(self) -> bool:
         """Whether the margin is larger than before."""
         return self.after > self.before
+
+    @property
+    def tipped(self) -> bool:
+        """Whether the robot had no tilt left on the way."""
+        return not self.least > 0.0
 
 
 def trials(settings: Settings, count: int, seed: int, kinds: tuple[str, ...]) -> Iterator[Trial]:
@@ -87,40 +94,47 @@ def _trial(settings: Settings, case: TipCase, kinds: tuple[str, ...]) -> Trial |
     if advice is None:
         return None
     before = _margin(settings, simulation, advice, case.payload)
-    load = _follow(simulation, advice, case.payload)
-    return Trial(case, advice, before, _margin(settings, simulation, advice, load))
+    load = Payload(0.0, case.payload.cog) if advice.kind == 'payload' else case.payload
+    least = min(_least(settings, simulation, load) for _ in _follow(simulation, advice, load))
+    return Trial(case, advice, before, _margin(settings, simulation, advice, load), least)
 
 
-def _follow(simulation: Simulation, advice: Advice, payload: Payload) -> Payload:
-    """Do what the advice says; return the payload that is carried then."""
+def _follow(simulation: Simulation, advice: Advice, load: Payload) -> Iterator[None]:
+    """Do what the advice says, with this load from then on, and yield every TICK on the way."""
     now = simulation.time
     if advice.kind == 'payload':
-        payload = Payload(0.0, payload.cog)
-        simulation.apply(Command(now, payload=payload))
+        simulation.apply(Command(now, payload=load))
     elif advice.kind == 'turn':
-        _turn(simulation, advice.amount)
+        yield from _turn(simulation, advice)
     else:
         j = simulation.robot.joint_names.index(advice.subject)
         target = float(simulation.joints()[0][j]) + advice.amount
         speed = abs(advice.amount) / advice.seconds
         simulation.apply(Command(now, ((advice.subject, target),), speed))
         # A smooth motion of that peak speed takes pi / 2 as long as one at that speed throughout.
-        simulation.advance(round(advice.seconds * math.pi / 2.0, 2))
-    simulation.advance(CALM)
-    return payload
+        yield from _wait(simulation, advice.seconds * math.pi / 2.0)
+    yield from _wait(simulation, CALM)
 
 
-def _turn(simulation: Simulation, amount: float) -> None:
-    """Turn on the spot until the robot faces another way by `amount` (rad), as an operator does."""
+def _turn(simulation: Simulation, advice: Advice) -> Iterator[None]:
+    """Turn on the spot until the robot faces where it should, or does not turn, as people do."""
+    amount = advice.amount
     wanted = math.copysign(YAW_RATE, amount)
     simulation.apply(Command(simulation.time, drive=(0.0, wanted)))
     turned = 0.0
-    for _ in range(LONGEST):
-        simulation.advance(TICK)
+    for _ in _wait(simulation, PATIENCE * advice.seconds):
         turned += float(simulation.imu()[1][2]) * TICK
+        yield
         if turned * wanted >= amount * wanted:
             break
     simulation.apply(Command(simulation.time, drive=(0.0, 0.0)))
+
+
+def _wait(simulation: Simulation, seconds: float) -> Iterator[None]:
+    """Let time pass, and yield every TICK."""
+    for _ in range(math.ceil(seconds / TICK)):
+        simulation.advance(TICK)
+        yield
 
 
 def _state(simulation: Simulation) -> tuple[Floats, Floats, Floats]:
@@ -130,6 +144,13 @@ def _state(simulation: Simulation) -> tuple[Floats, Floats, Floats]:
     x, y, z, w = orientation.tolist()
     up = np.array(up_from_orientation(x, y, z, w, IDENTITY))
     return q.copy(), -simulation.robot.gravity * up, effort.copy()
+
+
+def _least(settings: Settings, simulation: Simulation, load: Payload) -> float:
+    """Return the smallest tilt left (rad) to any side."""
+    q, down, _ = _state(simulation)
+    now = margins(settings.robot, q, down, load)
+    return -math.inf if int(now.state) >= NO_CONTACT else float(now.angle.min())
 
 
 def _margin(settings: Settings, simulation: Simulation, advice: Advice, load: Payload) -> float:
