@@ -23,9 +23,9 @@ def joint_state_cdr(
     effort: Numbers = (),
 ) -> bytes:
     """A sensor_msgs/JointState; SI units, radians; each array empty or as long as `names`."""
-    out = _head(stamp_ns, frame_id, tuple(names))
+    out = message_head(stamp_ns, frame_id, tuple(names))
     for values in (position, velocity, effort):
-        _floats(out, values, counted=True)
+        put_floats(out, values, counted=True)
     return bytes(out)
 
 
@@ -42,11 +42,11 @@ def imu_cdr(
     `covariances` of orientation, angular velocity, acceleration, 9 values each row by row; None
     is all zero, which means "unknown" (REP-145).
     """
-    out = _head(stamp_ns, frame_id, None)
+    out = message_head(stamp_ns, frame_id, None)
     vectors = ((orientation, 4), (angular_velocity, 3), (linear_acceleration, 3))
     for i, (vector, size) in enumerate(vectors):
-        _floats(out, vector, size)
-        _floats(out, covariances[i] if covariances else (0.0,) * 9, 9)
+        put_floats(out, vector, size)
+        put_floats(out, covariances[i] if covariances else (0.0,) * 9, 9)
     return bytes(out)
 
 
@@ -58,14 +58,15 @@ def inertia_cdr(
     moments: Numbers = (0.0,) * 6,
 ) -> bytes:
     """A geometry_msgs/InertiaStamped: kg, m, and kg m2 (ixx, ixy, ixz, iyy, iyz, izz)."""
-    out = _head(stamp_ns, frame_id, None)
-    _floats(out, (mass,), 1)
-    _floats(out, com, 3)
-    _floats(out, moments, 6)
+    out = message_head(stamp_ns, frame_id, None)
+    put_floats(out, (mass,), 1)
+    put_floats(out, com, 3)
+    put_floats(out, moments, 6)
     return bytes(out)
 
 
-def _head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None) -> bytearray:
+def message_head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None = None) -> bytearray:
+    """The beginning of a message: encapsulation, Header, and the names of a JointState."""
     sec, nanosec = divmod(stamp_ns, _NS)
     out = bytearray(b'\x00\x01\x00\x00')
     out += _STAMP.pack(sec, nanosec)
@@ -77,34 +78,37 @@ def _head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None) -> bytear
 def _texts(frame_id: str, names: tuple[str, ...] | None) -> bytes:
     """frame_id and names; both start at a multiple of four and so do all lengths in them."""
     out = bytearray()
-    _text(out, frame_id)
+    put_text(out, frame_id)
     if names is not None:
-        _count(out, len(names))
+        put_count(out, len(names))
         for name in names:
-            _text(out, name)
+            put_text(out, name)
     return bytes(out)
 
 
-def _text(out: bytearray, text: str) -> None:
+def put_text(out: bytearray, text: str) -> None:
+    """Append a string."""
     data = text.encode() + b'\0'
-    _count(out, len(data))
+    put_count(out, len(data))
     out += data
 
 
-def _count(out: bytearray, number: int) -> None:
+def put_count(out: bytearray, number: int) -> None:
+    """Append a length, or any other uint32."""
     out += bytes(-len(out) % 4)
     out += number.to_bytes(4, 'little')
 
 
-def _floats(
+def put_floats(
     out: bytearray, values: Numbers, size: int | None = None, *, counted: bool = False
 ) -> None:
+    """Append float64s: an array of `size`, or a sequence with its length."""
     number = len(values)
     if size not in (None, number):
         msg = f'expected {size} values, got {number}'
         raise ValueError(msg)
     if counted:
-        _count(out, number)
+        put_count(out, number)
     if number:
         out += bytes(-(len(out) - 4) % 8)
         out += struct.pack(f'<{number}d', *values)

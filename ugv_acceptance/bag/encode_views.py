@@ -1,0 +1,124 @@
+"""To CDR what viewers show: diagnoses and markers. Written by hand: no ROS is needed for a file."""
+
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+from ugv_acceptance.bag.encode import message_head, put_count, put_floats, put_text
+
+Point = tuple[float, float, float]
+Colour = tuple[float, float, float, float]
+
+_NS = 1_000_000_000
+_STAMP = struct.Struct('<iI')
+_HEAD = b'\x00\x01\x00\x00'
+# Marker.action.
+_ADD, _DELETE = 0, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One marker: `points` (m) in `colour`, or a `text` at `position` (m).
+
+    `kind` as visualization_msgs/Marker numbers them; `colours` is one a point, or empty; `size` (m)
+    is the width of lines, the diameter of spheres, the height of letters. Without points and text
+    it is nothing: what was drawn is taken away.
+    """
+
+    name: str
+    kind: int
+    colour: Colour
+    size: float
+    points: tuple[Point, ...] = ()
+    colours: tuple[Colour, ...] = ()
+    text: str = ''
+    position: Point = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The fields of a diagnostic_msgs/DiagnosticStatus; `level` 0 to 3."""
+
+    level: int
+    name: str
+    message: str
+    hardware_id: str
+    values: Mapping[str, str]
+
+
+def diagnosis_cdr(diagnosis: Diagnosis) -> bytes:
+    """A diagnostic_msgs/DiagnosticStatus."""
+    out = bytearray(_HEAD)
+    _put_diagnosis(out, diagnosis)
+    return bytes(out)
+
+
+def diagnoses_cdr(stamp_ns: int, diagnoses: Sequence[Diagnosis]) -> bytes:
+    """A diagnostic_msgs/DiagnosticArray."""
+    out = message_head(stamp_ns, '')
+    put_count(out, len(diagnoses))
+    for diagnosis in diagnoses:
+        _put_diagnosis(out, diagnosis)
+    return bytes(out)
+
+
+def _put_diagnosis(out: bytearray, diagnosis: Diagnosis) -> None:
+    out.append(diagnosis.level)
+    for text in (diagnosis.name, diagnosis.message, diagnosis.hardware_id):
+        put_text(out, text)
+    put_count(out, len(diagnosis.values))
+    for text in chain.from_iterable(diagnosis.values.items()):
+        put_text(out, text)
+
+
+def markers_cdr(stamp_ns: int, frame_id: str, lifetime_s: float, shapes: Sequence[Shape]) -> bytes:
+    """A visualization_msgs/MarkerArray of shapes in one frame, which vanish after `lifetime_s`."""
+    out = bytearray(_HEAD)
+    put_count(out, len(shapes))
+    stamp, lifetime = _time(stamp_ns), _time(round(lifetime_s * _NS))
+    for shape in shapes:
+        _put_marker(out, stamp, frame_id, lifetime, shape)
+    return bytes(out)
+
+
+def _time(ns: int) -> bytes:
+    return _STAMP.pack(*divmod(ns, _NS))
+
+
+def _put_marker(out: bytearray, stamp: bytes, frame_id: str, lifetime: bytes, shape: Shape) -> None:
+    _align(out)
+    out += stamp
+    put_text(out, frame_id)
+    put_text(out, shape.name)
+    action = _ADD if shape.points or shape.text else _DELETE
+    for number in (0, shape.kind, action):
+        put_count(out, number)
+    upright = (0.0, 0.0, 0.0, 1.0)
+    put_floats(out, (*shape.position, *upright, *(shape.size,) * 3))
+    out += struct.pack('<4f', *shape.colour) + lifetime
+    out.append(0)  # frame_locked
+    put_count(out, len(shape.points))
+    put_floats(out, tuple(chain.from_iterable(shape.points)))
+    put_count(out, len(shape.colours))
+    out += b''.join(struct.pack('<4f', *colour) for colour in shape.colours)
+    _put_no_texture(out)
+    put_text(out, shape.text)
+    for _ in ('mesh_resource', 'mesh_file.filename'):
+        put_text(out, '')
+    put_count(out, 0)  # mesh_file.data
+    out.append(0)  # mesh_use_embedded_materials
+
+
+def _put_no_texture(out: bytearray) -> None:
+    put_text(out, '')
+    _align(out)
+    out += _time(0)
+    for _ in ('frame_id', 'format'):
+        put_text(out, '')
+    for _ in ('data', 'uv_coordinates'):
+        put_count(out, 0)
+
+
+def _align(out: bytearray) -> None:
+    out += bytes(-len(out) % 4)
