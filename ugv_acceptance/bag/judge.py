@@ -6,6 +6,7 @@ from typing import Any
 
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.evaluation.alert_advice import AlertAdvice
 from ugv_acceptance.evaluation.bounds import Bounds, margin_bounds
 from ugv_acceptance.evaluation.comparison import ModelCheck
 from ugv_acceptance.evaluation.criteria import CriteriaSet, default_criteria
@@ -71,7 +72,8 @@ def judge(
     )
     examinations = [limits] if asked is limits else [limits, asked]
     check = ModelCheck(settings)
-    takers = [summary.add, check.add, *(e.add for e in examinations), *sinks]
+    told = AlertAdvice(settings, evaluator.watch.log, limits.payloads.at)
+    takers = [summary.add, check.add, told.add, *(e.add for e in examinations), *sinks]
     evaluator.start(bag.start_ns)
     reading = bag.batches(topics)
     for batch in _stretches(reading):
@@ -85,13 +87,14 @@ def judge(
     evaluator.finish(bag.end_ns)
     for finish in (summary.finish, *(e.finish for e in examinations)):
         finish(bag.end_ns)
+    log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
     data = {
-        **result_of(summary, evaluator.watch.log, bag.start_ns, bag.end_ns - bag.start_ns),
+        **result_of(summary, log, bag.start_ns, length, told.sentences()),
         'bag': _bag_result(bag, reading.facts),
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
         'model_check': check.result(),
     }
-    findings = Findings(asked, ordered(evaluator.watch.log), data, Bounds(settings, terms.sources))
+    findings = Findings(asked, ordered(log), data, Bounds(settings, terms.sources))
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **data}
     return Judgement(result, evaluator, reading.facts, asked)

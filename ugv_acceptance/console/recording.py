@@ -21,7 +21,7 @@ from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
-from ugv_acceptance.evaluation.wording import advice, describe
+from ugv_acceptance.evaluation.wording import describe
 from ugv_acceptance.model.robot import Payload
 
 # An alert stays on the page this long (ns) after it is over.
@@ -88,7 +88,7 @@ class Recording:
             rule.level,
             'over' if over else 'active',
             describe(alert, self.settings),
-            advice(rule.code),
+            self.judgement.result['alerts'][k]['advice'],
             alert.start,
             alert.end if over else None,
         )

@@ -21,6 +21,8 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
 from ugv_acceptance.model.statics import payload_capacity
 
+# Codes of alerts whose advice is computed; their subject is the margin.
+COMPUTED = frozenset({'TIP_OVER', 'TORQUE_LIMIT'})
 # Slack of comparisons; a path that gains less than this share of the way from ERROR to WARN is
 # none.
 SLACK, LEAST_GAIN = 1e-6, 0.1
@@ -97,13 +99,18 @@ def _spans(settings: Settings) -> tuple[float, float]:
 
 
 def advise(
-    settings: Settings, q: Sequence[float], gravity: Sequence[float], payload: Payload
+    settings: Settings,
+    q: Sequence[float],
+    gravity: Sequence[float],
+    payload: Payload,
+    of: str | None = None,
 ) -> tuple[Advice, ...]:
-    """Return what to do, the best first; nothing where no margin is below its warning limit.
+    """Return what to do, the best first; nothing where the margin is above its warning limit.
 
-    `q` (j,), `gravity` (3,) m/s2 in `base_link`. Nothing too where no margin is known.
+    `q` (j,), `gravity` (3,) m/s2 in `base_link`. The margin is `of` a side or joint, else the one
+    to speak of first. Nothing too where no margin is known.
     """
-    case = _case_of(settings, q, gravity, payload)
+    case = _case_of(settings, q, gravity, payload, of)
     if case is None or not case.scores[case.worst] < 1.0:
         return ()
     found = [*_moves(case), *_load(case)]
@@ -117,7 +124,11 @@ def _order(advice: Advice) -> tuple[bool, bool, float]:
 
 
 def _case_of(
-    settings: Settings, q: Sequence[float], gravity: Sequence[float], payload: Payload
+    settings: Settings,
+    q: Sequence[float],
+    gravity: Sequence[float],
+    payload: Payload,
+    of: str | None,
 ) -> _Case | None:
     at, down = np.array(q, dtype=np.float64), np.array(gravity, dtype=np.float64)
     if not (np.isfinite(at).all() and np.isfinite(down).all()):
@@ -127,7 +138,7 @@ def _case_of(
     if state >= NO_CONTACT:
         return None
     scores = scores_of(settings, now.torque, now.angle)
-    worst = _most_severe(scores)
+    worst = _most_severe(scores) if of is None else margin_names(settings).index(of)
     limits, (tip, span) = settings.limits, _spans(settings)
     if worst < len(SIDES):
         reserve = limits.tip_deadband / tip

@@ -1,6 +1,6 @@
 """What a recording came to: worst margins, time in violation, coverage and alerts."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -97,9 +97,16 @@ class Summary:
 
 
 def result_of(
-    summary: Summary, alerts: Sequence[Alert], start: int, duration: int
+    summary: Summary,
+    alerts: Sequence[Alert],
+    start: int,
+    duration: int,
+    told: Mapping[int, str] | None = None,
 ) -> dict[str, Any]:
-    """Return the part of a result that the margins and alerts decide, ready for JSON."""
+    """Return the part of a result that the margins and alerts decide, ready for JSON.
+
+    `told` is what to do, computed, by an alert's `id`; the others get what helps in general.
+    """
     settings = summary.settings
     seconds = duration / 1e9
     return {
@@ -115,7 +122,10 @@ def result_of(
             if np.isfinite(settings.limits.torque[j])
         },
         'stability': _stability_result(summary, start),
-        'alerts': [alert_result(alert, settings, start) for alert in ordered(alerts)],
+        'alerts': [
+            alert_result(alert, settings, start, (told or {}).get(id(alert)))
+            for alert in ordered(alerts)
+        ],
         'alarm_rates': rates_result([alert.start for alert in alerts], start, duration),
     }
 
@@ -125,8 +135,10 @@ def ordered(alerts: Sequence[Alert]) -> list[Alert]:
     return sorted(alerts, key=lambda a: (a.start, a.rule.code, a.rule.subject, a.rule.level))
 
 
-def alert_result(alert: Alert, settings: Settings, start: int) -> dict[str, Any]:
-    """Return one alert for JSON; times in seconds since `start` (ns)."""
+def alert_result(
+    alert: Alert, settings: Settings, start: int, told: str | None = None
+) -> dict[str, Any]:
+    """Return one alert for JSON; times in seconds since `start` (ns), `told` computed advice."""
     rule = alert.rule
     return {
         'code': rule.code,
@@ -136,7 +148,8 @@ def alert_result(alert: Alert, settings: Settings, start: int) -> dict[str, Any]
         'end_s': None if alert.end is None else (alert.end - start) / 1e9,
         'peak': _peak(alert),
         'message': describe(alert, settings),
-        'advice': advice(rule.code),
+        'advice': told or advice(rule.code),
+        'advice_computed': told is not None,
     }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from ugv_acceptance.evaluation.advice import Advice, advise
+from ugv_acceptance.evaluation.advice import COMPUTED, Advice, advise
 from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.outlook import Ahead, Outlook, slide_left
@@ -16,8 +16,8 @@ from ugv_acceptance.evaluation.payload_estimate import PayloadEstimate, payload_
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.nodes.faults import what_to_do
 
-# Codes whose advice is computed, and how old (ns) computed advice may be.
-COMPUTED, FRESH = frozenset({'TIP_OVER', 'TORQUE_LIMIT'}), 250_000_000
+# How old (ns) computed advice may be.
+FRESH = 250_000_000
 # Times in a row (once a second) that efforts must tell of another load before it is told.
 PERSISTENT = 3
 # Seconds to a limit below which the operator is told at once, and ns before it is told again.

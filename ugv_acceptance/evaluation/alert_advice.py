@@ -1,0 +1,80 @@
+"""What to do about each alert of a recording, computed for the moment it was raised.
+
+A case is kept an alert, not a message; what costs milliseconds is done at the end, for so many.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.advice import COMPUTED, advise
+from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.rows import Floats, MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+
+# Advice is computed for so many alerts of a run, the most severe first: a second's work.
+MOST = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moment:
+    """Positions (j,), gravity (3,) m/s2 in `base_link`, and when (ns) the joints were heard."""
+
+    q: Floats
+    gravity: Floats
+    heard: int
+
+
+@dataclass(slots=True)
+class AlertAdvice:
+    """Gathers the cases while a recording is read; `log` grows, `payload_at` takes a time (ns)."""
+
+    settings: Settings
+    log: list[Alert]
+    payload_at: Callable[[int], Payload]
+    _cases: list[tuple[Alert, _Moment]] = field(default_factory=list)
+    _seen: int = 0
+    _last: _Moment | None = None
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins, after the log has its alerts."""
+        for alert in self._fresh():
+            k = int(rows.time.searchsorted(alert.start, side='right')) - 1
+            moment = _moment(rows, k) if k >= 0 else self._last
+            if moment is not None:
+                self._cases.append((alert, moment))
+        if len(rows.time):
+            self._last = _moment(rows, len(rows.time) - 1)
+
+    def _fresh(self) -> list[Alert]:
+        fresh = [alert for alert in self.log[self._seen :] if alert.rule.code in COMPUTED]
+        self._seen = len(self.log)
+        return fresh
+
+    def sentences(self) -> dict[int, str]:
+        """Return what to do, by the alert's `id`; none where the model knows nothing better.
+
+        What fell due after the last message is judged by that.
+        """
+        if self._last is not None:
+            self._cases += [(alert, self._last) for alert in self._fresh()]
+        order = sorted(self._cases, key=lambda case: (-case[0].rule.level, case[0].start))
+        found = {}
+        for alert, moment in order[:MOST]:
+            payload = self.payload_at(moment.heard)
+            told = advise(
+                self.settings,
+                moment.q.tolist(),
+                moment.gravity.tolist(),
+                payload,
+                alert.rule.subject,
+            )
+            if told:
+                found[id(alert)] = told[0].sentence
+        return found
+
+
+def _moment(rows: MarginRows, k: int) -> _Moment:
+    j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])
+    joints = rows.pairs.joints
+    return _Moment(joints.q[j].copy(), rows.pairs.imu.gravity[i].copy(), int(joints.time[j]))
