@@ -13,7 +13,7 @@ import zstandard
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.gather import LEAD, SLACK, Bytes, Offsets
-from ugv_acceptance.bag.lz4_frame import unlz4
+from ugv_acceptance.bag.lz4_frame import Lz4
 
 FOOTER, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 2, 5, 6, 7, 15
 MAX_CHUNK_BYTES = 64 << 20
@@ -74,6 +74,7 @@ class Buffers:
         self._packed = np.zeros(1 << 16, np.uint8)
         self._records = np.zeros(1 << 16, np.uint8)
         self._zstd = zstandard.ZstdDecompressor()
+        self._lz4 = Lz4()
 
     def packed(self, size: int) -> Bytes:
         """Room for `size` bytes of the file, and SLACK behind them."""
@@ -109,7 +110,7 @@ class Buffers:
         if compression == 'zstd':
             got = self._unzstd(source, target)
         elif compression == 'lz4':
-            got = unlz4(source, target)
+            got = self._lz4.unpack(source, target)
         else:
             raise BadBag(f'compression {compression!r} is not known, expected zstd or lz4')
         if got != len(target):

@@ -1,62 +1,90 @@
-"""LZ4 frames into a buffer that is already there, block by block.
+"""LZ4 frames into a buffer that is already there, by liblz4 as the lz4 package carries it.
 
-`lz4.frame` takes new memory for every chunk, which costs five times as much as LZ4 itself; its
-`lz4.block` does not. A frame is a header, blocks of at most 4 MiB and an end mark. A frame's own
-checksums are not looked at: the chunk around it has one of its own.
+`lz4.frame` itself takes new memory for every chunk, which costs five times as much as LZ4 does. A
+frame's own checksums are looked at where it has any.
 """
 
-import lz4.block  # type: ignore[import-untyped]
+import ctypes
+import weakref
+from ctypes import byref, c_size_t, c_void_p
+
 import lz4.frame  # type: ignore[import-untyped]
+import numpy as np
 
 from ugv_acceptance import BadBag
 
-_MAGIC = b'\x04\x22\x4d\x18'
-_HISTORY = 1 << 16  # bytes that a linked block may refer back to
+_VERSION = 100  # of liblz4's interface for frames
 
 
-def unlz4(source: memoryview, target: memoryview) -> int:
-    """Unpack a frame into `target`; the bytes it unpacks to, or BadBag where it is broken."""
+def _liblz4() -> ctypes.CDLL | None:
+    """liblz4 of the lz4 package: inside it in wheels, beside it in Debian; None: neither."""
     try:
-        return _blocks(source, target)
-    except (lz4.block.LZ4BlockError, RuntimeError, ValueError, IndexError) as error:
-        raise BadBag(f'its lz4 data is broken ({error})') from error
+        library = ctypes.CDLL(lz4.frame._frame.__file__)  # noqa: SLF001 - its file is all we need
+        library.LZ4F_decompress.argtypes = [c_void_p] * 6
+        library.LZ4F_decompress.restype = c_size_t
+        library.LZ4F_getErrorName.argtypes = [c_size_t]
+        library.LZ4F_getErrorName.restype = ctypes.c_char_p
+        library.LZ4F_createDecompressionContext.argtypes = [c_void_p, ctypes.c_uint]
+        library.LZ4F_freeDecompressionContext.argtypes = [c_void_p]
+        library.LZ4F_resetDecompressionContext.argtypes = [c_void_p]
+    except (OSError, AttributeError):
+        return None
+    return library
 
 
-def _blocks(source: memoryview, target: memoryview) -> int:
-    flags = source[4]
-    if source[:4] != _MAGIC or flags >> 6 != 1 or flags & 1:
-        return _whole(source, target)  # of another version or with a dictionary
-    linked, sums = not flags & 0x20, bool(flags & 0x10)
-    most = 1 << 2 * (source[5] >> 4 & 7) + 8
-    pos = 7 + (8 if flags & 8 else 0)
-    got = 0
-    while True:
-        if pos + 4 > len(source):
-            raise ValueError('no end mark')
-        size = int.from_bytes(source[pos : pos + 4], 'little')
-        pos += 4
-        if not size:
-            return got
-        plain, size = bool(size >> 31), size & 0x7FFFFFFF
-        if pos + size > len(source):
-            raise ValueError('cut off')
-        block = source[pos : pos + size]
-        if not plain:
-            block = _block(block, most, target[max(got - _HISTORY, 0) : got] if linked else None)
-        if got + len(block) > len(target):
-            return got + len(block)
-        target[got : got + len(block)] = block
-        got += len(block)
-        pos += size + (4 if sums else 0)
+class Lz4:
+    """Unpacks frames one after another; each thread needs one of its own."""
+
+    def __init__(self) -> None:
+        self._lib = _liblz4()
+        self._context = c_void_p()
+        if self._lib is not None:
+            self._lib.LZ4F_createDecompressionContext(byref(self._context), _VERSION)
+            weakref.finalize(self, self._lib.LZ4F_freeDecompressionContext, self._context)
+
+    def unpack(self, source: memoryview, target: memoryview) -> int:
+        """Unpack a frame into `target`; the bytes it unpacks to, at least one more if too many.
+
+        BadBag where it is broken.
+        """
+        if self._lib is None or not source or not target:
+            return unpack_whole(source, target)
+        packed, out = (np.frombuffer(view, np.uint8) for view in (source, target))
+        used = got = 0
+        self._lib.LZ4F_resetDecompressionContext(self._context)
+        while True:
+            here, there = c_size_t(len(packed) - used), c_size_t(len(out) - got)
+            more = self._lib.LZ4F_decompress(
+                self._context,
+                out.ctypes.data + got,
+                byref(there),
+                packed.ctypes.data + used,
+                byref(here),
+                None,
+            )
+            if self._lib.LZ4F_isError(c_size_t(more)):
+                raise _broken(self._lib.LZ4F_getErrorName(more).decode())
+            used, got = used + here.value, got + there.value
+            if not more:
+                return got
+            if got == len(out):
+                return got + 1
+            if not here.value and not there.value:
+                raise _broken('cut off')
 
 
-def _block(block: memoryview, most: int, history: memoryview | None) -> memoryview:
-    if history:
-        return memoryview(lz4.block.decompress(block, uncompressed_size=most, dict=history))
-    return memoryview(lz4.block.decompress(block, uncompressed_size=most))
-
-
-def _whole(source: memoryview, target: memoryview) -> int:
-    data = lz4.frame.LZ4FrameDecompressor().decompress(source, max_length=len(target) + 1)
+def unpack_whole(source: memoryview, target: memoryview) -> int:
+    """Unpack a frame like `Lz4.unpack`, by way of new memory."""
+    unpacker = lz4.frame.LZ4FrameDecompressor()
+    try:
+        data = unpacker.decompress(source, max_length=len(target) + 1)
+    except (RuntimeError, ValueError, EOFError) as error:
+        raise _broken(str(error)) from error
+    if len(data) <= len(target) and not unpacker.eof:
+        raise _broken('cut off')
     target[: len(data)] = data[: len(target)]
     return len(data)
+
+
+def _broken(why: str) -> BadBag:
+    return BadBag(f'its lz4 data is broken ({why})')
