@@ -10,6 +10,7 @@ property test holds that both give the same rows.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,6 @@ from ugv_acceptance.evaluation.alerts import WARN, Signal, feed
 from ugv_acceptance.evaluation.low_pass import BELIEVABLE, NOWHERE, LowPass, Vector
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
-from ugv_acceptance.evaluation.watch import AttitudeSignals
 from ugv_acceptance.model.attitude import (
     angle_between,
     up_from_acceleration,
@@ -26,6 +26,9 @@ from ugv_acceptance.model.attitude import (
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
 from ugv_acceptance.model.rows import Values
+
+if TYPE_CHECKING:
+    from ugv_acceptance.evaluation.watch import AttitudeSignals
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -63,7 +66,7 @@ class ImuTracker:
     """
 
     settings: Settings
-    faults: AttitudeSignals
+    faults: 'AttitudeSignals'
     low_pass: LowPass = field(init=False)
     taken: list[int] = field(default_factory=lambda: [0, 0, 0])
     _frame: str | None = None
