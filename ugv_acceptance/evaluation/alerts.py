@@ -71,7 +71,9 @@ class Signal:
     def step(self, now: int, value: float) -> None:
         """Take a value at time `now` (ns)."""
         if value >= self.on:
-            self.set(now, value)
+            # Bad as before and no worse: nothing can change.
+            if not self.raw or self.due is not None or value > self.peak:
+                self.set(now, value)
         elif self.quiet:
             return
         elif value < self.rule.off:

@@ -86,14 +86,18 @@ class LiveEvaluator:
             return self.margins
         self._arrived(0, now, stamp, watch.joints)
         known = all(map(math.isfinite, joints.q))
-        seen = min(joints.seen)
         unusable = not known and any(
             t != NEVER and math.isnan(q) for q, t in zip(joints.q, joints.seen, strict=True)
         )
-        watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
-        watch.missing.step(now, 1.0 if now - seen > self._fresh[0].limit else 0.0)
+        # Here and below: a quiet signal has nothing to do with a small value; most calls are saved.
+        if unusable or not watch.joints.invalid.quiet:
+            watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
+        old = now - min(joints.seen) > self._fresh[0].limit
+        if old or not watch.missing.quiet:
+            watch.missing.step(now, 1.0 if old else 0.0)
         for signal, rate in zip(watch.speed, joints.qd, strict=True):
-            signal.step(now, abs(rate))
+            if rate >= signal.on or rate <= -signal.on or not signal.quiet:
+                signal.step(now, abs(rate))
         if known:
             load = self.payload
             self._posture = posture_of(self._mechanics, joints.q, load.mass, load.cog)
@@ -117,7 +121,9 @@ class LiveEvaluator:
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame
         )
-        self.watch.imu.invalid.step(now, 1.0 if unusable else 0.0)
+        invalid = self.watch.imu.invalid
+        if unusable or not invalid.quiet:
+            invalid.step(now, 1.0 if unusable else 0.0)
         self._gravity = gravity
         return self._evaluate(now, stamp)
 
@@ -147,6 +153,7 @@ class LiveEvaluator:
             due = fresh.deadline
             if due is not None and now > due:
                 signals.stale.set(due, 1.0)
+        self.watch.foresee()
         for signal in self.watch.signals():
             signal.advance(now)
         if not self._alive(now):
@@ -170,11 +177,15 @@ class LiveEvaluator:
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
         fresh = self._fresh[which]
+        stale, clock = signals.stale, signals.clock
         due = fresh.deadline
         if due is not None and now > due:
-            signals.stale.set(due, 1.0)
-        signals.stale.clear(now)
-        signals.clock.step(now, fresh.clock(now, stamp))
+            stale.set(due, 1.0)
+        if not stale.quiet:
+            stale.clear(now)
+        wrong = fresh.clock(now, stamp)
+        if wrong or not clock.quiet:
+            clock.step(now, wrong)
         fresh.message(now)
 
     def _alive(self, now: int) -> bool:
@@ -197,6 +208,9 @@ class LiveEvaluator:
         q = tuple(self._joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)
         self.evaluated += 1
+        foresight = self.watch.foresight
+        if now >= foresight.due:
+            foresight.keep(now, stability.angle, torque, self._joints.effort, q)
         return self.margins
 
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:
@@ -204,7 +218,6 @@ class LiveEvaluator:
         angles: Any = stability.angle
         for (warn, error), tau in zip(watch.torque, torque, strict=True):
             value = abs(tau)
-            # A quiet signal has nothing to do with a small value: most calls are saved.
             if value >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, value)
                 error.step(now, value)
@@ -212,4 +225,6 @@ class LiveEvaluator:
             if -angle >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, -angle)
                 error.step(now, -angle)
-        watch.support.step(now, 1.0 if stability.state >= NO_CONTACT else 0.0)
+        fallen = stability.state >= NO_CONTACT
+        if fallen or not watch.support.quiet:
+            watch.support.step(now, 1.0 if fallen else 0.0)

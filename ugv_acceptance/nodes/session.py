@@ -7,6 +7,8 @@ object is made; whatever they hold, the worst that happens is that they are coun
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from operator import attrgetter
+from typing import Any
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
@@ -19,6 +21,15 @@ from ugv_acceptance.nodes.faults import Faults
 from ugv_acceptance.nodes.following import Follower
 from ugv_acceptance.nodes.receipt import ReceiptClock
 
+# What the evaluator takes of a sample behind its time and stamp.
+JOINT_FIELDS = attrgetter('names', 'position', 'velocity', 'effort')
+IMU_FIELDS = attrgetter(
+    'orientation',
+    'orientation_covariance_0',
+    'angular_velocity',
+    'linear_acceleration',
+    'frame_id',
+)
 INPUTS = ('joint_states', 'imu', 'payload')
 
 
@@ -67,8 +78,11 @@ class Session:
         self.counsel = Counsel(self.evaluator, self.outlook, self.on_problem)
         self.counts = {name: InputCount() for name in INPUTS}
         self.evaluator.start(self.clock.now())
-        self.take_joint_state = self._guard('joint_states', self._joint_states())
-        self.take_imu = self._guard('imu', self._imu())
+        decode, evaluator = joint_state_decoder().one, self.evaluator
+        take = self._evaluating('joint_states', decode, JOINT_FIELDS, evaluator.joint_state)
+        self.take_joint_state = self._guard('joint_states', take)
+        take = self._evaluating('imu', imu_decoder().one, IMU_FIELDS, evaluator.imu)
+        self.take_imu = self._guard('imu', take)
         self.take_payload = self._guard('payload', self._payload())
 
     @property
@@ -109,37 +123,25 @@ class Session:
             self._known = known
             self.on_change()
 
-    def _joint_states(self) -> Callable[[bytes], None]:
-        decode, evaluate = joint_state_decoder().one, self.evaluator.joint_state
+    def _evaluating(
+        self,
+        name: str,
+        decode: Callable[[bytes], Any],
+        fields: Callable[[Any], tuple[Any, ...]],
+        evaluate: Callable[..., Margins | None],
+    ) -> Callable[[bytes], None]:
+        """Return the way of a message: decoded, and these fields of the sample evaluated."""
+        clock, count, follower = self.clock, self.counts[name], self.follower
         see = self.outlook.see
-        clock, count, follower = self.clock, self.counts['joint_states'], self.follower
 
         def take(data: bytes) -> None:
             now = time.monotonic_ns() + clock.offset
-            stamp, _, names, position, velocity, effort = decode(data)
+            sample = decode(data)
+            stamp = sample.stamp
             count.taken += 1
             count.last = now
             local = clock.stamp(now, stamp) if clock.simulated else stamp
-            margins = evaluate(now, local, names, position, velocity, effort)
-            if margins is not None:
-                see(margins)
-                self.on_margins(stamp, margins)
-            if (margins is not None) is not self._known or follower.changed():
-                self._look()
-
-        return take
-
-    def _imu(self) -> Callable[[bytes], None]:
-        decode, evaluate, see = imu_decoder().one, self.evaluator.imu, self.outlook.see
-        clock, count, follower = self.clock, self.counts['imu'], self.follower
-
-        def take(data: bytes) -> None:
-            now = time.monotonic_ns() + clock.offset
-            stamp, frame, orientation, omega, acceleration, covariance_0, _, _ = decode(data)
-            count.taken += 1
-            count.last = now
-            local = clock.stamp(now, stamp) if clock.simulated else stamp
-            margins = evaluate(now, local, orientation, covariance_0, omega, acceleration, frame)
+            margins = evaluate(now, local, *fields(sample))
             if margins is not None:
                 see(margins)
                 self.on_margins(stamp, margins)
