@@ -11,7 +11,7 @@ class Outcome(NamedTuple):
     held: bool | None
 
 
-def memory() -> float:
-    """Return the memory of this process now (MB, resident)."""
-    with open('/proc/self/statm', encoding='ascii') as file:  # noqa: PTH123 (a file of the kernel)
+def memory(process: int | str = 'self') -> float:
+    """Return the memory of a process now (MB, resident)."""
+    with open(f'/proc/{process}/statm', encoding='ascii') as file:  # noqa: PTH123 (a file of the kernel)
         return int(file.read().split()[1]) * os.sysconf('SC_PAGE_SIZE') / 1e6
