@@ -49,6 +49,26 @@ def write_run(
     return folder
 
 
+@pytest.mark.parametrize(('name', 'code'), [('packbot_pass', 0), ('packbot_fail', 1)])
+def test_nobody_reads_what_is_printed(
+    name: str, code: int, repository: Path, tmp_path: Path
+) -> None:
+    """A pipe that is closed, as by `| head`, costs no file, says no word, changes no exit code."""
+    files = [tmp_path / name for name in ('r.json', 'r.html', 'r.xml')]
+    options = [
+        x for pair in zip(('--json', '--report', '--junit'), files, strict=True) for x in pair
+    ]
+    command = [sys.executable, '-c', MAIN, 'evaluate', repository / 'bags' / name, *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        told = process.stderr.read()
+        assert process.wait(60) == code
+    assert told == b''
+    assert all(file.stat().st_size for file in files)
+
+
 @pytest.mark.parametrize(
     ('name', 'code', 'verdict'),
     [('packbot_pass', 0, 'PASS'), ('packbot_fail', 1, 'FAIL'), ('packbot_gap', 3, 'INCONCLUSIVE')],

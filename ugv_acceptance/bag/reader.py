@@ -60,6 +60,7 @@ class Bag:
     salvaged: str | None
     findings: tuple[str, ...]
     members: tuple[Member, ...] = field(repr=False)
+    _hash: list[str] = field(default_factory=list, repr=False, compare=False)
 
     @property
     def duration_s(self) -> float:
@@ -69,12 +70,13 @@ class Bag:
     def sha256(self) -> str:
         """SHA-256 of the file; of several, that of their SHA-256 digests in the order of `paths`.
 
-        metadata.yaml is not part of it: it says nothing that the files do not.
+        metadata.yaml is not part of it: it says nothing that the files do not. Computed once.
         """
-        digests = [_sha256(path) for path in self.paths]
-        if len(digests) == 1:
-            return digests[0].hex()
-        return hashlib.sha256(b''.join(digests)).hexdigest()
+        if not self._hash:
+            digests = [_sha256(path) for path in self.paths]
+            one = digests[0] if len(digests) == 1 else hashlib.sha256(b''.join(digests)).digest()
+            self._hash.append(one.hex())
+        return self._hash[0]
 
     def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
         """The messages of `topics` as an iterator of batches that follow each other in log time.

@@ -79,6 +79,7 @@ def campaign(
     from ugv_acceptance.campaign.sources import find_sources
     from ugv_acceptance.campaign.statement import Question, statement
     from ugv_acceptance.cli.campaign_text import print_campaign, print_effort
+    from ugv_acceptance.cli.summary import while_read
 
     check_requirement(require_mtbf)
     question = Question(confidence, require_mtbf, ended_by_failure, groups_from(compare or []))
@@ -93,8 +94,9 @@ def campaign(
     took = time.monotonic() - began
     said = statement(rows, all_failures(rows, entries), question, origin)
     write(out, said)
-    print_campaign(said, out)
-    print_effort(effort, len(sources), took)
+    with while_read():
+        print_campaign(said, out)
+        print_effort(effort, len(sources), took)
     raise typer.Exit(exit_code(said))
 
 

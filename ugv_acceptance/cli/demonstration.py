@@ -26,6 +26,7 @@ WORKED, BROKEN = 0, 1
 def demonstrate(bag: Path | None, rate: float) -> int:
     """Run the demo; return its exit code: 0 where live and recording were both judged."""
     from ugv_acceptance.cli.evaluate import judge_recording
+    from ugv_acceptance.cli.summary import print_result
     from ugv_acceptance.config import load
 
     console = Console(highlight=False)
@@ -40,6 +41,7 @@ def demonstrate(bag: Path | None, rate: float) -> int:
     alerts, played = live(path, rate, console)
     console.rule('2. The same run from the recording')
     result = judge_recording([path], load(), compare_effort=False)
+    print_result(result)
     return conclude(console, alerts, played, result)
 
 

@@ -60,6 +60,13 @@ def evaluate(
     parquet: Annotated[
         Path | None, typer.Option(help='Write the margins over time as Parquet (extra table).')
     ] = None,
+    annotate: Annotated[
+        Path | None,
+        typer.Option(help='Write the recording with margins, verdict and alerts beside it (MCAP).'),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option('--overwrite', help='Let --annotate replace a file that exists.')
+    ] = False,
 ) -> None:
     """Judge recorded runs: margins, alerts and a verdict with its reasons.
 
@@ -72,13 +79,16 @@ def evaluate(
       ugv-acceptance evaluate run_0.mcap run_1.mcap --json result.json --csv margins.csv
       ugv-acceptance evaluate run --config my_robot.yaml --urdf my_robot.urdf --compare-effort
       ugv-acceptance evaluate run --criteria site.yaml --json r.json --report r.html --junit r.xml
+      ugv-acceptance evaluate run --annotate run_judged.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.result import write_json
     from ugv_acceptance.cli.evidence import Papers, write_junit
+    from ugv_acceptance.cli.summary import print_result, while_read
     from ugv_acceptance.config import load
     from ugv_acceptance.config.identity import identity_from
 
-    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria)
+    tables, wishes = (report, pdf, csv_file, parquet), (criteria, init_criteria, annotate)
+    papers = Papers(*tables, *wishes, overwrite)
     groups, loaded = recordings(bags), load(config, urdf=urdf)
     papers.check(len(groups), (json_file, junit))
     entered = identity_from(identity)
@@ -100,6 +110,10 @@ def evaluate(
         write_json(json_file, results[0] if len(results) == 1 else results)
     if junit is not None:
         write_junit(junit, results)
+    with while_read():
+        for result in results:
+            if result['verdict'] in EXIT:
+                print_result(result)
     raise typer.Exit(worst(codes))
 
 
@@ -127,13 +141,11 @@ def judge_recording(
     compare_effort: bool = False,
     identity: 'Mapping[str, str] | None' = None,
 ) -> dict[str, Any]:
-    """Judge one recording, print its summary, write its papers, and return its result."""
+    """Judge one recording, write its papers, and return its result."""
     from ugv_acceptance.cli.evidence import Papers, judge_files, write_papers
-    from ugv_acceptance.cli.summary import print_result
 
     papers = papers or Papers()
     result, recorder = judge_files(paths, config, papers, compare_effort=compare_effort)
     result['identity'] = dict(identity or {})
-    print_result(result)
     write_papers(papers, result, recorder, config.settings)
     return result

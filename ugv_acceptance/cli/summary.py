@@ -1,5 +1,7 @@
 """A result as a person reads it in ten seconds: the verdict, why, and the worst of each margin."""
 
+import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
@@ -38,6 +40,16 @@ def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int]
             progress.update(task, completed=now - start, seconds=(now - start) / 1e9)
 
         yield reached
+
+
+@contextmanager
+def while_read() -> Iterator[None]:
+    """Print while somebody reads: a closed pipe (`| head`) changes no exit code."""
+    try:
+        yield
+        sys.stdout.flush()
+    except (BrokenPipeError, SystemExit):  # the second is how newer rich tells of the first
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def print_result(result: dict[str, Any], console: Console | None = None) -> None:

@@ -36,19 +36,25 @@ def verify(
       ugv-acceptance verify result.json
       ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.cli.summary import while_read
+
     told = read_result(result_file)
     found = again(told, result_file.parent, bag, config, urdf, criteria)
     differences = compare(told, found)
-    for line in differences[:MOST_SHOWN]:
-        typer.echo(f'  {line}')
-    if len(differences) > MOST_SHOWN:
-        typer.echo(f'  and {len(differences) - MOST_SHOWN} more')
-    if differences:
-        typer.echo(f'[X] DIFFERS  {result_file}: {len(differences)} differences')
-        raise typer.Exit(1)
-    typer.echo(
-        f'[OK] VERIFIED  {result_file}: the same hashes, verdicts and numbers ({told["verdict"]})'
-    )
+    with while_read():
+        for line in said(differences, result_file, told['verdict']):
+            typer.echo(line)
+    raise typer.Exit(1 if differences else 0)
+
+
+def said(differences: list[str], path: Path, verdict: str) -> list[str]:
+    """Return what to tell a person."""
+    if not differences:
+        return [f'[OK] VERIFIED  {path}: the same hashes, verdicts and numbers ({verdict})']
+    lines = [f'  {line}' for line in differences[:MOST_SHOWN]]
+    more = len(differences) - MOST_SHOWN
+    lines += [f'  and {more} more'] if more > 0 else []
+    return [*lines, f'[X] DIFFERS  {path}: {len(differences)} differences']
 
 
 def read_result(path: Path) -> Json:
