@@ -17,11 +17,14 @@ from ugv_acceptance.plan.card import card_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Step, read_plan, vector_of
+from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.ways import Routes, safe_way
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 CONFIG: Config = load()
 PLAN: Plan = derive(CONFIG)
 LIMITS = np.array(CONFIG.settings.limits.torque)
+LEVEL = (('level', 0.0), 4.0)
 HELD = [s for s in PLAN.steps if s.action in {'hold', 'tip'}]
 
 
@@ -68,23 +71,60 @@ def test_the_margins_a_step_expects_are_those_of_its_posture(step: Step) -> None
     assert step.expected['tilt_left_deg'] == pytest.approx(float(left[0]), abs=0.05)
 
 
-def test_both_sides_of_the_torque_boundary_are_there() -> None:
-    """Just inside goes to the robot, just outside to the simulation only."""
-    use = {s.id: s.expected['use'] for s in PLAN.steps if s.group == 'torque boundary'}
-    inside = [u for u in use.values() if u < 1.0]
-    outside = [u for u in use.values() if u > 1.0]
-    assert len(inside) >= 3
-    assert len(outside) >= 3
-    assert max(inside) > 0.9
-    assert min(outside) < 1.15
+def shares(where: str) -> list[float]:
+    """Return the shoulder's torque over its limit, with its sign, of the boundary's steps."""
+    robot = CONFIG.settings.robot
+    k = robot.joint_names.index('shoulder_joint')
+    found = []
+    for step in PLAN.steps:
+        if step.group == 'torque boundary' and step.where == where:
+            load_ = Payload(step.payload_kg, robot.payload.cog)
+            torque = static_torque(
+                robot, vector(step.posture_deg)[None, :], step.gravity(robot.gravity), load_
+            )
+            found.append(float(torque[0, k] / LIMITS[k]))
+    return found
 
 
-def test_both_sides_of_the_rollover_boundary_are_there() -> None:
-    """Inside, beyond the limit, and beyond the tip-over itself."""
-    left = [s.expected['tilt_left_deg'] for s in PLAN.steps if s.group == 'rollover boundary']
-    assert any(5.0 < x < 10.0 for x in left)
-    assert any(0.0 < x < 5.0 for x in left)
-    assert any(x < 0.0 for x in left)
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_both_sides_of_the_torque_boundary_are_there(sign: float) -> None:
+    """In either direction: below the warning and inside on the robot, outside in simulation."""
+    on_robot = [sign * s for s in shares(ROBOT)]
+    simulated = [sign * s for s in shares(SIMULATION)]
+    assert any(0.7 < s < 0.77 for s in on_robot)
+    assert any(0.9 < s < 1.0 for s in on_robot)
+    assert any(1.0 < s < 1.15 for s in simulated)
+
+
+@pytest.mark.parametrize('side', ['nose-down', 'nose-up', 'left', 'right'])
+@pytest.mark.parametrize('band', [(10.0, 13.0), (5.0, 9.0), (0.0, 4.0)])
+def test_both_sides_of_the_rollover_boundary_are_there(
+    side: str, band: tuple[float, float]
+) -> None:
+    """Towards each side: before the warning, inside the limit, and beyond it."""
+    steps = [s for s in PLAN.steps if s.group == 'rollover boundary']
+    left = [s.expected['tilt_left_deg'] for s in steps if s.ground.orientation == side]
+    assert any(band[0] < x < band[1] for x in left)
+
+
+def test_the_robot_tips_over_in_simulation() -> None:
+    """Beyond the tip-over itself, to more than one side."""
+    tips = [s for s in PLAN.steps if s.action == 'tip']
+    assert all(s.where == SIMULATION and s.expected['tilt_left_deg'] < 0.0 for s in tips)
+    assert len({s.ground.orientation for s in tips}) >= 2
+
+
+def test_a_posture_behind_a_limit_is_reached_around_it() -> None:
+    """Where the straight way passes a limit, the search finds postures between that do not."""
+    arm = Arm(CONFIG.settings, roles_of(CONFIG.settings))
+    home = vector(PLAN.home_deg)
+    ways = Routes(arm, home).ways(('level', 0.0), 4.0)
+    behind = [q for q in ways.q[ways.reachable] if not safe_way(arm, (home, q), *LEVEL)]
+    assert behind
+    for q in behind[::100]:
+        middle = ways.to(q)
+        assert middle
+        assert safe_way(arm, (home, *middle, q), *LEVEL)
 
 
 def test_nothing_that_fails_is_run_on_the_robot() -> None:

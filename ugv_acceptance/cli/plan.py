@@ -32,7 +32,7 @@ def plan(
     ] = 10.0,
     points: Annotated[
         int, typer.Option(min=1, max=20, help='Points on each side of a boundary.')
-    ] = 3,
+    ] = 1,
     hours: Annotated[float, typer.Option(min=0.01, help='Length of the endurance part.')] = 6.0,
     short: Annotated[
         bool, typer.Option('--short', help='One step of each kind, for a demonstration.')
@@ -46,7 +46,7 @@ def plan(
     Examples:
       ugv-acceptance plan -o plan.yaml --card card.html
       ugv-acceptance plan --from plan.yaml --card card.html
-      ugv-acceptance plan --config my_robot.yaml --tilt 15 --points 5 -o plan.yaml
+      ugv-acceptance plan --config my_robot.yaml --tilt 15 --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     import math
 

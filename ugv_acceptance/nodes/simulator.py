@@ -140,7 +140,7 @@ class Simulator(Node):
         return list(zip(settings.joints, settings.robot.joint_names, strict=True))
 
     def _on_ground(self, message: Vector3) -> None:
-        self.virtual.remote.tilt(message.x, message.y, message.z)
+        self.virtual.tilt(message.x, message.y, message.z)
 
     def _on_load(self, message: Inertia) -> None:
         self.virtual.remote.take(Payload(message.m, (message.com.x, message.com.y, message.com.z)))

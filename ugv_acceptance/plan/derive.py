@@ -12,19 +12,17 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.plan.boundaries import tip_boundary, torque_boundary
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
 from ugv_acceptance.plan.order import distance, ordered
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
-from ugv_acceptance.plan.search import Arm, Found, Mask, look, roles_of, safe, safe_way, spread_out
+from ugv_acceptance.plan.search import Arm, look, roles_of, safe
+from ugv_acceptance.plan.ways import Routes
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Share of a limit (and 20 deg of tilt) by which tests on a robot stay inside, by default.
 SPARE = 0.05
-# Use of the torque limit just inside and just outside; tilt left (deg) inside, beyond, tipping.
-INSIDE, OUTSIDE = (0.90, 0.97), (1.04, 1.15)
-TILT_INSIDE, TILT_BEYOND, TILT_OVER = (6.0, 9.0), (1.0, 4.0), (-8.0, -2.5)
-
 # Speed (deg/s) of a demonstration: just below the rate to which the static model holds.
 QUICK = 35.0
 # And of a motion that ends in a tip-over, in simulation.
@@ -37,7 +35,7 @@ class Wanted:
 
     tilt: float = math.radians(10.0)
     steep: float = math.radians(25.0)
-    points: int = 3
+    points: int = 1
     endurance: float = 6.0 * 3600.0
     short: bool = False
 
@@ -49,11 +47,12 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
     loads = (0.0, full / 2.0, full) if full else (0.0,)
     home = home_of(arm, wanted, loads[-1])
     place = posture_deg(arm, home)
+    routes = Routes(arm, home)
     steps: list[Step] = [
-        *_worst_postures(arm, loads),
-        *_torque_boundary(arm, wanted, loads),
-        *_orientations(arm, wanted, loads),
-        *_tip_boundary(arm, wanted, loads),
+        *_worst_postures(routes, loads),
+        *torque_boundary(routes, wanted.points, loads),
+        *_orientations(routes, wanted.tilt, loads),
+        *tip_boundary(routes, wanted.points, loads, (wanted.tilt, wanted.steep)),
         *capacity_steps(arm, home),
         *speed_steps(arm, home),
         *drive_steps(arm, home),
@@ -61,14 +60,14 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
     ]
     if wanted.short:
         steps = _few(steps, place)
-    routed = _routed(arm, ordered([_refused(arm, s) for s in steps], place), home)
+    routed = _routed(routes, ordered([_refused(arm, s) for s in steps], place))
     final = ordered(routed, place)
     return Plan(
         plan=f'{config.name}{"-short" if wanted.short else ""}',
         robot=config.name,
         config_sha256=config.sha256,
         home_deg=place,
-        steps=tuple(_numbered(_routed(arm, final, home))),
+        steps=tuple(_numbered(_routed(routes, final))),
     )
 
 
@@ -82,15 +81,16 @@ def home_of(arm: Arm, wanted: Wanted, load: float) -> Floats:
     return home
 
 
-def _worst_postures(arm: Arm, loads: Sequence[float]) -> Iterator[Step]:
+def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
     """Table 1 of the paper for this robot: the posture that asks most of each joint."""
-    names, load = arm.robot.joint_names, loads[-1]
-    found = look(arm, arm.grid, ('level', 0.0), load)
+    arm, load, level = routes.arm, loads[-1], ('level', 0.0)
+    found = look(arm, arm.grid, level, load)
     for joint in arm.roles.axes:
-        use = found.use[:, names.index(joint)]
+        use = np.abs(found.share[:, arm.robot.joint_names.index(joint)])
+        within = safe(arm, found, SPARE) & routes.ways(level, load).reachable
         for title, rows in (
             ('worst posture of all', np.ones(len(use), bool)),
-            ('worst posture within limits', safe(arm, found, SPARE)),
+            ('worst posture within limits', within),
         ):
             if rows.any():
                 k = int(np.where(rows, use, -1.0).argmax())
@@ -100,88 +100,20 @@ def _worst_postures(arm: Arm, loads: Sequence[float]) -> Iterator[Step]:
                 )
 
 
-def _torque_boundary(arm: Arm, wanted: Wanted, loads: Sequence[float]) -> Iterator[Step]:
-    for load in loads[1:] or loads:
-        found = look(arm, arm.grid, ('level', 0.0), load)
-        for title, (low, high), where in (
-            ('just inside', INSIDE, ROBOT),
-            ('just outside', OUTSIDE, SIMULATION),
-        ):
-            rows = (found.most > low) & (found.most < high) & (found.tilt > math.radians(8.0))
-            purpose = f'the torque map says {title} at {load:g} kg: is the boundary where it says?'
-            setup = Setup('torque boundary', load, where=where)
-            yield from _spread(arm, found, rows, wanted.points, setup, f'torque {title}', purpose)
-
-
-def _orientations(arm: Arm, wanted: Wanted, loads: Sequence[float]) -> Iterator[Step]:
+def _orientations(routes: Routes, tilt: float, loads: Sequence[float]) -> Iterator[Step]:
     """Each orientation of Figure 6: the posture that leaves least of any margin, within limits."""
-    load = loads[len(loads) // 2]
+    arm, load = routes.arm, loads[len(loads) // 2]
     for name, orientation in ORIENTATIONS.items():
         if name == 'level':
             continue
-        found = look(arm, arm.grid, (name, wanted.tilt), load)
-        rows = safe(arm, found, SPARE)
+        found = look(arm, arm.grid, (name, tilt), load)
+        rows = safe(arm, found, SPARE) & routes.ways((name, tilt), load).reachable
         if not rows.any():
             continue
         k = int(np.where(rows, found.tilt, np.inf).argmin())
-        setup = Setup('orientations', load, (name, wanted.tilt))
+        setup = Setup('orientations', load, (name, tilt))
         purpose = f'least tilt left within limits, {orientation.words}: do IMU and map agree?'
         yield hold_step(arm, setup, found, k, orientation.words, purpose)
-
-
-def _tip_boundary(arm: Arm, wanted: Wanted, loads: Sequence[float]) -> Iterator[Step]:
-    """Both sides of the rollover map's boundaries, the arm turned to the low side."""
-    for name in ('nose-down', 'nose-up', 'right', 'left'):
-        turret = ORIENTATIONS[name].heading or 0.0
-        grid = arm.turned(arm.grid, turret)
-        grid = grid[arm.clear(grid)]
-        for title, (low, high), where in (
-            ('just inside', TILT_INSIDE, ROBOT),
-            ('beyond the limit', TILT_BEYOND, SIMULATION),
-            ('tips over', TILT_OVER, SIMULATION),
-        ):
-            best = _richest(arm, grid, name, wanted, loads, (low, high))
-            if best is None:
-                continue
-            load, tilt, found, rows = best
-            action = 'tip' if title == 'tips over' else 'hold'
-            setup = Setup('rollover boundary', load, (name, tilt), where, action)
-            text = f'rollover {title}, {ORIENTATIONS[name].words}'
-            purpose = f'the rollover map says "{title}": is the boundary where it says?'
-            count = max(1, wanted.points - 2)
-            yield from _spread(arm, found, rows, count, setup, text, purpose)
-
-
-def _richest(
-    arm: Arm,
-    grid: Floats,
-    name: str,
-    wanted: Wanted,
-    loads: Sequence[float],
-    band: tuple[float, float],
-) -> tuple[float, float, Found, Mask] | None:
-    """Return load, tilt, margins and rows for which most postures lie in the band (deg left)."""
-    found: list[tuple[int, float, float, Found, Mask]] = []
-    for load in loads:
-        for tilt in (wanted.tilt, (wanted.tilt + wanted.steep) / 2.0, wanted.steep):
-            seen = look(arm, grid, (name, tilt), load)
-            left = np.degrees(seen.tilt)
-            rows = (left > band[0]) & (left < band[1]) & (seen.most < 0.75)
-            if rows.any():
-                found.append((int(rows.sum()), load, tilt, seen, rows))
-    if not found:
-        return None
-    _, load, tilt, seen, rows = max(found, key=lambda f: f[0])
-    return load, tilt, seen, rows
-
-
-def _spread(
-    arm: Arm, found: Found, rows: Mask, count: int, setup: Setup, title: str, purpose: str
-) -> Iterator[Step]:
-    places = np.flatnonzero(rows)
-    names = [arm.robot.joint_names.index(n) for n in arm.roles.axes]
-    for number, k in enumerate(spread_out(found.q[places], count, names), 1):
-        yield hold_step(arm, setup, found, int(places[k]), f'{title} {number}', purpose)
 
 
 def _refused(arm: Arm, step: Step) -> Step:
@@ -195,46 +127,32 @@ def _refused(arm: Arm, step: Step) -> Step:
     return step.model_copy(update={'where': SIMULATION}) if fails else step
 
 
-def _routed(arm: Arm, steps: Sequence[Step], home: Floats) -> list[Step]:
+def _routed(routes: Routes, steps: Sequence[Step]) -> list[Step]:
     """Return the steps with the postures on the way; unreachable ones go to the simulation."""
     found: list[Step] = []
+    home = routes.home
     before, setup = home, None
     for step in steps:
         now = (step.ground, step.payload_kg)
         start = before if now == setup else home
-        if step.action in {'hold', 'tip', 'sweep', 'pull'}:
-            step = _with_way(arm, step, start, home)  # noqa: PLW2901 - the same step, its way known
-        before, setup = _vector(arm, home, step.posture_deg), now
+        if step.action in {'hold', 'tip', 'pull'}:
+            step = _with_way(routes, step, start)  # noqa: PLW2901 - the same step, its way known
+        before, setup = _vector(routes.arm, home, step.posture_deg), now
         found.append(step)
     return found
 
 
-def _with_way(arm: Arm, step: Step, start: Floats, home: Floats) -> Step:
-    if step.action == 'sweep':
-        return step
-    end = _vector(arm, home, step.posture_deg)
-    ground = step.ground.orientation, math.radians(step.ground.tilt_deg)
+def _with_way(routes: Routes, step: Step, start: Floats) -> Step:
     if step.where == SIMULATION:
         return step.model_copy(update={'via_deg': ()})
-    for middle in ((), (home,), *(((m,)) for m in _detours(arm, home, end))):
-        if safe_way(arm, [start, *middle, end], ground, step.payload_kg):
-            return step.model_copy(update={'via_deg': tuple(posture_deg(arm, m) for m in middle)})
-    return step.model_copy(
-        update={
-            'where': SIMULATION,
-            'via_deg': (),
-            'purpose': f'{step.purpose} (no safe way to it)',
-        }
-    )
-
-
-def _detours(arm: Arm, home: Floats, end: Floats) -> Iterator[Floats]:
-    """Yield postures between: one joint first, then the other."""
-    for name in (*arm.roles.axes, *([arm.roles.turret] if arm.roles.turret else [])):
-        k = arm.robot.joint_names.index(name)
-        between = home.copy()
-        between[k] = end[k]
-        yield between
+    arm = routes.arm
+    end = _vector(arm, routes.home, step.posture_deg)
+    ground = step.ground.orientation, math.radians(step.ground.tilt_deg)
+    middle = routes.between(start, end, ground, step.payload_kg)
+    if middle is not None:
+        return step.model_copy(update={'via_deg': tuple(posture_deg(arm, m) for m in middle)})
+    told = f'{step.purpose} (no safe way to it)'
+    return step.model_copy(update={'where': SIMULATION, 'via_deg': (), 'purpose': told})
 
 
 def _vector(arm: Arm, home: Floats, posture: Posture) -> Floats:

@@ -25,7 +25,7 @@ LIGHTER, HEAVIER = 0.9, 1.12
 # Share of the largest pull, friction of rubber on concrete, height (m) of the hitch.
 PULL, FRICTION, HITCH = 0.8, 0.8, 0.1
 # Speeds tried, as shares of the rate to which the static model holds.
-SLOWER, FASTER = 0.8, 1.3
+SLOWER, FASTER = 0.9, 1.2
 NO_FAULT = Alerts(must_not=('ERROR', 'STALE'))
 
 

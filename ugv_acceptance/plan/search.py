@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +107,11 @@ class Arm:
         turned[..., self.robot.joint_names.index(self.roles.turret)] = turret
         return turned
 
+    def turret(self, q: Floats) -> float:
+        """Return the turret's angle (rad) in a posture (j,); 0 without a turret."""
+        name = self.roles.turret
+        return 0.0 if name is None else float(q[self.robot.joint_names.index(name)])
+
     def clear(self, q: Floats) -> Mask:
         """Return whether arm and load stay above the ground and off the deck, q (..., j)."""
         points = self._points(q)
@@ -140,16 +144,19 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What the model says of postures `q` (n, j): `use` (n, j) of limits, `tilt` left (n,) rad."""
+    """What the model says of postures `q` (n, j).
+
+    `share` (n, j) is the torque over its limit with its sign, `tilt` (n,) what is left (rad).
+    """
 
     q: Floats
-    use: Floats
+    share: Floats
     tilt: Floats
 
     @property
     def most(self) -> Floats:
-        """Largest share of a torque limit (n,)."""
-        largest: Floats = self.use.max(axis=-1)
+        """Largest share of a torque limit (n,), whatever its sign."""
+        largest: Floats = np.abs(self.share).max(axis=-1)
         return largest
 
 
@@ -157,9 +164,9 @@ def look(arm: Arm, q: Floats, ground: tuple[str, float], load: float) -> Found:
     """Return the margins of postures on a ground (orientation, tilt in rad) with a load (kg)."""
     gravity = gravity_of(*ground, arm.robot.gravity)
     found = margins(arm.robot, q, gravity, Payload(load, arm.robot.payload.cog))
-    use = np.abs(found.torque) / np.array(arm.settings.limits.torque)
+    share = found.torque / np.array(arm.settings.limits.torque)
     tilt = np.nan_to_num(found.angle.min(axis=-1), nan=-math.pi)
-    return Found(q, use, tilt)
+    return Found(q, share, tilt)
 
 
 def safe(arm: Arm, found: Found, spare: float = 0.0) -> Mask:
@@ -168,15 +175,6 @@ def safe(arm: Arm, found: Found, spare: float = 0.0) -> Mask:
     use, tilt = limits.torque_error - spare, limits.tip_error + spare * math.radians(20.0)
     good: Mask = (found.most < use) & (found.tilt > tilt)
     return good
-
-
-def safe_way(arm: Arm, ways: Sequence[Floats], ground: tuple[str, float], load: float) -> bool:
-    """Return whether straight motions through these postures pass no ERROR limit and keep clear."""
-    for start, end in pairwise(ways):
-        path = start + np.linspace(0.0, 1.0, PATH)[:, None] * (end - start)
-        if not (safe(arm, look(arm, path, ground, load)).all() and arm.clear(path).all()):
-            return False
-    return True
 
 
 def spread_out(q: Floats, count: int, names: Sequence[int]) -> list[int]:

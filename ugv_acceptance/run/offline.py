@@ -182,7 +182,7 @@ class OfflineCommands:
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
-        self.world.virtual.remote.tilt(tilt, heading, rate)
+        self.world.virtual.tilt(tilt, heading, rate)
 
     def load(self, mass: float) -> None:
         """Put a load (kg) into the hand."""

@@ -13,7 +13,8 @@ import numpy as np
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.plan import SIMULATION, Step, vector_of
-from ugv_acceptance.plan.search import Arm, roles_of, safe_way
+from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.ways import safe_way
 from ugv_acceptance.run.folder import RunFolder
 from ugv_acceptance.run.hands import SIM, Hands
 from ugv_acceptance.run.moving import REFUSED, Moves, holds

@@ -75,6 +75,15 @@ class VirtualRobot:
         self.epoch += nanoseconds
         self._driver = replace(self._driver, epoch=self.epoch)
 
+    def tilt(self, tilt: float, heading: float, rate: float) -> None:
+        """Tilt the ground: rad, down towards `heading` (rad from the robot's front), at a rate.
+
+        A robot that has turned is put onto the ramp as a person puts it there.
+        """
+        x, y, z, w = self.remote.simulation.imu()[0]
+        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        self.remote.tilt(tilt, heading + yaw, rate)
+
     def step(self) -> None:
         """Simulate one period of the IMU; what is sent waits until it is due."""
         self.remote.advance(self.tick)

@@ -1,0 +1,138 @@
+"""Ways of the arm that pass no limit: which postures can be reached from home, and how."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import breadth_first_order
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.plan.search import PATH, STEP_DEG, Arm, Mask, look, safe
+
+# Neither the start nor any other place: no place before it.
+_NOWHERE = -9999
+
+
+@dataclass(frozen=True)
+class Ways:
+    """The safe postures of a grid `q` (n, j) around `home` (j,), step by step to the next.
+
+    `ground` is orientation and tilt (rad), `load` in kg. `home` need not be in the grid.
+    """
+
+    arm: Arm
+    q: Floats
+    home: Floats
+    ground: tuple[str, float]
+    load: float
+
+    @cached_property
+    def _tree(self) -> NDArray[np.intp]:
+        """For each posture the one before it on the shortest way from home (n,)."""
+        good = safe(self.arm, look(self.arm, self.q, self.ground, self.load))
+        names = [self.arm.robot.joint_names.index(n) for n in self.arm.roles.axes]
+        cell = np.round(np.degrees(self.q[:, names]) / STEP_DEG).astype(int)
+        cell -= cell.min(axis=0) - 1
+        number = np.full(cell.max(axis=0) + 2, -1)
+        number[tuple(cell[good].T)] = np.flatnonzero(good)
+        edges = []
+        for step in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            other = number[tuple((cell[good] + step).T)]
+            there = other >= 0
+            edges.append(np.stack([np.flatnonzero(good)[there], other[there]]))
+        rows, columns = np.concatenate(edges, axis=1)
+        graph = csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(good),) * 2)
+        start = int(np.abs(self.q - self.home)[:, names].max(axis=1).argmin())
+        before: Any = breadth_first_order(graph, start, directed=False)[1]
+        before[start] = start
+        found: NDArray[np.intp] = before
+        return found
+
+    @property
+    def reachable(self) -> Mask:
+        """Which postures can be reached from home without passing a limit (n,)."""
+        found: Mask = self._tree != _NOWHERE
+        return found
+
+    def to(self, end: Floats) -> list[Floats]:
+        """Return the few postures (j,) between home and `end`; empty: there is no safe way."""
+        k = int(np.abs(self.q - end).max(axis=1).argmin())
+        if np.abs(self.q[k] - end).max() > 1e-6 or not self.reachable[k]:
+            return []
+        trail = [k]
+        while self._tree[trail[-1]] != trail[-1]:
+            trail.append(int(self._tree[trail[-1]]))
+        return self._shortened([self.home, *(self.q[i] for i in reversed(trail))])
+
+    def _shortened(self, way: list[Floats]) -> list[Floats]:
+        """Leave out what a straight motion can skip; empty where the first leg is not safe."""
+        kept, at = [], 0
+        while at < len(way) - 1:
+            farthest = next(
+                (k for k in range(len(way) - 1, at, -1) if self._straight(way[at], way[k])), None
+            )
+            if farthest is None:
+                return []
+            kept.append(way[farthest])
+            at = farthest
+        return kept[:-1]
+
+    def _straight(self, start: Floats, end: Floats) -> bool:
+        return safe_way(self.arm, (start, end), self.ground, self.load)
+
+
+def safe_way(arm: Arm, ways: Sequence[Floats], ground: tuple[str, float], load: float) -> bool:
+    """Return whether straight motions through these postures pass no ERROR limit and keep clear."""
+    for start, end in pairwise(ways):
+        path = start + np.linspace(0.0, 1.0, PATH)[:, None] * (end - start)
+        if not (safe(arm, look(arm, path, ground, load)).all() and arm.clear(path).all()):
+            return False
+    return True
+
+
+def detours(arm: Arm, start: Floats, home: Floats, end: Floats) -> Iterator[list[Floats]]:
+    """Yield postures between two: none; home; one joint of the end's, the others as before."""
+    yield []
+    yield [home]
+    for name in (*arm.roles.axes, *([arm.roles.turret] if arm.roles.turret else [])):
+        k = arm.robot.joint_names.index(name)
+        for before in (start, home):
+            between = before.copy()
+            between[k] = end[k]
+            yield [between] if before is start else [home, between]
+
+
+@dataclass(slots=True)
+class Routes:
+    """Finds ways from `home` (j,), remembering what was found for a ground, load and turret."""
+
+    arm: Arm
+    home: Floats
+    _known: dict[tuple[tuple[str, float], float, float], Ways] = field(default_factory=dict)
+
+    def ways(self, ground: tuple[str, float], load: float, turret: float = 0.0) -> Ways:
+        """Return the safe postures of the grid with the turret at an angle (rad)."""
+        key = (ground, load, turret)
+        if key not in self._known:
+            q, home = (self.arm.turned(x, turret) for x in (self.arm.grid, self.home))
+            self._known[key] = Ways(self.arm, q[self.arm.clear(q)], home, ground, load)
+        return self._known[key]
+
+    def between(
+        self, start: Floats, end: Floats, ground: tuple[str, float], load: float
+    ) -> list[Floats] | None:
+        """Return postures on a safe way from `start` to `end` (j,), as few as are found."""
+        for middle in detours(self.arm, start, self.home, end):
+            if safe_way(self.arm, [start, *middle, end], ground, load):
+                return middle
+        ways = self.ways(ground, load, self.arm.turret(end))
+        found = ways.to(end)
+        for middle in ([self.home, ways.home, *found], [ways.home, *found]):
+            if found and safe_way(self.arm, [start, *middle, end], ground, load):
+                return middle
+        return None
