@@ -15,6 +15,7 @@ GRAVE = ('serious', 'critical')
 
 def seek(page: Page, seconds: float) -> None:
     """Pause the recording at a time and wait until the page shows it."""
+    page.wait('!!window.console_page?.frame')
     for words in ({'do': 'pause'}, {'do': 'seek', 'to_s': seconds}):
         page.run(f'console_page.socket.send({json.dumps(json.dumps(words))})')
     at = 'console_page.frame.playback.position_s'

@@ -54,6 +54,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     skeleton = skeleton_of(figure, snapshot.q, snapshot.gravity, snapshot.payload)
     return {
         'time_s': snapshot.time / 1e9,
+        'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
         'level': LEVELS[level],
         'word': WORDS[level],
         'cause': cause,

@@ -27,7 +27,10 @@ _ANSWERS = 32
 
 @dataclass(slots=True, eq=False)
 class Client:
-    """One page or terminal: the newest frame and map it has not taken yet, and answers to it."""
+    """One page or terminal: the newest frame and map it has not taken yet, and answers to it.
+
+    `sending` is since when (s) something is on its way to it, infinite where nothing is.
+    """
 
     axes: tuple[str, str]
     frame: str | None = None
@@ -35,6 +38,8 @@ class Client:
     answers: deque[str] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
     shown: MapKey | None = None
     ready: asyncio.Event = field(default_factory=asyncio.Event)
+    sending: float = math.inf
+    server: 'asyncio.Task[None] | None' = None
 
     def take(self) -> list[str]:
         """Return what waits, and forget it: answers, then the map, then the frame."""
@@ -68,6 +73,7 @@ class Hub:
         while True:
             self._snapshot = self.feed.snapshot()
             if self.clients:
+                self._let_go(clock() - PATIENCE)
                 self._offer_frame()
                 if clock() >= self._map_due:
                     self._map_due = clock() + MAP
@@ -75,6 +81,12 @@ class Hub:
             # Late frames are left out, not made up for.
             due = max(due + FRAME, clock())
             await asyncio.sleep(due - clock())
+
+    def _let_go(self, since: float) -> None:
+        """End the service of clients that have taken nothing since then."""
+        for client in self.clients:
+            if client.sending < since and client.server is not None:
+                client.server.cancel()
 
     def _offer_frame(self) -> None:
         self.sent += 1
@@ -111,10 +123,13 @@ class Hub:
 
     async def serve(self, client: Client, send: Callable[[str], Awaitable[None]]) -> None:
         """Send a client what there is until it is gone or takes nothing any more."""
+        client.server, clock = asyncio.current_task(), asyncio.get_running_loop().time
         while True:
             await client.ready.wait()
             for text in client.take():
-                await asyncio.wait_for(send(text), PATIENCE)
+                client.sending = clock()
+                await send(text)
+            client.sending = math.inf
 
     def ask(self, client: Client, text: str) -> None:
         """Do what a client asks (JSON with `do`); it is answered, whatever it sent."""

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.alerts import STALE
-from ugv_acceptance.evaluation.imu import NOWHERE, Vector
+from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, UNKNOWN
 
@@ -53,7 +53,7 @@ class Snapshot:
     `level` is that of the verdict. Where the margins are not `known`, `problem` may say why and the
     numbers are NaN. `torque` (N m; N), `angle` (rad) the tilt left to each of SIDES, `state` a
     number in STATES, `effort` what the motors measure, `hints` what else
-    the operator should know, in words.
+    the operator should know, in words. `stamp` (ns) is in the header of the newest message.
     """
 
     time: int
@@ -70,3 +70,4 @@ class Snapshot:
     alerts: tuple[AlertRow, ...] = ()
     inputs: tuple[InputRow, ...] = ()
     hints: tuple[str, ...] = ()
+    stamp: int | None = None

@@ -1,28 +1,29 @@
 """The console's live feed: the monitor's word on the robot, and the inputs it speaks of.
 
 The verdict and the alerts are the monitor's: if it falls silent there are NO DATA. What is drawn is
-computed here from the same inputs by the same code, so that a page costs the monitor nothing.
+computed here from the same inputs by the same code, so that a page costs the monitor nothing. What
+came is taken in bursts, just before it is shown: a thread that wakes for each message would cost
+twice as much, and show it no sooner.
 """
 
+import gc
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from queue import Empty, SimpleQueue
-from threading import Thread
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.config import Config
 from ugv_acceptance.console.alert_book import AlertBook
-from ugv_acceptance.console.hearing import Heartbeat, hints_of
+from ugv_acceptance.console.hearing import Heartbeat, Newest, attitude_given, hints_of, joints_named
 from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.snapshot import NO_LOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
@@ -32,22 +33,21 @@ from ugv_acceptance.nodes.faults import what_to_do
 from ugv_acceptance.nodes.inputs import Inputs, qos_of
 from ugv_acceptance.nodes.operating import DOINGS, SHELVED
 from ugv_acceptance.nodes.outputs import LATCHED
-from ugv_acceptance.nodes.running import Stop, ros, spin
+from ugv_acceptance.nodes.receipt import ReceiptClock
+from ugv_acceptance.nodes.running import ros
 from ugv_acceptance.nodes.session import Session
 
 MONITOR = 'acceptance_monitor'
-# Seconds between snapshots: shorter than between frames, or each would wait for the next.
-PERIOD = 0.02
-# Seconds without a verdict (it comes each second), without margins while inputs arrive, without a
-# snapshot of our own, after which nothing that was said counts any more.
+# Seconds without a verdict (it comes each second), and without margins while inputs arrive, after
+# which nothing that was said counts any more.
 VERDICT_SILENCE = 2.5
 MARGIN_SILENCE = 0.5
-OWN_SILENCE = 0.5
-_DEPTH = 100
+# Messages of an input that may wait for the next snapshot.
+_DEPTH = 400
 
 
 class ConsoleNode(Node):
-    """Listens to a robot and its monitor. `latest` is replaced, never changed."""
+    """Listens to a robot and its monitor whenever a snapshot is asked for; has no thread."""
 
     def __init__(self, config: Config) -> None:
         super().__init__('acceptance_console')
@@ -57,10 +57,21 @@ class ConsoleNode(Node):
         self.said: dict[str, str] = {}
         self.heard, self.margins = Heartbeat(), Heartbeat()
         self.session = Session(
-            self.settings, lambda _stamp, _margins: None, self._take_own, self._complain
+            self.settings,
+            lambda _stamp, _margins: None,
+            self._take_own,
+            self._complain,
+            ReceiptClock(bool(self.get_parameter('use_sim_time').value)),
         )
-        self._inputs = Inputs(self, config.topics, self.session, _DEPTH)
-        self._asked: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        session = self.session
+        self._heard = {
+            'joint_states': Newest(session.take_joint_state, joints_named()),
+            'imu': Newest(session.take_imu, attitude_given(self.settings.imu)),
+        }
+        session.take_joint_state = self._heard['joint_states']
+        session.take_imu = self._heard['imu']
+        self._inputs = Inputs(self, config.topics, session, _DEPTH)
+        self._due = 0.0
         self._load: InertiaStamped | None = None
         self._load_out: Any = None
         self._known_since: float | None = None
@@ -70,12 +81,8 @@ class ConsoleNode(Node):
             JointState, f'{MONITOR}/stability', lambda _: self._beat(), 10, raw=True
         )
         self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(PERIOD, self._every_frame, clock=steady)
-        self.create_timer(1.0, self._every_second, clock=steady)
-        self.latest: tuple[float, Snapshot] = (time.monotonic(), Snapshot(time.time_ns()))
-
-    # The feed, called from the server's thread
+        self._executor, self._never = EventsExecutor(), Future()
+        self._executor.add_node(self)
 
     def describe(self) -> dict[str, Any]:
         """Return where the numbers come from."""
@@ -87,19 +94,24 @@ class ConsoleNode(Node):
         return {}
 
     def snapshot(self) -> Snapshot:
-        """Return the newest snapshot; NO DATA where our own thread stands still."""
-        made, found = self.latest
-        if time.monotonic() - made <= OWN_SILENCE:
-            return found
-        return Snapshot(
-            time.time_ns(), problem='the console no longer hears ROS', alerts=found.alerts
-        )
+        """Take what has come since the last time, and return what is known now."""
+        self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
+        for name, newest in self._heard.items():
+            replaced = newest.hand_on()
+            self.session.counts[name].taken += replaced
+        now, clock = time.monotonic(), self.session.clock
+        if clock.simulated:
+            clock.follow(clock.now(), self.get_clock().now().nanoseconds)
+        if now >= self._due:
+            self._due = now + 1.0
+            self._every_second()
+        self.session.tick()
+        return self._look(now)
 
     def command(self, do: str, values: dict[str, Any]) -> str:
         """Do about alerts what the monitor offers, or declare a payload; BadSample for else."""
         if do in DOINGS:
-            message = self._operation(do, values)
-            self._asked.put(lambda: self._hand.publish(message))
+            self._hand.publish(self._operation(do, values))
             return f'asked the monitor: {do}'
         if do == 'payload':
             return self._declare(values)
@@ -131,10 +143,8 @@ class ConsoleNode(Node):
         message.header.frame_id = link
         message.inertia.m = mass
         message.inertia.com.x, message.inertia.com.y, message.inertia.com.z = com
-        self._asked.put(lambda: self._carry(message))
+        self._carry(message)
         return f'declared {mass:g} kg'
-
-    # In the node's own thread
 
     def _carry(self, message: InertiaStamped) -> None:
         topic = self.config.topics.payload
@@ -177,16 +187,6 @@ class ConsoleNode(Node):
         self._inputs.look_around([])
         self.session.measure_rates()
         self._say_load()
-
-    def _every_frame(self) -> None:
-        try:
-            while True:
-                self._asked.get_nowait()()
-        except Empty:
-            pass
-        self.session.tick()
-        now = time.monotonic()
-        self.latest = (now, self._look(now))
 
     def _problem(self, now: float) -> str:
         """Return why nothing may be believed; '' where the monitor is heard."""
@@ -236,6 +236,7 @@ class ConsoleNode(Node):
             alerts=told,
             inputs=inputs,
             hints=hints_of(self.said),
+            stamp=margins.stamp,
         )
 
     def _newest(self, row: AlertRow) -> AlertRow:
@@ -274,17 +275,22 @@ class ConsoleNode(Node):
             '; '.join(sentences) or optional,
         )
 
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.remove_node(self)
+        self._executor.shutdown()
+        self.destroy_node()
+
 
 @contextmanager
 def live_feed(config: Config, args: list[str] | None = None) -> Iterator[ConsoleNode]:
-    """Run the console's node in a thread of its own."""
+    """Run the console's node for as long as it is asked for snapshots."""
     with ros(args):
-        node, stop = ConsoleNode(config), Stop()
-        thread = Thread(target=spin, args=(node, stop), name='ros')
-        thread.start()
+        node = ConsoleNode(config)
+        # What is there now stays: the garbage collector need not look through it between frames.
+        gc.collect()
+        gc.freeze()
         try:
             yield node
         finally:
-            stop.asked = True
-            thread.join()
-            node.destroy_node()
+            node.close()

@@ -133,6 +133,10 @@ def _equal_steps(robot: Robot, grid: Grid) -> bool:
 
 def _by_rows(count: int, workers: int, run: Callable[[slice], None]) -> None:
     blocks = [slice(k, min(k + _ROWS, count)) for k in range(0, count, _ROWS)]
+    if min(workers, len(blocks)) == 1:
+        for block in blocks:
+            run(block)
+        return
     with ThreadPoolExecutor(workers) as pool:
         list(pool.map(run, blocks))
 
