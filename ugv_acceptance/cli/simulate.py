@@ -41,10 +41,11 @@ def simulate(
     The exit code is 0 once it is recorded, tipped over or not; `evaluate` judges the recording.
 
     \b
-    Scenarios: gentle, overreach (fixed); work, tilt, swing, reach, grasp, dash (drawn by --seed);
-    fault-KIND (gentle with a fault) for every KIND of fault:
+    Scenarios: gentle, overreach, fetch (fixed); work, tilt, swing, reach, grasp, snatch, dash,
+    climb (drawn by --seed); fault-KIND (gentle with a fault) for every KIND of fault:
     dropped, late, reordered, duplicated, dead, nan, dead-encoder, frozen-encoder, effort-missing,
-    imu-bias, wrong-mounting, identity-orientation, clock-jump, heavy-payload, weak-motor.
+    imu-bias, wrong-mounting, identity-orientation, clock-jump, second-publisher, heavy-payload,
+    weak-motor.
 
     \b
     Examples:

@@ -248,6 +248,7 @@ class RecordedEvaluator:
             feed(error, time, worse)
         state = rows.state if all_known else rows.state[rows.known]
         feed(self.watch.support, time, state >= NO_CONTACT)
+        self.watch.foresee_rows(rows)
 
 
 def _product(lever: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

@@ -1,10 +1,15 @@
 """The rules of an evaluation and their signals: what is watched, live and in a recording alike."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from ugv_acceptance.evaluation.alerts import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.foresight import Foresight, foresight_of
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
+
+if TYPE_CHECKING:
+    from ugv_acceptance.evaluation.rows import MarginRows
 
 # Alerts of level ERROR with these codes are failures of the robot; all others are of the input.
 FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
@@ -33,6 +38,7 @@ class Watch:
     missing: Signal = field(init=False)
     leaps: list[Signal] = field(init=False)
     attitude: 'AttitudeSignals' = field(init=False)
+    foresight: Foresight = field(init=False)
 
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
@@ -59,6 +65,18 @@ class Watch:
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
         self.leaps = [self._leap(name) for name in names]
         self.attitude = self._attitude()
+        self.foresight = foresight_of(self.settings, self._warning)
+
+    def foresee(self) -> None:
+        """Judge what live samples gave the foresight; before time passes."""
+        self.foresight.judge(self.settings.limits.torque)
+
+    def foresee_rows(self, rows: 'MarginRows') -> None:
+        """Judge what a stretch of a recording gives the foresight."""
+        self.foresight.rows(rows, self.settings.limits.torque)
+
+    def _warning(self, code: str, subject: str, at: tuple[float, float], delay: float) -> Signal:
+        return self._signal(code, subject, WARN, at, delay)
 
     def _signal(
         self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
@@ -119,7 +137,7 @@ class Watch:
         of = self.attitude
         attitude = [of.frame, of.orientation, of.strange, of.disagreement]
         faults = [self.support, self.payload, self.missing, *attitude]
-        return [*pairs, *self.speed, *self.leaps, *inputs, *faults]
+        return [*pairs, *self.speed, *self.leaps, *inputs, *faults, *self.foresight.signals()]
 
 
 @dataclass(frozen=True, slots=True)

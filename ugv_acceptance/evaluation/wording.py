@@ -23,6 +23,26 @@ WORDS = {
         '{subject} moves at {peak:.2f} {rate}; the static model was shown to hold to {limit:.2f}',
         'move the joint more slowly',
     ),
+    'TIP_AHEAD': (
+        'tips to the {subject} within {seconds:.1f} s if it goes on like this',
+        'stop the motion that brings it there',
+    ),
+    'TORQUE_AHEAD': (
+        '{subject} is at its limit within {seconds:.1f} s if it goes on like this',
+        'stop the motion that brings it there',
+    ),
+    'EFFORT_LIMIT': (
+        'the motor of {subject} gives {peak:.1f} {unit}; its limit is {torque:.1f} {unit}',
+        'move the joint more slowly, bring the load closer, or set it down',
+    ),
+    'MOTOR_WEAK': (
+        'the motor of {subject} gives no more, below its limit, while its posture needs more',
+        'set the load down; check the supply and the motor, or the limit in the configuration',
+    ),
+    'ENCODER_FROZEN': (
+        '{subject} does not move at all while its effort changes',
+        'check its encoder; else something blocks the joint or pulls at it',
+    ),
     'INPUT_STALE': (
         'no message from {subject}',
         'check that its driver runs, its topic name and its quality of service',
@@ -74,7 +94,7 @@ def describe(alert: Alert, settings: Settings) -> str:
     if rule.subject in settings.robot.joint_names:
         turning = settings.robot.joint(rule.subject).kind != 'prismatic'
     if rule.code == 'TORQUE_LIMIT':
-        limit = settings.limits.torque[settings.robot.joint_names.index(rule.subject)]
+        limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
     return WORDS[rule.code][0].format(
@@ -85,8 +105,16 @@ def describe(alert: Alert, settings: Settings) -> str:
         rate='rad/s' if turning else 'm/s',
         tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
+        seconds=-peak,
+        torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
     )
+
+
+def _torque(subject: str, settings: Settings) -> float:
+    """Return the limit (N m; N) of a joint; infinite for what is none."""
+    names = settings.robot.joint_names
+    return settings.limits.torque[names.index(subject)] if subject in names else math.inf
 
 
 def tilt_left(degrees: float) -> str:

@@ -17,6 +17,8 @@ from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Scenario
 DELAY, JITTER = 0.0003, 0.0004
 # A message that is overtaken comes this much (s) later: after a few of the next ones.
 OVERTAKEN = 0.02
+# Another publisher's message comes this much (s) after ours.
+BEHIND = 0.001
 
 
 def weakened(robot: Robot, faults: Sequence[Fault]) -> Robot:
@@ -48,14 +50,15 @@ def overloaded(scenario: Scenario, factor: float) -> Scenario:
 
 @dataclass(slots=True)
 class Corruption:
-    """Faults at work; it remembers what a frozen encoder told last."""
+    """Faults at work; it remembers what a frozen encoder told last, and where others stand."""
 
     faults: tuple[Fault, ...]
     joint_names: tuple[str, ...]
     _frozen: dict[Fault, float] = field(default_factory=dict)
+    _others: dict[tuple[Fault, str], tuple[Floats, ...]] = field(default_factory=dict)
 
     def joints(self, log: JointLog) -> JointLog:
-        """Return what the encoders say."""
+        """Return what the encoders say, those of another robot included."""
         position, velocity = log.position.copy(), log.velocity.copy()
         for fault in self.faults:
             rows = _during(fault, log.stamp)
@@ -65,10 +68,11 @@ class Corruption:
                 position[rows, j], velocity[rows, j] = last, 0.0
             elif fault.kind == 'nan' and fault.hits('joint_states'):
                 position[rows] = np.nan
-        return JointLog(log.stamp, position, velocity, log.effort)
+        told = self._joined('joint_states', log.stamp, (position, velocity, log.effort))
+        return JointLog(*told)
 
     def imu(self, log: ImuLog) -> ImuLog:
-        """Return what the IMU says."""
+        """Return what the IMU says, that of another robot included."""
         orientation, rate = log.orientation.copy(), log.angular_velocity.copy()
         force = log.linear_acceleration.copy()
         for fault in self.faults:
@@ -83,7 +87,26 @@ class Corruption:
                 orientation[rows] = _turned(orientation[rows], np.radians(fault.amount))
                 rate[rows] = _seen_turned(rate[rows], np.radians(fault.amount))
                 force[rows] = _seen_turned(force[rows], np.radians(fault.amount))
-        return ImuLog(log.stamp, orientation, rate, force)
+        return ImuLog(*self._joined('imu', log.stamp, (orientation, rate, force)))
+
+    def _joined(
+        self, source: str, stamp: Floats, columns: tuple[Floats, ...]
+    ) -> tuple[Floats, ...]:
+        """Return stamps and columns with the messages of another robot, each just behind ours."""
+        for fault in self.faults:
+            rows = _during(fault, stamp)
+            if fault.kind != 'second-publisher' or not fault.hits(source) or not rows.any():
+                continue
+            first = tuple(column[rows.argmax()] for column in columns)
+            others = self._others.setdefault((fault, source), first)
+            order = np.argsort(np.concatenate((stamp, stamp[rows] + BEHIND)), kind='stable')
+            count = int(rows.sum())
+            columns = tuple(
+                np.concatenate((ours, np.tile(theirs, (count, 1))))[order]
+                for ours, theirs in zip(columns, others, strict=True)
+            )
+            stamp = np.concatenate((stamp, stamp[rows] + BEHIND))[order]
+        return (stamp, *columns)
 
     def missing(self, time: float) -> tuple[tuple[str, ...], bool]:
         """Return the joints missing from a message at `time` (s), and whether efforts are."""

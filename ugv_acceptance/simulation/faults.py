@@ -44,6 +44,7 @@ KINDS: dict[str, Kind] = {
     ),
     'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
     'clock-jump': Kind('header stamps are off by seconds', 'input', -5.0, -1e8, 1e8),
+    'second-publisher': Kind('another robot that stands still publishes as well', 'input'),
     'heavy-payload': Kind('the load is heavier than declared by a factor', '', 2.0, 0.0, 100.0),
     'weak-motor': Kind('a motor gives a share of its torque', 'joint', 0.6, 0.0, 1.0),
 }

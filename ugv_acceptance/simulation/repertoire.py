@@ -6,7 +6,7 @@ simulation's truth does.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi, radians
+from math import atan, pi, radians
 
 import numpy as np
 
@@ -16,12 +16,15 @@ from ugv_acceptance.model.stability import margins
 from ugv_acceptance.model.statics import gripper_point
 from ugv_acceptance.simulation.scenario import Command, Scenario
 from ugv_acceptance.simulation.scenarios import STOWED
+from ugv_acceptance.simulation.shape import Block, ramp, stairs, step, wheel_contacts
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
 # Margins that a quiet shift keeps: tilt left (rad), share of the torque limit, grip height (m).
 CALM_TILT, CALM_TORQUE, LOWEST = radians(18.0), 0.62, 0.08
 # Postures of a motion that are looked at.
 _PATH = 17
+# Share of quiet shifts with a low obstacle ahead, and how high (m) it is at most.
+_UNEVEN, _TOP = 0.3, 0.1
 
 Rng = np.random.Generator
 Kind = Callable[[Robot, Rng, float], Scenario]
@@ -29,10 +32,14 @@ Kind = Callable[[Robot, Rng, float], Scenario]
 
 @dataclass(frozen=True, slots=True)
 class Poses:
-    """Draws postures (name, rad) of the arm; the flippers stay folded back."""
+    """Draws postures (name, rad) of the arm; the flippers stay folded back.
+
+    The grip stays `lowest` (m) above the ground.
+    """
 
     robot: Robot
     rng: Rng
+    lowest: float = LOWEST
 
     def anywhere(self) -> Floats:
         """Return a posture (j,) whose grip is above the ground and clear of the deck."""
@@ -42,7 +49,7 @@ class Poses:
                 shoulder_joint=self.rng.uniform(radians(10), radians(150)),
                 elbow_joint=self.rng.uniform(radians(-150), radians(90)),
             )
-            if gripper_point(self.robot, q)[2] > LOWEST:
+            if gripper_point(self.robot, q)[2] > self.lowest:
                 return q
 
     def vector(self, **angles: float) -> Floats:
@@ -56,18 +63,22 @@ class Poses:
 
     def calm(self, start: Floats, load: Payload, tilt: float) -> Floats | None:
         """Return a posture to which the way from `start` keeps large margins; None: none found."""
-        heads = np.array([gravity_on_slope(self.robot.gravity, tilt, h) for h in _headings()])
-        limit = np.array([self.robot.joint(n).effort for n in self.robot.joint_names])
         for _ in range(40):
             end = self.anywhere()
             path = start + np.linspace(0.0, 1.0, _PATH)[:, None] * (end - start)
-            if (gripper_point(self.robot, path)[:, 2] < LOWEST).any():
+            if (gripper_point(self.robot, path)[:, 2] < self.lowest).any():
                 continue
-            found = margins(self.robot, path[:, None, :], heads, load)
-            share = (np.abs(found.torque) / limit).max()
-            if found.angle.min() > CALM_TILT and share < CALM_TORQUE:
+            if self.keeps(path, load, tilt):
                 return end
         return None
+
+    def keeps(self, path: Floats, load: Payload, tilt: float) -> bool:
+        """Return whether postures (n, j) keep large margins on a slope to whatever side."""
+        heads = np.array([gravity_on_slope(self.robot.gravity, tilt, h) for h in _headings()])
+        limit = np.array([self.robot.joint(n).effort for n in self.robot.joint_names])
+        found = margins(self.robot, path[:, None, :], heads, load)
+        share = (np.abs(found.torque) / limit).max()
+        return bool(found.angle.min() > CALM_TILT and share < CALM_TORQUE)
 
 
 def _headings() -> Floats:
@@ -75,31 +86,47 @@ def _headings() -> Floats:
 
 
 def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """Arm, tracks and ground move as in a quiet shift: every margin stays large."""
-    poses = Poses(robot, rng)
-    load = Payload(float(rng.uniform(0.0, 1.5)), robot.payload.cog)
+    """Arm, tracks, load and ground change as in a quiet shift: every margin stays large."""
+    blocks, lean = _obstacle(robot, rng, 0.03) if rng.random() < _UNEVEN else ((), 0.0)
+    poses = Poses(robot, rng, LOWEST + (_TOP if blocks else 0.0))
+    full = Payload(float(rng.uniform(0.0, 1.5)), robot.payload.cog)
     tilt = float(rng.uniform(0.0, radians(6.0)))
-    now, q = 2.0, poses.vector()
+    load, now, q = full, 2.0, poses.vector()
     commands: list[Command] = []
     while now < seconds - 12.0:
-        act = rng.integers(4)
+        act = rng.integers(5)
         if act == 0:
             drive = float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))
             commands += [Command(now, drive=drive), Command(now + 2.0, drive=(0.0, 0.0))]
-            now += 3.0
+            now += 3.5
         elif act == 1:
             heading = float(rng.uniform(-pi, pi))
             commands.append(Command(now, slope=(0.0, 0.0), slope_rate=0.04))
             commands.append(Command(now + 4.5, slope=(tilt, heading), slope_rate=0.04))
             now += 9.0
+        elif act == 2 and poses.keeps(q[None], full, tilt + lean):
+            load = Payload(0.0, full.cog) if load.mass else full
+            commands.append(Command(now, payload=load, payload_time=1.0))
+            now += 2.0
         else:
-            end = poses.calm(q, load, tilt)
+            end = poses.calm(q, load, tilt + lean)
             speed = float(rng.uniform(0.15, 0.5))
             if end is not None:
                 commands.append(Command(now, joints=poses.named(end), speed=speed))
                 now += float(np.abs(end - q).max()) * pi / (2.0 * speed) + 0.5
                 q = end
-    return Scenario('work', seconds, STOWED, (0.0, 0.0), load, tuple(commands))
+    return Scenario(
+        'work', seconds, STOWED, (0.0, 0.0), full, tuple(commands), blocks=blocks, lean=lean
+    )
+
+
+def _obstacle(robot: Robot, rng: Rng, height: float) -> tuple[tuple[Block, ...], float]:
+    """Return a step, stairs or a ramp ahead, up to `height` (m) a stair, and the lean it gives."""
+    half = max(c.position[0] for c in wheel_contacts(robot))
+    rise, at = float(rng.uniform(0.5, 1.0)) * height, float(rng.uniform(0.5, 0.8))
+    lean = atan(rise / half) + radians(1.0)
+    made = ((step(at, rise),), stairs(at, rise, 0.35, 3), (ramp(at, lean, 0.75),))
+    return made[rng.integers(3)], lean
 
 
 def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
@@ -145,7 +172,16 @@ def reach(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def grasp(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm is stretched out over the side; it takes a load, declared when it is taken."""
+    """The arm is stretched out over the side; it lifts a load, declared when it is gripped."""
+    return _grasp(robot, rng, seconds, float(rng.uniform(0.5, 1.5)))
+
+
+def snatch(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """The arm is stretched out over the side; a load is in the hand all at once."""
+    return _grasp(robot, rng, seconds, 0.0)
+
+
+def _grasp(robot: Robot, rng: Rng, seconds: float, lifting: float) -> Scenario:
     poses = Poses(robot, rng)
     side = float(rng.choice([-1.0, 1.0])) * rng.uniform(radians(60), radians(120))
     q = poses.vector(
@@ -153,7 +189,7 @@ def grasp(robot: Robot, rng: Rng, seconds: float) -> Scenario:
         shoulder_joint=radians(rng.uniform(20, 60)),
         elbow_joint=radians(rng.uniform(-50, 0)),
     )
-    take = Command(5.0, payload=_load(robot, rng, 1.0, 6.0))
+    take = Command(5.0, payload=_load(robot, rng, 1.0, 6.0), payload_time=lifting)
     empty, slope = Payload(0.0, robot.payload.cog), (radians(rng.uniform(0, 12)), side)
     return Scenario('grasp', seconds, poses.named(q), slope, empty, (take,))
 
@@ -168,8 +204,24 @@ def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     commands: list[Command] = []
     for begin in np.arange(3.0, seconds - 2.0, 3.0).tolist():
         speed = float(rng.uniform(0.5, 1.8)) * float(rng.choice([-1.0, 1.0]))
-        commands += [Command(begin, drive=(speed, 0.0)), Command(begin + 1.0, drive=(0.0, 0.0))]
+        commands.append(Command(begin, drive=(speed, 0.0), drive_rate=3.0))
+        commands.append(Command(begin + 1.0, drive=(0.0, 0.0), drive_rate=15.0))
     return Scenario('dash', seconds, poses.named(q), slope, load, tuple(commands))
+
+
+def climb(robot: Robot, rng: Rng, seconds: float) -> Scenario:
+    """The arm back or to a side with a load, it climbs a step, stairs or a ramp."""
+    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 6.0)
+    q = poses.vector(
+        turret_joint=rng.uniform(radians(90), radians(270)),
+        shoulder_joint=radians(rng.uniform(40, 80)),
+        elbow_joint=radians(rng.uniform(-60, 0)),
+    )
+    blocks, lean = _obstacle(robot, rng, 0.075)
+    go = Command(2.0, drive=(float(rng.uniform(0.15, 0.35)), 0.0))
+    return Scenario(
+        'climb', seconds, poses.named(q), (0.0, 0.0), load, (go,), blocks=blocks, lean=lean
+    )
 
 
 def _load(robot: Robot, rng: Rng, low: float, high: float) -> Payload:
@@ -182,7 +234,18 @@ KINDS: dict[str, Kind] = {
     'swing': swing,
     'reach': reach,
     'grasp': grasp,
+    'snatch': snatch,
     'dash': dash,
+    'climb': climb,
 }
 # Usual lengths (s).
-SECONDS = {'work': 120.0, 'tilt': 22.0, 'swing': 12.0, 'reach': 14.0, 'grasp': 10.0, 'dash': 15.0}
+SECONDS = {
+    'work': 120.0,
+    'tilt': 22.0,
+    'swing': 12.0,
+    'reach': 14.0,
+    'grasp': 10.0,
+    'snatch': 10.0,
+    'dash': 15.0,
+    'climb': 14.0,
+}

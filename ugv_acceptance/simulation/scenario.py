@@ -6,6 +6,7 @@ import numpy as np
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.simulation.shape import Block
 
 NO_LOAD = Payload()
 # Lean (rad) from which a robot is off its stance (2 deg), and from which it counts as tipped
@@ -20,7 +21,8 @@ class Command:
     `joints` pairs joint names with targets (rad, m), reached smoothly at a peak rate of `speed`
     (rad/s, m/s). `drive` is forward speed (m/s) and yaw rate (rad/s), reached at a peak of
     `drive_rate` (m/s2, rad/s2). `slope` is tilt and heading (rad) of the ground, reached at
-    `slope_rate` (rad/s). `payload` is in the hand from then on.
+    `slope_rate` (rad/s). `payload` is declared at `time` and in the hand `payload_time` (s) later:
+    until then the arm takes more and more of its weight, as off the ground; 0: all at once.
     """
 
     time: float
@@ -31,6 +33,7 @@ class Command:
     slope: tuple[float, float] | None = None
     slope_rate: float = 0.05
     payload: Payload | None = None
+    payload_time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,8 @@ class Scenario:
     """A run of `duration` (s) from a start at rest; commands in the order of their times.
 
     `start` pairs joint names with positions (rad, m), others start at 0; `slope` is tilt and
-    heading (rad) of the ground. Rates in Hz; the joints' divides the IMU's.
+    heading (rad) of the ground, on which `blocks` lie; a robot on them may lean by `lean` (rad)
+    without tipping. Rates in Hz; the joints' divides the IMU's.
     """
 
     name: str
@@ -74,6 +78,8 @@ class Scenario:
     joint_rate: float = 200.0
     imu_rate: float = 400.0
     noise: Noise = Noise()
+    blocks: tuple[Block, ...] = ()
+    lean: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +106,10 @@ class ImuLog:
 class Truth:
     """What really happened, at the stamps of the joints: no sensor tells it.
 
-    `lean` (n,) is the angle (rad) between the robot's z axis and the ground's normal, less that of
-    the start; `saturated` (n, j) says which motors gave all they had; `position` (n, 3) is
-    `base_link` in the ground's axes (m); `slope` (n,) the ground's tilt (rad).
+    `lean` (n,) is the angle (rad) between the robot's z axis and the ground's normal at the start,
+    less what its blocks explain; `saturated` (n, j) says which motors gave all they had; `position`
+    (n, 3) is `base_link` in the ground's axes (m); `slope` (n,) the ground's tilt (rad); `load`
+    (n,) the mass (kg) that the hand bears.
     """
 
     stamp: Floats
@@ -110,6 +117,7 @@ class Truth:
     saturated: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
     position: Floats
     slope: Floats
+    load: Floats
 
     @property
     def tipped_at(self) -> float:
@@ -125,7 +133,7 @@ class Truth:
 class Recording:
     """A simulated run: what its topics would say, and the truth.
 
-    `payload` lists the times (s) from which each payload was in the hand, the first at 0.
+    `payload` lists the times (s) from which each payload was declared, the first at 0.
     """
 
     scenario: Scenario

@@ -5,6 +5,7 @@ from math import pi, radians
 
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.simulation.scenario import Command, Scenario
+from ugv_acceptance.simulation.shape import ramp
 
 # Flippers folded back along the tracks, arm folded over the deck.
 STOWED = (('flipper_joint', pi), ('shoulder_joint', radians(115)), ('elbow_joint', radians(-140)))
@@ -55,4 +56,34 @@ def overreach() -> Scenario:
     )
 
 
-SCENARIOS: dict[str, Callable[[], Scenario]] = {'gentle': gentle, 'overreach': overreach}
+def fetch() -> Scenario:
+    """On level ground: reach down, lift 2 kg, climb a ramp with it, come back, set it down."""
+    return Scenario(
+        'fetch',
+        40.0,
+        start=STOWED,
+        payload=Payload(0.0),
+        commands=(
+            Command(2.0, joints=_arm(40, -70), speed=0.5),
+            Command(6.5, payload=Payload(2.0), payload_time=1.0),
+            Command(8.0, joints=_arm(95, -120), speed=0.35),
+            Command(13.0, drive=(0.2, 0.0)),
+            Command(20.0, drive=(0.0, 0.0)),
+            Command(22.0, drive=(-0.2, 0.0)),
+            Command(29.0, drive=(0.0, 0.0)),
+            Command(31.0, joints=_arm(40, -70), speed=0.35),
+            Command(36.0, payload=Payload(0.0)),
+            Command(37.0, joints=_arm(70, -100), speed=0.35),
+        ),
+        joint_rate=100.0,
+        imu_rate=200.0,
+        blocks=(ramp(0.6, radians(10)),),
+        lean=radians(10.5),
+    )
+
+
+SCENARIOS: dict[str, Callable[[], Scenario]] = {
+    'gentle': gentle,
+    'overreach': overreach,
+    'fetch': fetch,
+}

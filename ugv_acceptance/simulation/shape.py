@@ -19,6 +19,8 @@ BULK_RADIUS, CLEARANCE = 0.03, 0.03
 # lifts what slips by slip speed x friction time / contact time^2: with one time for both, a turning
 # robot hops from contact to contact, and its accelerometer feels more than 2 g.
 SLIP_TIME, STIFF = 0.1, 0.7
+# Wheels between the ends of a track; raised (m) so that on flat ground the ends bear.
+BETWEEN, RAISED = 3, 0.001
 # Time constant (s) and damping of a brake.
 BRAKE = (0.02, 1.0)
 
@@ -71,11 +73,30 @@ def wheel_contacts(robot: Robot) -> tuple[Contact, ...]:
     )
 
 
+def track_wheels(robot: Robot, *, whole: bool) -> tuple[Contact, ...]:
+    """Return `wheel_contacts`, and with `whole` tracks what bears between the ends of each side."""
+    ends = wheel_contacts(robot)
+    between = []
+    for side in sorted({c.position[1] for c in ends}) if whole else ():
+        rear, *_, front = sorted((c for c in ends if c.position[1] == side), key=_forward)
+        for k in range(1, BETWEEN + 1):
+            x = rear.position[0] + k / (BETWEEN + 1) * (front.position[0] - rear.position[0])
+            place = (x, side, rear.position[2] + RAISED)
+            between.append(Contact(f'{rear.name}:{k}', robot.root, place))
+    return (*ends, *between)
+
+
+def _forward(contact: Contact) -> float:
+    return contact.position[0]
+
+
 def add_contacts(
-    bodies: Mapping[str, ET.Element], robot: Robot, wheel_radius: float | None
+    bodies: Mapping[str, ET.Element],
+    robot: Robot,
+    wheels: tuple[Contact, ...],
+    wheel_radius: float,
 ) -> None:
-    """Add a sphere at every contact, or a wheel at those of `wheel_contacts` if it has a radius."""
-    wheels = () if wheel_radius is None else wheel_contacts(robot)
+    """Add a sphere at every contact that is no wheel, and the `wheels`."""
     for contact in robot.contacts:
         if contact not in wheels:
             ET.SubElement(
@@ -87,7 +108,7 @@ def add_contacts(
                 pos=numbers(contact.position),
             )
     for contact in wheels:
-        _add_wheel(bodies[contact.link], contact, wheel_radius or 0.0)
+        _add_wheel(bodies[contact.link], contact, wheel_radius)
 
 
 def add_blocks(world: ET.Element, blocks: Iterable[Block]) -> None:
@@ -106,12 +127,16 @@ def add_blocks(world: ET.Element, blocks: Iterable[Block]) -> None:
 
 
 def add_pairs(
-    root: ET.Element, robot: Robot, blocks: int, friction: float, contact_time: float
+    root: ET.Element,
+    robot: Robot,
+    wheels: tuple[Contact, ...],
+    blocks: int,
+    friction: float,
+    contact_time: float,
 ) -> None:
     """Let wheels and contact points slip on the ground and the blocks without hopping."""
     contact = ET.SubElement(root, 'contact')
-    wheels = wheel_contacts(robot)
-    for touching in robot.contacts:
+    for touching in dict.fromkeys((*robot.contacts, *wheels)):
         name = f'{"wheel" if touching in wheels else "contact"}:{touching.name}'
         for ground in ('ground', *(f'block:{k}' for k in range(blocks))):
             ET.SubElement(

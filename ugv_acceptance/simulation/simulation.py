@@ -37,6 +37,8 @@ STEPS = 2
 SENSORS = ('orientation', 'gyro', 'accelerometer')
 # Time (s) to come to rest before the run begins.
 SETTLE = 1.0
+# Load (kg) that is added at a time: each takes MuJoCo as long as some steps.
+_NOTICED = 0.02
 # Slack (s) of sums of time steps.
 _EARLY = 1e-9
 
@@ -89,10 +91,12 @@ class Simulation:
         _check_joints(robot, first)
         self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
         self._slope = [_Move(part) for part in _parts(*slope)]
+        self._load, self._mass = load, _Move(load.mass)
         self._drive = [_Move(0.0), _Move(0.0)]
         self._steered_until = 0.0
         self._braked = False
         self._sensors = [self.data.sensor(name).data for name in SENSORS]
+        self._felt = np.zeros(3)
         self._settle()
 
     def _settle(self) -> None:
@@ -106,6 +110,7 @@ class Simulation:
         self._steered_until = 0.0
         self._steer(0.0)
         mujoco.mj_forward(vehicle.model, data)
+        self._felt = self._sensors[-1].copy()
 
     @property
     def time(self) -> float:
@@ -131,22 +136,37 @@ class Simulation:
             parts = zip(self._slope, _parts(*command.slope), strict=True)
             self._slope = [_move(m.at(now)[0], to, command.slope_rate, now) for m, to in parts]
         if command.payload is not None:
-            set_payload(self.vehicle, command.payload)
+            self._take(command.payload, command.payload_time)
+
+    def _take(self, payload: Payload, length: float) -> None:
+        """Take a load off the ground within `length` (s); what is set down goes at once."""
+        before = self.load
+        if length <= 0.0 or payload.mass <= before:
+            before, length = payload.mass, 0.0
+        self._mass = _Move(before, payload.mass - before, self.time, length)
+        self._load = payload
+        set_payload(self.vehicle, replace(payload, mass=before))
+
+    @property
+    def load(self) -> float:
+        """Return the mass (kg) that the hand bears now."""
+        return self._mass.at(self.time)[0]
 
     def advance(self, duration: float) -> None:
         """Move on by `duration` (s), a multiple of the time step."""
         model, data = self.vehicle.model, self.data
-        left = round(duration / model.opt.timestep)
-        while left > 0:
-            steps = min(left, STEPS)
+        count = round(duration / model.opt.timestep)
+        felt = np.zeros(3)
+        for _ in range(count):
             if self.time >= self._steered_until:
                 self._steer(self.time + STEPS * model.opt.timestep)
-            mujoco.mj_step(model, data, nstep=steps)
-            left -= steps
+            mujoco.mj_step(model, data)
+            felt += self._sensors[-1]
+        self._felt = felt / count
 
     def _steer(self, time: float) -> None:
         """Set the servos' targets and gravity for `time`; they last until a motion goes on."""
-        moves = (*self._moves, *self._slope, *self._drive)
+        moves = (*self._moves, *self._slope, *self._drive, self._mass)
         over = all(m.begin + m.length <= time for m in moves)
         self._steered_until = math.inf if over else time - _EARLY
         control, vehicle = self.data.ctrl, self.vehicle
@@ -160,6 +180,10 @@ class Simulation:
             set_brakes(vehicle, on=self._braked)
         for wheel, y in vehicle.wheels:
             control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
+        mass = self._mass.at(time)[0]
+        borne = vehicle.model.body_mass[vehicle.payload]
+        if abs(mass - borne) > _NOTICED or (over and mass != borne):
+            set_payload(vehicle, replace(self._load, mass=mass))
         gravity = gravity_on_slope(self.robot.gravity, *self._slope_at(time))
         vehicle.model.opt.gravity[:] = gravity
 
@@ -181,8 +205,11 @@ class Simulation:
         )
 
     def imu(self) -> tuple[Floats, Floats, Floats]:
-        """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2."""
-        orientation, gyro, acceleration = self._sensors
+        """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2.
+
+        The force is the mean over the last `advance`: an IMU has no aliases of a rattle either.
+        """
+        orientation, gyro, _ = self._sensors
         tilt, heading = self.slope()
         s = math.sin(tilt / 2.0)
         ground = np.array(
@@ -190,7 +217,7 @@ class Simulation:
         )
         world = np.empty(4)
         mujoco.mju_mulQuat(world, ground, orientation)
-        return world[[1, 2, 3, 0]], gyro.copy(), acceleration.copy()
+        return world[[1, 2, 3, 0]], gyro.copy(), self._felt.copy()
 
     def base(self) -> tuple[Floats, Floats]:
         """Return position (3,) m of `base_link` on the ground, and its z axis there (3,)."""

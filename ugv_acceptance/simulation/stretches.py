@@ -1,7 +1,7 @@
 """A scenario simulated stretch by stretch, as fast as it goes: runs of any length."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -31,12 +31,12 @@ class Rows:
     """Samples as they come, each led by its time (s); arrays when the stretch is over.
 
     A joint sample goes on with position, rate, effort; one of the IMU with orientation, rate,
-    specific force; one of the base with position, z axis and the ground's tilt.
+    specific force; one of the base with position, z axis, the ground's tilt and the load.
     """
 
     joints: list[tuple[float, Floats, Floats, Floats]] = field(default_factory=list)
     imu: list[tuple[float, Floats, Floats, Floats]] = field(default_factory=list)
-    base: list[tuple[Floats, Floats, float]] = field(default_factory=list)
+    base: list[tuple[Floats, Floats, float, float]] = field(default_factory=list)
 
 
 def stretches(
@@ -49,7 +49,8 @@ def stretches(
     becomes unstable.
     """
     stride = stride_of(scenario, build)
-    simulation = Simulation(robot, scenario.start, scenario.slope, scenario.payload, build)
+    built = replace(build, blocks=scenario.blocks)
+    simulation = Simulation(robot, scenario.start, scenario.slope, scenario.payload, built)
     sensors = Sensors(scenario.noise, np.random.default_rng(seed))
     waiting = sorted(scenario.commands, key=lambda c: c.time)
     loads: list[tuple[float, Payload]] = [(0.0, scenario.payload)]
@@ -69,7 +70,7 @@ def stretches(
         rows.imu.append((now, *simulation.imu()))
         if count % stride == 0:
             rows.joints.append((now, *simulation.joints()))
-            rows.base.append((*simulation.base(), simulation.slope()[0]))
+            rows.base.append((*simulation.base(), simulation.slope()[0], simulation.load))
         if count == last or len(rows.imu) >= block:
             _check_stable(scenario, simulation)
             yield _recording(scenario, sensors, rows, loads, (limit, upright))
@@ -94,10 +95,10 @@ def _recording(
     limit, upright = known
     joints = sensors.joints(rows)
     imu = sensors.imu(rows)
-    position, up, slope = (np.array(c) for c in zip(*rows.base, strict=True))
+    position, up, slope, load = (np.array(c) for c in zip(*rows.base, strict=True))
     effort = np.array([row[3] for row in rows.joints])
-    lean = np.arccos(np.clip(up @ upright, -1.0, 1.0))
-    truth = Truth(joints.stamp, lean, np.abs(effort) >= limit * _ALL, position, slope)
+    lean = np.maximum(np.arccos(np.clip(up @ upright, -1.0, 1.0)) - scenario.lean, 0.0)
+    truth = Truth(joints.stamp, lean, np.abs(effort) >= limit * _ALL, position, slope, load)
     return Recording(scenario, joints, imu, tuple(loads), truth)
 
 

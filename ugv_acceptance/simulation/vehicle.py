@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.robot import IDENTITY, Joint, Link, Payload, Robot, Vector
+from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.simulation import shape
 from ugv_acceptance.simulation.shape import numbers
 
@@ -79,7 +79,7 @@ def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
     model = mujoco.MjModel.from_xml_string(mjcf_of(robot, build))
     joints = [model.joint(name) for name in robot.joint_names]
     motors = [model.actuator(name).id for name in robot.joint_names] if build.motors else []
-    wheels = shape.wheel_contacts(robot) if build.wheels else ()
+    wheels = _wheels(robot, build)
     vehicle = Vehicle(
         robot,
         build,
@@ -105,6 +105,11 @@ def tune(vehicle: Vehicle, frequency: float) -> None:
     model.actuator_biasprm[vehicle.motor, 2] = -2.0 * inertia * frequency
 
 
+def _wheels(robot: Robot, build: Build) -> tuple[Contact, ...]:
+    """Return where wheels are; only what may climb needs whole tracks."""
+    return shape.track_wheels(robot, whole=bool(build.blocks)) if build.wheels else ()
+
+
 def mjcf_of(robot: Robot, build: Build) -> str:
     """Return the MJCF text of `robot`."""
     root = ET.Element('mujoco', model=robot.name)
@@ -128,7 +133,8 @@ def mjcf_of(robot: Robot, build: Build) -> str:
         shape.add_blocks(world, build.blocks)
     _add_bodies(world, robot, build)
     if build.wheels:
-        shape.add_pairs(root, robot, len(build.blocks), build.friction, build.contact_time)
+        wheels, blocks = _wheels(robot, build), len(build.blocks)
+        shape.add_pairs(root, robot, wheels, blocks, build.friction, build.contact_time)
     _add_motors(root, robot, build)
     _add_sensors(root, robot)
     return ET.tostring(root, encoding='unicode')
@@ -156,7 +162,7 @@ def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
     x, y = (tuple(row[k] for row in build.imu_rotation) for k in (0, 1))
     ET.SubElement(top, 'site', name='imu', pos=numbers(build.imu_position), xyaxes=numbers(x + y))
     if build.base == 'free':
-        shape.add_contacts(bodies, robot, build.wheel_radius if build.wheels else None)
+        shape.add_contacts(bodies, robot, _wheels(robot, build), build.wheel_radius)
         if build.bulk:
             shape.add_bulk(bodies, robot)
 
@@ -214,7 +220,7 @@ def _add_motors(root: ET.Element, robot: Robot, build: Build) -> None:
         limit = robot.joint(name).effort
         clip = {'forcerange': numbers((-limit, limit))} if np.isfinite(limit) else {}
         ET.SubElement(actuators, 'position', clip, name=name, joint=name, kp='1', kv='1')
-    for contact in shape.wheel_contacts(robot) if build.wheels else ():
+    for contact in _wheels(robot, build):
         name = f'wheel:{contact.name}'
         ET.SubElement(
             actuators,
