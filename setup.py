@@ -28,6 +28,7 @@ REQUIRES = [
 ]
 SIMULATION = ['mujoco']
 CONSOLE = ['starlette', 'textual', 'uvicorn', 'websockets']
+FOXGLOVE = ['foxglove-sdk']
 PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
 TABLE = ['pyarrow']
 CLUSTER = ['dask', 'distributed', 'fsspec', 's3fs']
@@ -37,15 +38,18 @@ TEST = [
     'flask-cors',
     'hypothesis',
     'jsonschema',
+    'mcap-ros2-support',
     'moto[s3]',
     'pin',
     'pytest',
+    'pytest-cov',
     'pytest-timeout',
     'pytest-xdist',
     'setuptools<80',
     'wheel',
     *CLUSTER,
     *CONSOLE,
+    *FOXGLOVE,
     *PDF,
     *SIMULATION,
     *TABLE,
@@ -116,6 +120,7 @@ setup(
     install_requires=REQUIRES,
     extras_require={
         'console': CONSOLE,
+        'foxglove': FOXGLOVE,
         'sim': SIMULATION,
         'fast': ['isal'],
         'pdf': PDF,

@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nodes.live_case import FOLDED, NAMES, imu, joints
 
-from ugv_acceptance.bag.encode import joint_state_cdr
+from ugv_acceptance.bag.encode import JointStateBytes, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE, Alert, Rule
-from ugv_acceptance.nodes.conversions import JointStateBytes
 from ugv_acceptance.nodes.faults import WORDS
 from ugv_acceptance.nodes.following import KEPT, Follower
 from ugv_acceptance.nodes.parameters import knobs_of, unknown

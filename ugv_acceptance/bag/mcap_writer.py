@@ -38,7 +38,7 @@ class McapWriter:
         self._file = file
         self._compression = compression
         self._zstd = zstandard.ZstdCompressor(level=3)
-        self._schemas: dict[str, records.Schema] = {}
+        self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
         self._channels: list[records.Channel] = []
         self._chunks: list[records.ChunkIndex] = []
         self._counts: dict[int, int] = {}
@@ -57,27 +57,43 @@ class McapWriter:
         return (self._open.size, self._open.first) if self._open.at else None
 
     def channel(self, topic: str, type_: str, schema: str, metadata: dict[str, str]) -> int:
-        """Id of a new channel."""
-        if type_ not in self._schemas:
+        """Id of a new channel of a ROS 2 type."""
+        known = self._schema(type_, 'ros2msg', schema.encode())
+        return self._add(topic, 'cdr', metadata, known)
+
+    def copy(self, channel: records.Channel, schema: records.Schema | None) -> int:
+        """Id of a new channel like one of another file; `schema` None: it has none."""
+        known = 0 if schema is None else self._schema(schema.name, schema.encoding, schema.data)
+        return self._add(channel.topic, channel.message_encoding, channel.metadata, known)
+
+    def _schema(self, name: str, encoding: str, data: bytes) -> int:
+        key = (name, encoding, data)
+        if key not in self._schemas:
             number = len(self._schemas) + 1
-            self._schemas[type_] = records.Schema(number, schema.encode(), 'ros2msg', type_)
-            self._append(_record(self._schemas[type_]))
+            self._schemas[key] = records.Schema(number, data, encoding, name)
+            self._append(_record(self._schemas[key]))
+        return self._schemas[key].id
+
+    def _add(self, topic: str, encoding: str, metadata: dict[str, str], schema: int) -> int:
         number = len(self._channels) + 1
-        channel = records.Channel(number, topic, 'cdr', metadata, self._schemas[type_].id)
+        channel = records.Channel(number, topic, encoding, metadata, schema)
         self._channels.append(channel)
         self._counts[number] = 0
         self._append(_record(channel))
         return number
 
-    def message(self, channel: int, log_time: int, data: bytes) -> None:
-        """Add a message to the open chunk."""
+    def message(
+        self, channel: int, log_time: int, data: bytes, published: int | None = None
+    ) -> None:
+        """Add a message to the open chunk; `published` None: when it was logged."""
+        sent = log_time if published is None else published
         chunk = self._open
         if chunk.at:
             chunk.first, chunk.last = min(chunk.first, log_time), max(chunk.last, log_time)
         else:
             chunk.first = chunk.last = log_time
         chunk.at.setdefault(channel, []).append((log_time, chunk.size))
-        head = (5, 22 + len(data), channel, self._counts[channel] & 0xFFFFFFFF, log_time, log_time)
+        head = (5, 22 + len(data), channel, self._counts[channel] & 0xFFFFFFFF, log_time, sent)
         self._counts[channel] += 1
         self._append(_MESSAGE.pack(*head))
         self._append(data)

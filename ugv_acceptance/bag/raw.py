@@ -25,11 +25,13 @@ _HEADER = 31  # bytes of a Message record before its content
 
 
 class Logged(NamedTuple):
-    """One message: log time (ns), topic, and its content as CDR."""
+    """One message: log time (ns), topic, its content as CDR, publish time (ns), file's channel."""
 
     log_time: int
     topic: str
     data: bytes
+    published: int
+    channel: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +48,12 @@ def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
     What cannot be read is left out, as in `Bag.batches`.
     """
     wanted = set(topics)
-    streams = [_member(member, wanted) for member in bag.members]
+    streams = [messages_of(member, wanted) for member in bag.members]
     return heapq.merge(*streams, key=lambda message: message.log_time)
 
 
-def _member(member: Member, wanted: set[str]) -> Iterator[Logged]:
+def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    """Yield the messages of one file, as `messages` does."""
     read = {'mcap': _mcap, 'sqlite3': _sqlite, 'ros1': _ros1}[member.storage]
     yield from read(member, wanted)
 
@@ -96,22 +99,25 @@ def _piece(
             for at, time in zip(offsets.tolist(), times, strict=True):
                 length = int.from_bytes(data[at + 1 : at + 9], 'little')
                 content = bytes(data[at + _HEADER : at + 9 + length])
-                found.append((time, piece.start + at, Logged(time, topic, content)))
+                published = int.from_bytes(data[at + 23 : at + _HEADER], 'little')
+                logged = Logged(time, topic, content, published, channel)
+                found.append((time, piece.start + at, logged))
     return found
 
 
 def _sqlite(member: Member, wanted: set[str]) -> Iterator[Logged]:
     query = (
-        'SELECT messages.timestamp, topics.name, messages.data FROM messages '
+        'SELECT messages.timestamp, topics.name, messages.data, topics.id FROM messages '
         'JOIN topics ON topics.id = messages.topic_id ORDER BY messages.timestamp, messages.id'
     )
     try:
         with closing(
             sqlite3.connect(f'{member.content.resolve().as_uri()}?mode=ro', uri=True)
         ) as db:
-            for log_time, topic, data in db.execute(query):
+            for log_time, topic, data, channel in db.execute(query):
                 if topic in wanted:
-                    yield Logged(int(log_time), str(topic), bytes(data))
+                    now = int(log_time)
+                    yield Logged(now, str(topic), bytes(data), now, int(channel))
     except sqlite3.Error as error:
         raise BadBag(f'{member.path}: reading ended early ({error})') from error
 
@@ -124,7 +130,7 @@ def _ros1(member: Member, wanted: set[str]) -> Iterator[Logged]:
         connections = [c for c in known if c.topic in wanted]
         for connection, log_time, data in reader.messages(connections):
             content = bytes(store.ros1_to_cdr(data, normal_type(connection.msgtype)))
-            yield Logged(log_time, connection.topic, content)
+            yield Logged(log_time, connection.topic, content, log_time, connection.id)
 
 
 def offered(bag: Bag) -> dict[str, Offered]:

@@ -80,7 +80,7 @@ class BagWriter:
             if self._topics[name].type != type_:
                 raise BadBag(f'{name}: declared as {self._topics[name].type}, now as {type_}')
             return
-        schema, type_hash = _definition(type_)
+        schema, type_hash = definition_of(type_)
         profile = [_profile(qos or Qos())]
         metadata = {
             'offered_qos_profiles': yaml.safe_dump(profile, sort_keys=False),
@@ -172,7 +172,7 @@ def _typestore() -> Typestore:
 
 
 @cache
-def _definition(type_: str) -> tuple[str, str]:
+def definition_of(type_: str) -> tuple[str, str]:
     """Text of a type's definition and its hash; BadBag of a type Jazzy does not have."""
     try:
         text, _ = _typestore().generate_msgdef(type_, ros_version=2)

@@ -11,7 +11,8 @@ import typer
 from ugv_acceptance import AcceptanceError, __version__
 
 if TYPE_CHECKING:
-    from ugv_acceptance.bag.reader import Bag
+    from ugv_acceptance.bag.judge import Judgement
+    from ugv_acceptance.bag.reader import Bag, Topics
     from ugv_acceptance.config import Config
     from ugv_acceptance.evaluation.criteria import CriteriaSet
     from ugv_acceptance.evaluation.settings import Settings
@@ -30,6 +31,8 @@ class Papers:
     parquet: Path | None = None
     criteria: Path | None = None
     init_criteria: Path | None = None
+    annotate: Path | None = None
+    overwrite: bool = False
 
     @property
     def paged(self) -> bool:
@@ -49,6 +52,7 @@ class Papers:
             '--csv': self.csv,
             '--parquet': self.parquet,
             '--init-criteria': self.init_criteria,
+            '--annotate': self.annotate,
         }
         for option, path in one_run.items():
             if path is not None and recordings != 1:
@@ -63,6 +67,7 @@ def judge_files(
 ) -> tuple[Json, 'StripRecorder | None']:
     """Return the result of one recording, and its strips where a report is asked for."""
     from ugv_acceptance.bag.acknowledgements import add_acknowledgements
+    from ugv_acceptance.bag.annotated import check_new
     from ugv_acceptance.bag.judge import Terms, judge
     from ugv_acceptance.bag.reader import choose_topics, open_bag
     from ugv_acceptance.bag.result import CsvSink
@@ -79,6 +84,8 @@ def judge_files(
         detail=papers.csv is not None or papers.parquet is not None,
     )
     bag = open_bag(paths)
+    if papers.annotate is not None:
+        check_new(papers.annotate, bag.paths, overwrite=papers.overwrite)
     names = (wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
     topics = choose_topics(bag, *names)
     effort, recorder = EffortComparison(settings), StripRecorder(settings, bag.start_ns)
@@ -90,12 +97,29 @@ def judge_files(
         progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress,
     ):
         takers = [*sinks, *csv.sinks, *parquet.sinks]
-        result = judge(bag, topics, settings, takers, progress, terms).result
+        judgement = judge(bag, topics, settings, takers, progress, terms)
+    result = judgement.result
+    if papers.annotate is not None:
+        annotate(papers.annotate, bag, topics, judgement, config)
     complete(result, bag, config)
     add_acknowledgements(result, bag)
     if compare_effort:
         result['effort'] = effort.result(bag.start_ns)
     return result, recorder if papers.paged else None
+
+
+def annotate(
+    path: Path, bag: 'Bag', topics: 'Topics', judgement: 'Judgement', config: 'Config'
+) -> None:
+    """Write the recording with its judgement beside it, for viewers."""
+    from ugv_acceptance.bag.annotated import write_annotated
+    from ugv_acceptance.cli.summary import progress_of
+    from ugv_acceptance.nodes.annotation import Annotation
+
+    robot = config.serial or config.name
+    told = Annotation(bag, topics, config.settings, judgement, robot)
+    with progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress:
+        write_annotated(path, bag, told.types, told.said(), progress)
 
 
 def criteria_of(papers: Papers, settings: 'Settings') -> 'CriteriaSet | None':

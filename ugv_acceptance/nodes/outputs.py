@@ -9,10 +9,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from ugv_acceptance.bag.encode import JointStateBytes
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.nodes.conversions import JointStateBytes, diagnostic_array, status_message
+from ugv_acceptance.nodes.conversions import diagnostic_array, status_message
 from ugv_acceptance.nodes.status import Status
 
 LATCHED = QoSProfile(

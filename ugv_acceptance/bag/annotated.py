@@ -1,0 +1,168 @@
+"""A recording written anew, every message as it is, with further topics beside it: one MCAP file.
+
+Messages of both are merged in order of log time, so what is held in memory is a chunk or two.
+"""
+
+import heapq
+import os
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+
+from mcap import records
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
+
+from ugv_acceptance import AcceptanceError, BadBag, __version__
+from ugv_acceptance.bag.mcap_writer import McapWriter
+from ugv_acceptance.bag.raw import Logged, messages_of
+from ugv_acceptance.bag.reader import Bag
+from ugv_acceptance.bag.reading import Member, normal_type
+from ugv_acceptance.bag.result import check_writable, unwritable
+from ugv_acceptance.bag.writer import definition_of
+
+CHUNK = 1 << 20
+# Between two looks at the clock of the progress bar: so many messages.
+STRIDE = 4096
+# What the mcap package lets through of a broken file.
+_BROKEN = (McapError, OSError, ValueError, KeyError, struct.error)
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A message of a further topic: log time (ns), topic, content as CDR."""
+
+    log_time: int
+    topic: str
+    data: bytes
+
+
+def check_new(path: Path, bag_paths: Iterable[Path], *, overwrite: bool) -> None:
+    """Raise AcceptanceError where `path` cannot be written, is there already, or is the bag."""
+    check_writable(path)
+    if path.exists() and any(path.samefile(p) for p in bag_paths if p.exists()):
+        raise AcceptanceError(f'{path}: expected a new file, got the recording itself')
+    if path.exists() and not overwrite:
+        raise AcceptanceError(f'{path}: it exists; it is replaced with --overwrite only')
+
+
+def write_annotated(
+    path: Path,
+    bag: Bag,
+    types: dict[str, str],
+    said: Iterable[Said],
+    progress: Callable[[int], None] = lambda _: None,
+) -> int:
+    """Write the recording and what is said beside it; return the number of recorded messages.
+
+    `types` gives the ROS 2 type of each further topic, `said` comes in order of log time, but for
+    what is written late by design; `progress` takes the log time reached (ns). Every chunk has a
+    checksum. The file has its name only when it is whole.
+    """
+    part = path.with_name(path.name + '.part')
+    try:
+        with part.open('wb') as file:
+            writer = McapWriter(file, f'ugv_acceptance {__version__}')
+            count = _write(writer, bag, types, said, progress)
+            writer.finish()
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    except OSError as error:
+        raise unwritable(path, error.strerror) from None
+    finally:
+        part.unlink(missing_ok=True)
+    return count
+
+
+def _write(
+    writer: McapWriter,
+    bag: Bag,
+    types: dict[str, str],
+    said: Iterable[Said],
+    progress: Callable[[int], None],
+) -> int:
+    own = {name: _new(writer, name, kind) for name, kind in types.items()}
+    streams: list[Iterable[_Copy | Said]] = [_copied(writer, bag, m) for m in bag.members]
+    count = 0
+    merged = heapq.merge(*streams, said, key=attrgetter('log_time'))
+    for k, message in enumerate(merged):
+        if isinstance(message, Said):
+            writer.message(own[message.topic], message.log_time, message.data)
+        else:
+            logged, channel = message.logged, message.channel
+            writer.message(channel, logged.log_time, logged.data, logged.published)
+            count += 1
+        if (held := writer.pending) and held[0] >= CHUNK:
+            writer.end_chunk()
+        if not k % STRIDE:
+            progress(message.log_time)
+    return count
+
+
+@dataclass(frozen=True, slots=True)
+class _Copy:
+    """A recorded message and its channel in the new file."""
+
+    log_time: int
+    logged: Logged
+    channel: int
+
+
+def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[_Copy]:
+    """Return one file's messages, its channels made now: they stand at the file's beginning."""
+    channels = _channels(writer, member)
+    messages = messages_of(member, set(bag.topics))
+    return (_Copy(m.log_time, m, channels[m.channel]) for m in messages if m.channel in channels)
+
+
+def _channels(writer: McapWriter, member: Member) -> dict[int, int]:
+    """Return the new id of each channel of a file that is copied."""
+    if member.storage == 'mcap':
+        schemas, channels = _definitions(member)
+        return {k: writer.copy(c, schemas.get(c.schema_id)) for k, c in channels.items()}
+    return {k: _new(writer, c.topic, c.type) for k, c in member.index.channels.items()}
+
+
+def _new(writer: McapWriter, topic: str, kind: str) -> int:
+    """Return the id of a new channel; a type that Jazzy does not have goes without its text."""
+    kind = normal_type(kind)
+    try:
+        text, type_hash = definition_of(kind)
+    except BadBag:
+        return writer.copy(records.Channel(0, topic, 'cdr', {'type': kind}, 0), None)
+    return writer.channel(topic, kind, text, {'topic_type_hash': type_hash})
+
+
+def _definitions(
+    member: Member,
+) -> tuple[dict[int, records.Schema], dict[int, records.Channel]]:
+    """Return the schemas and channels of an MCAP: from its summary, else all that a scan finds."""
+    with member.content.open('rb') as file:
+        try:
+            summary = make_reader(file).get_summary()
+        except _BROKEN:
+            summary = None
+        if summary is not None and _says_all(member, summary.schemas, summary.channels):
+            return dict(summary.schemas), dict(summary.channels)
+        file.seek(0)
+        schemas: dict[int, records.Schema] = {}
+        channels: dict[int, records.Channel] = {}
+        with suppress(*_BROKEN):  # the reader has said where the file breaks off
+            for record in StreamReader(file).records:
+                if isinstance(record, records.Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, records.Channel):
+                    channels[record.id] = record
+    return schemas, channels
+
+
+def _says_all(
+    member: Member, schemas: dict[int, records.Schema], channels: dict[int, records.Channel]
+) -> bool:
+    there = set(member.index.channels) <= set(channels)
+    return there and all(c.schema_id in (0, *schemas) for c in channels.values())
