@@ -11,6 +11,7 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ugv_acceptance.config import Config
+from ugv_acceptance.plan.motions import HITCH
 
 SIMULATOR = 'packbot_simulator'
 # Seconds in which a simulator answers.
@@ -27,6 +28,7 @@ class RosCommands:
         self._velocity = publish(Twist, 'cmd_vel', 10)
         self._payload = publish(InertiaStamped, config.topics.payload.name, QoSProfile(depth=10))
         self._ground = publish(Vector3, f'{SIMULATOR}/ground', 10)
+        self._pull = publish(Vector3, f'{SIMULATOR}/pull', 10)
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
         self._reset: Any = node.create_client(Trigger, f'{SIMULATOR}/reset')
 
@@ -67,6 +69,10 @@ class RosCommands:
     def load(self, mass: float) -> None:
         """Put a load (kg) into the simulated hand."""
         self._load.publish(self._inertia(mass))
+
+    def pull(self, force: float) -> None:
+        """Pull the simulated robot backwards at its hitch (N)."""
+        self._pull.publish(Vector3(x=force, z=HITCH))
 
     def stand_up(self) -> None:
         """Put the simulated robot back to its start, and wait until it is."""

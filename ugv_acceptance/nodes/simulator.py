@@ -2,7 +2,8 @@
 
 It publishes joint_states and imu/data (and /clock when asked) and obeys cmd_vel and
 arm_controller/joint_trajectory. What a person does on a test ground comes on topics of its own:
-~/ground tilts what it stands on, ~/load puts a load into its hand, ~/reset stands it up again.
+~/ground tilts what it stands on, ~/load puts a load into its hand, ~/pull pulls it backwards (x: N,
+z: height in m), ~/reset stands it up again.
 """
 
 import math
@@ -93,6 +94,7 @@ class Simulator(Node):
         subscribe(JointTrajectory, trajectories, self._guard(self._on_trajectory), 10)
         subscribe(Vector3, '~/ground', self._guard(self._on_ground), 10)
         subscribe(Inertia, '~/load', self._guard(self._on_load), 10)
+        subscribe(Vector3, '~/pull', self._guard(self._on_pull), 10)
         self.create_service(Trigger, '~/reset', self._on_reset)
 
     def _guard(self, take: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -141,6 +143,11 @@ class Simulator(Node):
 
     def _on_ground(self, message: Vector3) -> None:
         self.virtual.tilt(message.x, message.y, message.z)
+
+    def _on_pull(self, message: Vector3) -> None:
+        if not (math.isfinite(message.x) and message.x >= 0.0 and math.isfinite(message.z)):
+            raise BadSample(f'pull: expected newtons backwards, got {message.x} at {message.z} m')
+        self.virtual.pull(message.x, message.z)
 
     def _on_load(self, message: Inertia) -> None:
         self.virtual.remote.take(Payload(message.m, (message.com.x, message.com.y, message.com.z)))

@@ -78,6 +78,18 @@ class Hands:
             self.world.wait(DRIVE_PERIOD)
         self.world.commands.drive(0.0, 0.0)
 
+    def pull(self, step: Step) -> None:
+        """Pull with the step's force for its time, then let go."""
+        force = step.force_n or 0.0
+        if self.mode != SIM:
+            self.told(f'{step.id}: pull with {force:g} N for {step.hold_s:g} s, then let go')
+            return
+        end = self.world.fed() + step.hold_s
+        self.world.commands.pull(force)
+        while self.world.fed() < end and self.going():
+            self.world.wait(DRIVE_PERIOD)
+        self.world.commands.pull(0.0)
+
     def stand_up(self) -> bool:
         """Bring a robot that tipped over, or whose arm gave way, back to its start."""
         if self.mode == SIM:

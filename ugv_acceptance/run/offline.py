@@ -23,6 +23,7 @@ from ugv_acceptance.evaluation.alerts import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.wording import describe
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.plan.motions import HITCH
 from ugv_acceptance.run.virtual import VirtualRobot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
@@ -188,6 +189,10 @@ class OfflineCommands:
         """Put a load (kg) into the hand."""
         cog = self.world.config.settings.robot.payload.cog
         self.world.virtual.remote.take(Payload(mass, cog))
+
+    def pull(self, force: float) -> None:
+        """Pull backwards at the hitch (N), until told otherwise."""
+        self.world.virtual.pull(force, HITCH)
 
     def stand_up(self) -> None:
         """Put the robot on level ground as at the start, its hand empty."""

@@ -81,8 +81,6 @@ class Runner:
         return self._finish(step, earlier.pop(), earlier)
 
     def _refused(self, step: Step) -> str:
-        if step.action == 'pull' and self.hands.mode == SIM:
-            return 'needs a person who pulls'
         if step.where == SIMULATION and self.hands.mode != SIM:
             return 'would pass a limit: in simulation only'
         return ''
@@ -205,7 +203,7 @@ class Runner:
         if step.action == 'drive' and step.drive is not None:
             self.hands.drive(step, step.drive[0], math.radians(step.drive[1]), step.hold_s)
         elif step.action == 'pull':
-            self.hands.told(f'{step.id}: pull with {step.force_n:g} N, then let go')
+            self.hands.pull(step)
         elif step.action == 'cycle':
             return self.moves.cycle(step)
         elif holds(step):

@@ -80,9 +80,20 @@ class VirtualRobot:
 
         A robot that has turned is put onto the ramp as a person puts it there.
         """
+        self.remote.tilt(tilt, heading + self._yaw(), rate)
+
+    def pull(self, force: float, height: float) -> None:
+        """Pull backwards (N) at a hitch in the middle of the base, at a height (m) above it."""
+        simulation, yaw = self.remote.simulation, self._yaw()
+        back = (-force * math.cos(yaw), -force * math.sin(yaw), 0.0)
+        base = simulation.data.body(self.config.settings.robot.root)
+        arm = base.xpos + np.array((0.0, 0.0, height)) - base.xipos
+        base.xfrc_applied[:] = (*back, *np.cross(arm, back))
+
+    def _yaw(self) -> float:
+        """Return where the robot's front points (rad)."""
         x, y, z, w = self.remote.simulation.imu()[0]
-        yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        self.remote.tilt(tilt, heading + yaw, rate)
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
     def step(self) -> None:
         """Simulate one period of the IMU; what is sent waits until it is due."""

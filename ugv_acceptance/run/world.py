@@ -99,6 +99,9 @@ class Commands(Protocol):
     def load(self, mass: float) -> None:
         """Put a load (kg) into the hand."""
 
+    def pull(self, force: float) -> None:
+        """Pull backwards at the hitch (N), until told otherwise."""
+
     def stand_up(self) -> None:
         """Put the robot on level ground as at the start, its hand empty."""
 
