@@ -43,8 +43,8 @@ class Heard:
 class Ears(Node):
     """Hears what the robot sends and what the monitor says. `last` are the newest stamps (ns)."""
 
-    def __init__(self) -> None:
-        super().__init__('ears')
+    def __init__(self, namespace: str = '') -> None:
+        super().__init__('ears', namespace=namespace)
         self.alerts: list[Heard] = []
         self.verdicts: list[DiagnosticStatus] = []
         self.diagnostics: dict[str, dict[str, str]] = {}
