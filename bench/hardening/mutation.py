@@ -1,133 +1,264 @@
-"""Mutation testing: one small change of the code at a time, and whether the tests notice it.
+"""Mutation testing of model/ and evaluation/: one change at a time, and whether tests notice it.
 
-`python -m bench.hardening.mutation --budget 600 [FILE ...]` prints each survivor. A sample, drawn
-with a seed: all mutants of a file take hours.
+`python -m bench.hardening.mutation --count 300 --seed 0 [PATTERN ...]` draws mutants from all files
+that match, prints each survivor and a table. First all tests run once to learn which ran what line;
+a mutant is then tried in a forked copy of this process by the tests that ran its line, the quickest
+first, until one fails or PATIENCE of them passed. So what is said to survive may still be
+noticed by a slower test: the rate is a lower bound.
 """
 
 import argparse
-import ast
+import hashlib
+import json
 import os
+import resource
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from functools import partial
+from importlib import import_module
+from itertools import accumulate
 from pathlib import Path
 from random import Random
 from typing import Any
 
+import coverage
+import hypothesis
+import pytest
+
+from bench.hardening.mutants import EQUIVALENT, Mutant, mutants, mutated
+
 ROOT = Path(__file__).resolve().parents[2]
-# File -> the tests that are about it.
-TESTS = {
-    'model/statics.py': ['model/test_statics.py', 'model/test_against_pinocchio.py'],
-    'model/support.py': ['model/test_support.py'],
-    'model/hull.py': ['model/test_support.py', 'model/test_stability.py'],
-    'model/stability.py': ['model/test_stability.py', 'studies/test_planar.py'],
-    'evaluation/alerts.py': ['evaluation/test_alerts.py', 'evaluation/test_chatter.py'],
-    'evaluation/freshness.py': ['evaluation/test_freshness.py'],
-}
-_COMPARE: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn,
-}  # fmt: skip
-_BINARY: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
-    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.FloorDiv: ast.Mult,
-}  # fmt: skip
+PACKAGE = 'ugv_acceptance'
+FILES = ('model/*.py', 'evaluation/*.py')
+# A part for each job; what a mutant is tried by is chosen among these.
+TESTS = (
+    ('test/model', 'test/studies', 'test/run/test_verdicts.py'),
+    ('test/evaluation',),
+)
+PARTS = (PACKAGE, 'test', 'msg_configs', 'urdf', 'bags')
+# Seconds of tests that a mutant is tried by, and seconds after which it hangs.
+PATIENCE, HANGS = 10.0, 60.0
+OPTIONS = ('-q', '-x', '-p', 'no:cacheprovider', '-p', 'no:xdist')
+PROFILE = '--hypothesis-profile=mutants'
+# What tests import before they begin: paid for once, before the forks.
+COMMON = ('config', 'bag', 'run.verdicts', 'evaluation.live', 'simulation.scenarios')
+
+Lines = dict[str, list[str]]  # line -> the tests that ran it
 
 
-def places(source: str) -> list[int]:
-    """Return the numbers of the nodes, in ast.walk's order, that can be changed."""
-    nodes = enumerate(ast.walk(ast.parse(source)))
-    return [k for k, node in nodes if isinstance(node, ast.expr) and _change(node)]
+@dataclass(slots=True)
+class Seen:
+    """A pytest plugin: seconds of each test, and the context of coverage while it runs."""
+
+    measured: coverage.Coverage
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @pytest.hookimpl(hookwrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Name the context after the test."""
+        start = time.perf_counter()
+        self.measured.switch_context(item.nodeid)
+        yield
+        self.measured.switch_context('')
+        self.seconds[item.nodeid] = time.perf_counter() - start
 
 
-def mutant(source: str, place: int) -> tuple[str, str]:
-    """Return what was changed at a place, and the changed source."""
-    tree = ast.parse(source)
-    node: Any = list(ast.walk(tree))[place]
-    before = ast.unparse(node)
-    _change(node)
-    return f'{node.lineno}: {before} -> {ast.unparse(node)}', ast.unparse(tree)
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Which tests ran a line of a file, and how long each takes."""
+
+    tests: Mapping[str, Lines]
+    seconds: dict[str, float]
+
+    def of(self, mutant: Mutant) -> list[str]:
+        """Return the tests to try a mutant by, the quickest first, PATIENCE in all."""
+        by_line = self.tests.get(mutant.file, {})
+        lines = [str(line) for line in mutant.lines if any(by_line.get(str(line), ()))]
+        found = {test for line in lines or by_line for test in by_line[line] if test}
+        ordered = sorted(found, key=lambda test: self.seconds[test])
+        total = accumulate(self.seconds[test] for test in ordered)
+        return [test for test, sum_ in zip(ordered, total, strict=True) if sum_ < PATIENCE]
 
 
-def _change(node: ast.expr) -> bool:
-    """Change a node in place; return whether there was a change to make."""
-    if isinstance(node, ast.Compare) and type(node.ops[0]) in _COMPARE:
-        node.ops[0] = _COMPARE[type(node.ops[0])]()
-    elif isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        node.op = _BINARY[type(node.op)]()
-    elif isinstance(node, ast.BoolOp):
-        node.op = ast.Or() if isinstance(node.op, ast.And) else ast.And()
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        node.op = ast.UAdd()
-    elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
-        node.value = not node.value
-    elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-        node.value += 1
-    elif isinstance(node, ast.IfExp):
-        node.body, node.orelse = node.orelse, node.body
-    else:
-        return False
-    return True
+def copied(folder: Path) -> Path:
+    """Return a copy of what tests need."""
+    for part in PARTS:
+        shutil.copytree(ROOT / part, folder / part)
+    shutil.copy(ROOT / 'pyproject.toml', folder)
+    return folder
 
 
-def killed(copy: Path, name: str, source: str) -> bool:
-    """Return whether the tests of a file fail with this source in its place."""
-    path = copy / 'ugv_acceptance' / name
-    whole = path.read_text(encoding='utf-8')
-    path.write_text(source, encoding='utf-8')
-    command = [sys.executable, '-m', 'pytest', '-x', '-q', '-p', 'no:cacheprovider']
-    command += [str(Path('test', test)) for test in TESTS[name]]
-    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+def forked(work: Callable[[], int], copy: Path) -> int:
+    """Start `work` in a copy of this process and of the code; return its process's number."""
+    pid = os.fork()
+    if pid:
+        return pid
+    code = 70
     try:
-        done = subprocess.run(
-            command, cwd=copy, capture_output=True, check=False, timeout=120, env=env
-        )
-    except subprocess.TimeoutExpired:  # a loop without end is noticed
-        return True
+        os.setsid()
+        out = os.open(copy / 'log', os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        os.chdir(copy)
+        sys.path[:0] = [str(copy)]
+        code = work()
     finally:
-        path.write_text(whole, encoding='utf-8')
-    return done.returncode != 0
+        os._exit(code)
 
 
-def try_some(names: Iterable[str], budget: float, seed: int) -> dict[str, tuple[int, int]]:
-    """Try mutants of each file in turn until `budget` (s) is used; return (killed, tried)."""
-    rng, found = Random(seed), dict.fromkeys(names, (0, 0))
+def learn(copies: list[Path], cache: Path) -> Reach:
+    """Run all tests once and return which lines each ran; exit where one fails."""
+    if cache.exists():
+        return Reach(*json.loads(cache.read_text('utf-8')))
+    pairs = list(zip(copies, TESTS, strict=False))
+    started = [(forked(partial(measure, copy, chosen), copy), copy) for copy, chosen in pairs]
+    tests, seconds = defaultdict[str, Lines](lambda: defaultdict(list)), dict[str, float]()
+    for pid, copy in started:
+        if os.waitpid(pid, 0)[1]:
+            raise SystemExit(f'tests fail without a mutant: {(copy / "log").read_text("utf-8")}')
+        seconds |= json.loads((copy / 'seconds').read_text('utf-8'))
+        ran = coverage.CoverageData(str(copy / '.coverage'))
+        ran.read()
+        for file in ran.measured_files():
+            lines = tests[str(Path(file).relative_to(copy / PACKAGE))]
+            for line, names in ran.contexts_by_lineno(file).items():
+                lines[str(line)] += names
+    cache.parent.mkdir(parents=True, exist_ok=True)
+    cache.write_text(json.dumps((tests, seconds)), 'utf-8')
+    return Reach(tests, seconds)
+
+
+def measure(copy: Path, chosen: Iterable[str]) -> int:
+    """Run a part of the tests under coverage and write which lines each ran."""
+    measured = coverage.Coverage(str(copy / '.coverage'), source=[PACKAGE], config_file=False)
+    seen = Seen(measured)
+    measured.start()
+    code = pytest.main([*OPTIONS, PROFILE, *chosen], plugins=[seen])
+    measured.stop()
+    measured.save()
+    (copy / 'seconds').write_text(json.dumps(seen.seconds), 'utf-8')
+    return int(code)
+
+
+def state() -> str:
+    """Return a number of the code and the tests as they stand."""
+    paths = sorted(path for part in PARTS[:2] for path in (ROOT / part).rglob('*.py'))
+    return hashlib.sha256(b''.join(path.read_bytes() for path in paths)).hexdigest()[:16]
+
+
+def trial(copy: Path, mutant: Mutant, tests: list[str]) -> tuple[int, Callable[[], None]]:
+    """Start the tests of a mutant; return the process's number and what undoes the change."""
+    path = copy / PACKAGE / mutant.file
+    whole = path.read_text('utf-8')
+    path.write_text(mutated(whole, mutant.place), 'utf-8')
+
+    def work() -> int:
+        sys.dont_write_bytecode = True
+        resource.setrlimit(resource.RLIMIT_AS, (6 << 30, 6 << 30))
+        return int(pytest.main([*OPTIONS, PROFILE, *tests]))
+
+    def undo() -> None:
+        path.write_text(whole, 'utf-8')
+
+    return forked(work, copy), undo
+
+
+def killed(copies: list[Path], waiting: list[Mutant], reach: Reach) -> Iterator[tuple[Mutant, int]]:
+    """Try mutants, one in each copy at a time; yield each with the exit code of its tests."""
+    running = dict[int, tuple[Mutant, Path, Callable[[], None], float]]()
+    free, waiting = list(copies), list(waiting)
+    try:
+        while waiting or running:
+            while waiting and free:
+                mutant = waiting.pop(0)
+                if not (tests := reach.of(mutant)):
+                    yield mutant, 0
+                    continue
+                copy = free.pop()
+                pid, undo = trial(copy, mutant, tests)
+                running[pid] = mutant, copy, undo, time.monotonic() + HANGS
+            for pid, (mutant, copy, undo, end) in list(running.items()):
+                done, status = os.waitpid(pid, os.WNOHANG)
+                if not done and time.monotonic() > end:  # a loop without end is noticed
+                    os.killpg(pid, signal.SIGKILL)
+                    done, status = os.waitpid(pid, 0)
+                if done:
+                    del running[pid]
+                    undo()
+                    free.append(copy)
+                    yield mutant, status
+            time.sleep(0.005)
+    finally:
+        for pid in running:
+            os.killpg(pid, signal.SIGKILL)
+
+
+def ready() -> None:
+    """Import what tests import, except our own modules, which a mutant's process reads anew."""
+    os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+    settings: dict[str, Any] = {'deadline': None, 'derandomize': True, 'database': None}
+    phases = (hypothesis.Phase.explicit, hypothesis.Phase.generate)
+    hypothesis.settings.register_profile('mutants', phases=phases, **settings)
+    for name in COMMON:
+        import_module(f'{PACKAGE}.{name}')
+    for name in [name for name in sys.modules if name.split('.')[0] == PACKAGE]:
+        del sys.modules[name]
+
+
+def drawn(patterns: Iterable[str], count: int, seed: int) -> list[Mutant]:
+    """Return `count` mutants of the files that match, drawn at random from all of them."""
+    folder = ROOT / PACKAGE
+    names = sorted(str(path.relative_to(folder)) for path in folder.rglob('*.py'))
+    chosen = [name for name in names if any(fnmatch(name, pattern) for pattern in patterns)]
+    every = [m for name in chosen for m in mutants(name, (folder / name).read_text('utf-8'))]
+    every = [m for m in every if (m.file, m.function, m.change) not in EQUIVALENT]
+    Random(seed).shuffle(every)
+    return every[:count]
+
+
+def try_some(
+    patterns: Iterable[str] = FILES, count: int = 300, seed: int = 0
+) -> dict[str, tuple[int, int]]:
+    """Try mutants drawn at random; print survivors; return (killed, tried) of each file."""
+    tried, dead = Counter[str](), Counter[str]()
+    waiting = drawn(patterns, count, seed)
+    ready()
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder)
-        for part in ('ugv_acceptance', 'test', 'msg_configs', 'urdf', 'bags'):
-            shutil.copytree(ROOT / part, copy / part)
-        shutil.copy(ROOT / 'pyproject.toml', copy)
-        waiting, sources = dict[str, list[int]](), dict[str, str]()
-        for name in found:
-            source = (copy / 'ugv_acceptance' / name).read_text(encoding='utf-8')
-            if killed(copy, name, source):
-                raise SystemExit(f'{name}: its tests fail without a mutant')
-            waiting[name] = places(source)
-            rng.shuffle(waiting[name])
-            sources[name] = source
-        end = time.monotonic() + budget
-        while any(waiting.values()) and time.monotonic() < end:
-            for name in (name for name, rest in waiting.items() if rest):
-                what, source = mutant(sources[name], waiting[name].pop())
-                dead = killed(copy, name, source)
-                found[name] = (found[name][0] + dead, found[name][1] + 1)
-                if not dead:
-                    print(f'survived: {name}:{what}', flush=True)
-    return found
+        copies = [copied(Path(folder).resolve() / str(k)) for k in range(len(TESTS))]
+        reach = learn(copies, ROOT / 'out' / 'mutation' / f'{state()}.json')
+        with suppress(KeyboardInterrupt):  # what was tried until then is told
+            for mutant, status in killed(copies, waiting, reach):
+                tried[mutant.file] += 1
+                dead[mutant.file] += status != 0
+                if not status:
+                    print(f'survived: {mutant.text}', file=sys.stderr, flush=True)
+    return {file: (dead[file], tried[file]) for file in sorted(tried)}
 
 
 def main() -> None:
-    """Print survivors and rates."""
+    """Print survivors, the table, and what was left out."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('files', nargs='*', default=list(TESTS))
-    parser.add_argument('--budget', type=float, default=600.0, help='seconds')
+    parser.add_argument('patterns', nargs='*', default=FILES, help='such as model/hull.py')
+    parser.add_argument('--count', type=int, default=300)
     parser.add_argument('--seed', type=int, default=0)
     asked = parser.parse_args()
-    for name, (dead, tried) in try_some(asked.files, asked.budget, asked.seed).items():
-        print(f'{name}: {dead} of {tried} killed', flush=True)
+    start = time.monotonic()
+    found = try_some(asked.patterns, asked.count, asked.seed)
+    found['all'] = tuple(map(sum, zip(*found.values(), strict=True)))  # type: ignore[assignment]
+    print('| file | killed | of | share |\n|---|---|---|---|')
+    for file, (dead, tried) in found.items():
+        print(f'| {file} | {dead} | {tried} | {dead / tried:.0%} |')
+    print(f'{time.monotonic() - start:.0f} s; left out as equivalent:')
+    for (file, function, change), why in EQUIVALENT.items():
+        print(f'{file} {function}: {change}: {why}')
 
 
 if __name__ == '__main__':

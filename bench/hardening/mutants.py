@@ -1,0 +1,87 @@
+"""Mutants of a source: one small change of one expression each.
+
+A comparison, an operator, a constant, a sign or a choice is turned into another. Those in
+EQUIVALENT change nothing that anybody could see; they are left out and printed with the reason.
+"""
+
+import ast
+from dataclasses import dataclass
+from typing import Any
+
+_COMPARE: dict[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq, ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn,
+}  # fmt: skip
+_BINARY: dict[type[ast.operator], type[ast.operator]] = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
+    ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd, ast.FloorDiv: ast.Mult,
+}  # fmt: skip
+# (file, function, change) -> why no test can tell it from the code.
+EQUIVALENT: dict[tuple[str, str, str], str] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """A change: of the `place`-th node of ast.walk, in `function`; its statement's `lines`."""
+
+    file: str
+    place: int
+    function: str
+    change: str
+    lines: range
+
+    @property
+    def text(self) -> str:
+        """Where and what, on one line."""
+        return f'{self.file}:{self.lines[-1]} {self.function}: {self.change}'
+
+
+def mutants(file: str, source: str) -> list[Mutant]:
+    """Return every mutant of a source, those that are equivalent too."""
+    tree = ast.parse(source)
+    around = dict[ast.AST, tuple[str, int]]()
+    for node in ast.walk(tree):  # parents come before their children
+        name, line = around.get(node, ('', 1))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            name = f'{name}.{node.name}'.lstrip('.')
+        if isinstance(node, ast.stmt):
+            line = node.lineno
+        around.update(dict.fromkeys(ast.iter_child_nodes(node), (name, line)))
+        around[node] = name, line
+    found = []
+    for k, node in enumerate(ast.walk(tree)):
+        before = ast.unparse(node) if isinstance(node, ast.expr) else ''
+        if isinstance(node, ast.expr) and _change(node):
+            name, first = around[node]
+            lines = range(min(first, node.lineno), (node.end_lineno or first) + 1)
+            found.append(Mutant(file, k, name, f'{before} -> {ast.unparse(node)}', lines))
+    return found
+
+
+def mutated(source: str, place: int) -> str:
+    """Return a source with its `place`-th node changed."""
+    tree = ast.parse(source)
+    node: Any = list(ast.walk(tree))[place]
+    _change(node)
+    return ast.unparse(tree)
+
+
+def _change(node: ast.expr) -> bool:
+    """Change a node in place; return whether there was a change to make."""
+    if isinstance(node, ast.Compare) and type(node.ops[0]) in _COMPARE:
+        node.ops[0] = _COMPARE[type(node.ops[0])]()
+    elif isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        node.op = _BINARY[type(node.op)]()
+    elif isinstance(node, ast.BoolOp):
+        node.op = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        node.op = ast.UAdd()
+    elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
+        node.value = not node.value
+    elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
+        node.value += 1
+    elif isinstance(node, ast.IfExp):
+        node.body, node.orelse = node.orelse, node.body
+    else:
+        return False
+    return True
