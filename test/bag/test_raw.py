@@ -36,7 +36,7 @@ def test_all_messages_are_those_rosbags_reads(shared_bags: Path, name: str) -> N
     bag = open_bag(path)
     ours = list(messages(bag, bag.topics))
     assert [m.log_time for m in ours] == sorted(m.log_time for m in ours)
-    assert Counter(map(tuple, ours)) == of_rosbags(path)
+    assert Counter(m[:3] for m in ours) == of_rosbags(path)
 
 
 def test_ros_1_messages_become_cdr(shared_bags: Path) -> None:
