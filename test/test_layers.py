@@ -44,7 +44,16 @@ MAY_IMPORT: dict[str, set[str]] = {
     'cli': BELOW_NODES | {'nodes'},
 }
 # Every start of the command loads every module of cli, so they import these inside a verb.
-HEAVY = {'distributed', 'rclpy', 'mujoco', 'matplotlib', 'starlette', 'textual', 'uvicorn'}
+HEAVY = {
+    'distributed',
+    'foxglove',
+    'rclpy',
+    'mujoco',
+    'matplotlib',
+    'starlette',
+    'textual',
+    'uvicorn',
+}
 
 # The layers that may import a foreign library.
 HOME_OF = {
@@ -56,6 +65,7 @@ HOME_OF = {
     'mcap': {'bag'},
     'rosbags': {'bag'},
     'distributed': {'campaign'},
+    'foxglove': {'nodes'},
     'fsspec': {'campaign'},
     'matplotlib': {'report'},
     'jinja2': {'report', 'plan'},

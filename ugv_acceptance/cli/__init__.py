@@ -21,6 +21,7 @@ VERBS = (
     'monitor',
     'console',
     'watch',
+    'foxglove',
     'replay',
     'plan',
     'run',

@@ -1,0 +1,32 @@
+"""`ugv-acceptance foxglove`: the live topics for Foxglove and Lichtblick, read only."""
+
+from typing import Annotated
+
+import typer
+
+from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+
+__all__ = ['CONTEXT', 'foxglove']
+
+
+def foxglove(
+    context: typer.Context,
+    port: Annotated[int, typer.Option(help='Port on 127.0.0.1; 0 takes a free one.')] = 8765,
+) -> None:
+    """Show the live topics in Foxglove or Lichtblick on this machine (extra foxglove).
+
+    Read only: nothing can be published, set or called. Ctrl-C ends.
+
+    \b
+    Examples:
+      ugv-acceptance foxglove        # then open ws://localhost:8765 and layouts/foxglove.json
+      ssh -L 8765:localhost:8765 robot ugv-acceptance foxglove
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.nodes.foxglove import Bridge
+    from ugv_acceptance.nodes.running import end, ros, spin
+
+    with ros(ros_arguments(context)) as stop:
+        bridge = Bridge(port)
+        typer.echo(f'Foxglove WebSocket on ws://127.0.0.1:{bridge.port} (Ctrl-C ends)')
+        spin(bridge, stop)
+        end(bridge)
