@@ -1,7 +1,9 @@
 """Mutants of a source: one small change of one expression each.
 
-A comparison, an operator, a constant, a sign or a choice is turned into another. Those in
-EQUIVALENT change nothing that anybody could see; they are left out and printed with the reason.
+A comparison, an operator, a constant, a sign or a choice is turned into another; a number over 1000
+is doubled, for one more would be lost in it. Decorators are left as they are: `slots` and `frozen`
+forbid what no code does, and a cache's size changes no value. Those in EQUIVALENT change nothing
+that anybody could see; they are left out and printed with the reason.
 """
 
 import ast
@@ -48,10 +50,12 @@ def mutants(file: str, source: str) -> list[Mutant]:
             line = node.lineno
         around.update(dict.fromkeys(ast.iter_child_nodes(node), (name, line)))
         around[node] = name, line
+    decorators = (d for n in ast.walk(tree) for d in getattr(n, 'decorator_list', ()))
+    left = {node for decorator in decorators for node in ast.walk(decorator)}
     found = []
     for k, node in enumerate(ast.walk(tree)):
         before = ast.unparse(node) if isinstance(node, ast.expr) else ''
-        if isinstance(node, ast.expr) and _change(node):
+        if isinstance(node, ast.expr) and node not in left and _change(node):
             name, first = around[node]
             lines = range(min(first, node.lineno), (node.end_lineno or first) + 1)
             found.append(Mutant(file, k, name, f'{before} -> {ast.unparse(node)}', lines))
@@ -79,7 +83,7 @@ def _change(node: ast.expr) -> bool:
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
         node.value = not node.value
     elif isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-        node.value += 1
+        node.value += node.value if abs(node.value) > 1000 else 1
     elif isinstance(node, ast.IfExp):
         node.body, node.orelse = node.orelse, node.body
     else:

@@ -40,7 +40,7 @@ PACKAGE = 'ugv_acceptance'
 FILES = ('model/*.py', 'evaluation/*.py')
 # A part for each job; what a mutant is tried by is chosen among these.
 TESTS = (
-    ('test/model', 'test/studies', 'test/run/test_verdicts.py'),
+    ('test/model', 'test/studies'),
     ('test/evaluation',),
 )
 PARTS = (PACKAGE, 'test', 'msg_configs', 'urdf', 'bags')
@@ -49,7 +49,7 @@ PATIENCE, HANGS = 10.0, 60.0
 OPTIONS = ('-q', '-x', '-p', 'no:cacheprovider', '-p', 'no:xdist')
 PROFILE = '--hypothesis-profile=mutants'
 # What tests import before they begin: paid for once, before the forks.
-COMMON = ('config', 'bag', 'run.verdicts', 'evaluation.live', 'simulation.scenarios')
+COMMON = ('config', 'bag', 'evaluation.live', 'simulation.scenarios')
 
 Lines = dict[str, list[str]]  # line -> the tests that ran it
 

@@ -80,7 +80,7 @@ def torque_margin(torque: ArrayLike, limit: ArrayLike) -> Floats:
 
 
 def utilisation(torque: ArrayLike, limit: ArrayLike) -> Floats:
-    """Return |torque| / limit (..., j): 1 is saturation; NaN where a limit is infinite."""
+    """Return |torque| / limit (..., j): 1 is saturation; 0 where a limit is infinite."""
     return np.abs(np.asarray(torque, dtype=np.float64)) / np.asarray(limit, dtype=np.float64)
 
 
