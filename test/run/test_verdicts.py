@@ -1,5 +1,6 @@
 """The verdict on a step from its alerts, and the folder that holds a run."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.plan.derive import Wanted, derive
-from ugv_acceptance.plan.plan import Step, write_plan
+from ugv_acceptance.plan.plan import Step, read_plan, write_plan
 from ugv_acceptance.run.catalogue import case_of
 from ugv_acceptance.run.coverage import cells, coverage_of
 from ugv_acceptance.run.folder import open_folder
@@ -67,7 +68,7 @@ def test_a_step_passes_if_its_alerts_are_those_it_expects(
     [
         (Done(0, 5, 8, stopped='ERROR TIP_OVER left'), 1.0, 'FAIL'),
         (Done(0, 5, 8, fault='the monitor has said nothing'), 1.0, 'INCONCLUSIVE'),
-        (Done(0, 5, 8, reached=False), 1.0, 'FAIL'),
+        (Done(0, 5, 8, wrong='the posture was not reached'), 1.0, 'FAIL'),
         (DONE, 0.9, 'INCONCLUSIVE'),
     ],
 )
@@ -116,6 +117,27 @@ def opened(path: Path, plan_file: Path, *, resume: bool = False, mode: str = 'si
     return open_folder(path, PLAN, plan_file, mode, CONFIG, resume=resume)
 
 
+def test_a_run_killed_while_it_made_its_folder_is_begun_anew(tmp_path: Path) -> None:
+    """Without run.json nothing was begun: neither refused nor taken for a run."""
+    out = tmp_path / 'out'
+    (out / 'steps').mkdir(parents=True)
+    (out / 'plan.yaml').write_text('half of a pl')
+    opened(out, tmp_path / 'plan.yaml', resume=True)
+    assert read_plan(out / 'plan.yaml') == PLAN
+    with pytest.raises(BadConfig, match='--resume continues'):
+        opened(out, tmp_path / 'plan.yaml')
+
+
+def test_the_journal_tells_what_began_and_what_came_of_it(tmp_path: Path) -> None:
+    """A line an event, in order, each a whole JSON object with its time."""
+    folder = opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    folder.note('attempt', step='one', number=1)
+    lines = [json.loads(x) for x in (folder.path / 'journal.jsonl').read_text().splitlines()]
+    assert [line['event'] for line in lines] == ['begun', 'attempt']
+    assert lines[0]['plan_sha256'] == PLAN.sha256
+    assert lines[0]['time'] <= lines[1]['time']
+
+
 def test_a_run_is_continued_only_when_asked(tmp_path: Path) -> None:
     """A folder with a run in it is never written over."""
     opened(tmp_path / 'out', tmp_path / 'plan.yaml')
@@ -141,6 +163,8 @@ def test_what_an_interruption_left_is_kept(tmp_path: Path) -> None:
         (place / 'data').write_text(str(number))
     aside = folder.path / 'steps' / f'{first.id}.interrupted-1' / 'data'
     assert aside.read_text() == '1'
+    folder.recording(first, 'attempt')
+    assert (folder.path / 'steps' / f'{first.id}.attempt-1' / 'data').read_text() == '2'
 
 
 def test_the_result_names_the_plan_and_every_step(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.boundaries import tip_boundary, torque_boundary
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
-from ugv_acceptance.plan.order import distance, ordered
+from ugv_acceptance.plan.order import ordered, seconds_of
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, look, roles_of, safe
 from ugv_acceptance.plan.ways import Routes
@@ -23,10 +23,15 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Share of a limit (and 20 deg of tilt) by which tests on a robot stay inside, by default.
 SPARE = 0.05
-# Speed (deg/s) of a demonstration: just below the rate to which the static model holds.
-QUICK = 35.0
-# And of a motion that ends in a tip-over, in simulation.
-TIPPING = 50.0
+# The steps of a demonstration by group, place and action, and what is different in them: as fast
+# as the static model holds, or as the simulated arm can.
+QUICK = {'hold_s': 1.0, 'speed_degps': 35.0}
+SHORT: dict[tuple[str, str, str], dict[str, float]] = {
+    ('torque boundary', ROBOT, 'hold'): QUICK,
+    ('rollover boundary', ROBOT, 'hold'): QUICK,
+    ('speed', ROBOT, 'sweep'): {},
+    ('rollover boundary', SIMULATION, 'tip'): {**QUICK, 'speed_degps': 57.0},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +63,10 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
         *drive_steps(arm, home),
         *endurance_steps(arm, home, wanted.endurance),
     ]
+    steps = [_refused(arm, step) for step in steps]
     if wanted.short:
-        steps = _few(steps, place)
-    routed = _routed(routes, ordered([_refused(arm, s) for s in steps], place))
+        steps = _few(routes, steps)
+    routed = _routed(routes, ordered(steps, place))
     final = ordered(routed, place)
     return Plan(
         plan=f'{config.name}{"-short" if wanted.short else ""}',
@@ -135,14 +141,14 @@ def _routed(routes: Routes, steps: Sequence[Step]) -> list[Step]:
     for step in steps:
         now = (step.ground, step.payload_kg)
         start = before if now == setup else home
-        if step.action in {'hold', 'tip', 'pull'}:
-            step = _with_way(routes, step, start)  # noqa: PLW2901 - the same step, its way known
+        found.append(_with_way(routes, step, start))
         before, setup = _vector(routes.arm, home, step.posture_deg), now
-        found.append(step)
     return found
 
 
 def _with_way(routes: Routes, step: Step, start: Floats) -> Step:
+    if step.action not in {'hold', 'tip', 'pull'}:
+        return step  # its postures on the way are what it is for
     if step.where == SIMULATION:
         return step.model_copy(update={'via_deg': ()})
     arm = routes.arm
@@ -162,23 +168,16 @@ def _vector(arm: Arm, home: Floats, posture: Posture) -> Floats:
     return q
 
 
-def _few(steps: Sequence[Step], home: Posture) -> list[Step]:
-    """Return one step of each kind, near home and quick, as a demonstration wants it."""
-    wanted = (
-        ('torque boundary', ROBOT, 'hold'),
-        ('rollover boundary', ROBOT, 'hold'),
-        ('speed', ROBOT, 'sweep'),
-        ('rollover boundary', SIMULATION, 'tip'),
-    )
-    quick = {'hold_s': 1.5, 'speed_degps': QUICK}
+def _few(routes: Routes, steps: Sequence[Step]) -> list[Step]:
+    """Return one step of each kind, the quickest from home, as a demonstration wants it."""
+    home = posture_deg(routes.arm, routes.home)
     found = []
-    for kind in wanted:
+    for kind, change in SHORT.items():
         of = [s for s in steps if (s.group, s.where, s.action) == kind]
-        if of:
-            nearest = min(of, key=lambda s: (not s.alerts.must, distance(home, s.posture_deg)))
-            sweeps = nearest.action == 'sweep'
-            speed = {'speed_degps': TIPPING} if nearest.action == 'tip' else {}
-            found.append(nearest if sweeps else nearest.model_copy(update=quick | speed))
+        with_ways = [_with_way(routes, s.model_copy(update=change), routes.home) for s in of]
+        same = [s for s in with_ways if s.where == kind[1]]
+        if same:
+            found.append(min(same, key=lambda s: (not s.alerts.must, seconds_of(s, home, home))))
     return found
 
 

@@ -53,16 +53,20 @@ def way(steps: Sequence[Step], home: Posture) -> float:
     return float(np.sum([distance(a, b) for a, b in pairwise(places)]))
 
 
+def seconds_of(step: Step, start: Posture, home: Posture) -> float:
+    """Return how long (s) a step's motions from `start` and its hold take."""
+    seconds, at = step.hold_s, start
+    for stop in (*step.via_deg, step.posture_deg):
+        seconds += distance(at, stop) * np.pi / (2.0 * step.speed_degps)
+        at = {**home, **stop}
+    return float(seconds)
+
+
 def durations(plan: Plan) -> list[float]:
     """Return how long (s) motions and hold of each step take, without what a person does."""
-    found, at = [], plan.home_deg
-    for step in plan.steps:
-        seconds = step.hold_s
-        for stop in (*step.via_deg, step.posture_deg):
-            seconds += distance(at, stop) * np.pi / (2.0 * step.speed_degps)
-            at = {**plan.home_deg, **stop}
-        found.append(float(seconds))
-    return found
+    home = plan.home_deg
+    starts = [home, *({**home, **step.posture_deg} for step in plan.steps)]
+    return [seconds_of(s, at, home) for s, at in zip(plan.steps, starts, strict=False)]
 
 
 def duration(plan: Plan) -> float:

@@ -10,7 +10,7 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 SIM, ROBOT, OPERATOR = 'sim', 'robot', 'operator'
 # Peak rate (rad/s) at which the simulated ground tilts; seconds to come to rest after it.
-TILT_RATE, REST = 0.6, 0.8
+TILT_RATE, REST = 0.9, 0.5
 # Seconds between two drive commands.
 DRIVE_PERIOD = 0.1
 

@@ -135,7 +135,8 @@ class Runner:
     def _prepare(self, step: Step) -> str:
         """Bring the robot home and set it up where anything changes; return what was wrong."""
         setup = (step.ground, step.payload_kg)
-        if self._lying:
+        # What is only simulated begins at the start, where no way home has to be safe.
+        if self._lying or (step.where == SIMULATION and setup != self._setup):
             self._setup, self.moves.trail = None, []
             if not self.hands.stand_up():
                 return REFUSED

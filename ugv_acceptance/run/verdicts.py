@@ -1,7 +1,8 @@
 """A step of a plan judged by the recording made while it was done."""
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ PASS, FAIL, INCONCLUSIVE, SKIPPED = 'PASS', 'FAIL', 'INCONCLUSIVE', 'SKIPPED'
 VERDICTS = (FAIL, INCONCLUSIVE, SKIPPED, PASS)
 # Less than this share of the hold evaluated: nothing was shown.
 LEAST = 0.95
+# Past its tipping point by more than this (deg), a robot does not merely lean.
+FALLEN = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +81,8 @@ def judge_step(step: Step, folder: Path, config: Config, done: Done) -> dict[str
         'bag': result['bag'],
         'covered': covered(seen, done),
     }
+    if step.action == 'tip' and not done.wrong:
+        done = replace(done, wrong=stood(seen, done))
     verdict, reasons = decide(step, found['alerts'], window, done, found['covered'])
     return {'verdict': verdict, 'reasons': reasons, **found}
 
@@ -156,6 +161,14 @@ def measured(seen: Seen, done: Done) -> dict[str, float]:
         'tilt_left_deg': round(float(np.degrees(np.median(tilt[rows]))), 2),
         'use': round(float(np.median(use[rows])), 4),
     }
+
+
+def stood(seen: Seen, done: Done) -> str:
+    """Return that a robot did not tip over though it should have; empty: it did."""
+    time, _, _, tilt = seen.joined()
+    rows = tilt[(time >= done.begin) & (time <= done.end)]
+    least = math.degrees(rows.min()) if rows.size else math.inf
+    return '' if least < -FALLEN else f'it did not tip over: {least:.1f} deg of tilt were left'
 
 
 def covered(seen: Seen, done: Done) -> float:

@@ -1,0 +1,183 @@
+"""A plan done by the runner in simulated time: real MuJoCo, real recordings, no ROS."""
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.config import load
+from ugv_acceptance.plan.plan import Plan
+from ugv_acceptance.run.folder import open_folder
+from ugv_acceptance.run.hands import OPERATOR, SIM, Ask, Hands
+from ugv_acceptance.run.offline import Offline
+from ugv_acceptance.run.runner import Runner
+from ugv_acceptance.run.verdicts import seen_in
+from ugv_acceptance.run.virtual import VirtualRobot
+from ugv_acceptance.simulation.faults import fault_from
+
+CONFIG = load()
+HOME = {
+    'turret_joint': 0.0, 'shoulder_joint': 95.0, 'elbow_joint': 140.0, 'flipper_joint': 180.0
+}  # fmt: skip
+NEAR = {**HOME, 'shoulder_joint': 105.0}
+TIPS: dict[str, Any] = {
+    'where': 'simulation', 'action': 'tip', 'payload_kg': 2.0,
+    'ground': {'orientation': 'left', 'tilt_deg': 25.0},
+    'posture_deg': {**HOME, 'turret_joint': 90.0, 'shoulder_joint': 40.0, 'elbow_joint': -85.0},
+    'alerts': {'must': ['ERROR TIP_OVER left'], 'must_not': []},
+}  # fmt: skip
+
+
+def plan_of(*steps: dict[str, Any]) -> Plan:
+    """Return a plan of steps near home that expect nothing, changed as given."""
+    usual = {
+        'group': 'g', 'title': 't', 'purpose': 'p', 'hold_s': 0.5, 'speed_degps': 35.0,
+        'posture_deg': NEAR, 'alerts': {'must_not': ['ERROR', 'STALE']},
+    }  # fmt: skip
+    written = [{'id': f's{k}', **usual, **step} for k, step in enumerate(steps)]
+    return Plan.model_validate(
+        {'plan': 'tiny', 'robot': 'packbot', 'config_sha256': CONFIG.sha256, 'home_deg': HOME,
+         'steps': written}
+    )  # fmt: skip
+
+
+def runner_of(
+    out: Path, plan: Plan, *faults: str, mode: str = SIM, ask: Ask = lambda *_: False
+) -> Runner:
+    """Return a runner of a plan in a folder, its robot with faults."""
+    home = tuple(math.radians(HOME[n]) for n in CONFIG.settings.robot.joint_names)
+    found = tuple(fault_from(text, CONFIG.settings.robot) for text in faults)
+    world = Offline(VirtualRobot(CONFIG, 1, found, home), lambda _: None)
+    folder = open_folder(out, plan, None, mode, CONFIG, resume=False)
+    return Runner(CONFIG, folder, world, Hands(world, mode, ask), attempts=2)
+
+
+def results(runner: Runner) -> Iterator[dict[str, Any]]:
+    """Do all steps and yield what came of each."""
+    for step in runner.folder.plan.steps:
+        result = runner.run(step)
+        assert result is not None
+        yield result
+
+
+def test_a_posture_is_reached_held_and_passes(tmp_path: Path) -> None:
+    """What the recording shows in the hold is the posture that was asked for."""
+    runner = runner_of(tmp_path / 'out', plan_of({}))
+    (result,) = results(runner)
+    assert (result['verdict'], result['earlier']) == ('PASS', [])
+    time, q, _, _ = seen_in(tmp_path / 'out' / 'steps' / 's0', CONFIG).joined()
+    start = open_bag(tmp_path / 'out' / 'steps' / 's0').start_ns
+    held = q[(time - start) / 1e9 >= result['window_s'][1]]
+    wanted = [math.radians(NEAR[n]) for n in CONFIG.settings.robot.joint_names]
+    assert np.abs(held - wanted).max() < math.radians(2.0)
+
+
+def test_the_same_seed_gives_the_same_recording(tmp_path: Path) -> None:
+    """In simulated time nothing depends on the machine: the same bytes, twice."""
+    for name in 'ab':
+        list(results(runner_of(tmp_path / name, plan_of({}))))
+    one, two = (tmp_path / name / 'steps' / 's0' / 's0_0.mcap' for name in 'ab')
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_tip_over_is_seen_and_the_next_step_stands_again(tmp_path: Path) -> None:
+    """The alarm comes before the fall; afterwards the robot is set up from the start."""
+    first, second = results(runner_of(tmp_path / 'out', plan_of(TIPS, {})))
+    assert (first['verdict'], second['verdict']) == ('PASS', 'PASS')
+    path = tmp_path / 'out' / 'steps' / 's0'
+    time, _, _, tilt = seen_in(path, CONFIG).joined()
+    fallen = time[tilt < math.radians(-20.0)]
+    assert len(fallen)
+    raised = next(a for a in first['alerts'] if a['level'] == 'ERROR' and a['code'] == 'TIP_OVER')
+    assert raised['start_s'] < (fallen[0] - open_bag(path).start_ns) / 1e9
+
+
+def test_an_alarm_that_is_not_expected_stops_the_fall(tmp_path: Path) -> None:
+    """The same motion where the alarm is not expected: frozen in time, the robot does not tip."""
+    unexpected = {**TIPS, 'alerts': {'must_not': ['ERROR TIP_OVER']}}
+    (result,) = results(runner_of(tmp_path / 'out', plan_of(unexpected)))
+    assert result['verdict'] == 'FAIL'
+    assert result['reasons'][0].startswith('stopped: ERROR TIP_OVER left')
+    path = tmp_path / 'out' / 'steps' / 's0'
+    time, q, _, tilt = seen_in(path, CONFIG).joined()
+    after = (time - open_bag(path).start_ns) / 1e9 > result['window_s'][2] + 0.5
+    assert after.sum() > 10
+    assert np.ptp(q[after], axis=0).max() < math.radians(1.0)
+    assert tilt.min() > 0.0
+
+
+def test_missing_messages_are_tried_again_and_told(tmp_path: Path) -> None:
+    """An IMU that is dead for a while: inconclusive first, then done again and passed."""
+    runner = runner_of(tmp_path / 'out', plan_of({}), 'dead:imu@1.5-9')
+    (result,) = results(runner)
+    assert result['verdict'] == 'PASS'
+    assert [e['verdict'] for e in result['earlier']] == ['INCONCLUSIVE']
+    assert 'STALE' in result['earlier'][0]['reasons'][0]
+    assert open_bag(tmp_path / 'out' / 'steps' / 's0.attempt-1').topics['/imu/data'].count > 10
+
+
+def test_messages_that_never_come_back_show_nothing(tmp_path: Path) -> None:
+    """After the last attempt the step is inconclusive, and says why."""
+    (result,) = results(runner_of(tmp_path / 'out', plan_of({}), 'dead:imu@1.5'))
+    assert result['verdict'] == 'INCONCLUSIVE'
+    assert 'STALE INPUT_STALE imu' in result['reasons'][0]
+
+
+def test_a_posture_that_is_not_reached_fails(tmp_path: Path) -> None:
+    """A joint whose encoder froze: the joint that is off is named."""
+    (result,) = results(runner_of(tmp_path / 'out', plan_of({}), 'frozen-encoder:shoulder_joint'))
+    assert result['verdict'] == 'FAIL'
+    assert result['reasons'][0].startswith('the posture was not reached: shoulder_joint is ')
+
+
+def test_a_posture_that_is_left_during_the_hold_fails(tmp_path: Path) -> None:
+    """Reached is not enough: somebody who moves the arm away is seen."""
+    runner = runner_of(tmp_path / 'out', plan_of({'hold_s': 4.0}))
+    world = runner.world
+
+    def meddle(now: float) -> None:
+        if now > 6.0:
+            world.commands.move({'shoulder_joint': math.radians(112.0)}, 0.5)
+
+    assert isinstance(world, Offline)
+    world.progress = meddle
+    (result,) = results(runner)
+    assert result['verdict'] == 'FAIL'
+    assert result['reasons'][0].startswith('the posture was not held: shoulder_joint')
+
+
+def test_a_pull_is_felt(tmp_path: Path) -> None:
+    """The simulated drag holds at the plan's force and slips well above it."""
+    moved = []
+    for force in (170.0, 260.0):
+        runner = runner_of(tmp_path / f'{force}', plan_of(
+            {'action': 'pull', 'force_n': force, 'hold_s': 2.0, 'posture_deg': HOME}
+        ))  # fmt: skip
+        list(results(runner))
+        assert isinstance(runner.world, Offline)
+        moved.append(-float(runner.world.virtual.remote.simulation.base()[0][0]))
+    assert moved[0] < 0.01
+    assert moved[1] > 0.1
+
+
+def test_an_operator_who_refuses_leaves_the_step_open(tmp_path: Path) -> None:
+    """Neither passed nor failed, not tried again, and the reason is there."""
+    runner = runner_of(tmp_path / 'out', plan_of({}), mode=OPERATOR)
+    (result,) = results(runner)
+    assert result['verdict'] == 'INCONCLUSIVE'
+    assert result['reasons'] == ['the operator did not do what was asked']
+    assert result['earlier'] == []
+
+
+def test_an_interrupted_step_has_no_result(tmp_path: Path) -> None:
+    """Asked to end, the runner freezes the robot and leaves the step for --resume."""
+    runner = runner_of(tmp_path / 'out', plan_of({}))
+    runner.asked = runner.moves.asked = lambda: runner.world.now() > 2.0
+    assert runner.run(runner.folder.plan.steps[0]) is None
+    lines = (tmp_path / 'out' / 'journal.jsonl').read_text().splitlines()
+    assert json.loads(lines[-1])['event'] == 'interrupted'
+    assert runner.folder.done(runner.folder.plan.steps[0]) is None
