@@ -1,5 +1,6 @@
 """Robot files with anything in them: a configuration, or one line that names the file."""
 
+import re
 import time
 from itertools import pairwise
 from math import inf
@@ -11,13 +12,19 @@ from hardening.outcome import Outcome
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
+from ugv_acceptance.model.statics import static_torque
 
 PIECES = (
     '', '0', '-1', 'nan', '1e999', '[]', '{}', '&a', '*a', '!!python/object:os.system', '\t', '\0',
     '<', '>', '"', '&b;', 'base', 'arm', '30 deg', '~', '- ', ': ', '\n', '</robot>',
 )  # fmt: skip
 ENTITIES = '<!DOCTYPE r [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>'
+LAUGHS = ''.join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 10))
+LAUGHS = f'<!DOCTYPE r [<!ENTITY a0 "ha">{LAUGHS}]>'
 EXTERNAL = '<!DOCTYPE r [<!ENTITY b SYSTEM "file:///etc/passwd">]>'
+SECOND_PARENT = (
+    '<joint name="z" type="fixed"><parent link="base"/><child link="hand"/></joint></robot>'
+)
 
 
 def mutated(rng: Random, text: str) -> str:
@@ -75,6 +82,11 @@ def hostile(folder: Path, patience: float = inf) -> Outcome:
     files = {
         'entities': (YAML, ENTITIES + URDF.replace('name="two"', 'name="&b;"', 1)),
         'external entity': (YAML, EXTERNAL + URDF.replace('name="two"', 'name="&b;"', 1)),
+        'billion laughs': (YAML, LAUGHS + URDF.replace('name="two"', 'name="&a9;"', 1)),
+        'two parents': (YAML, URDF.replace('</robot>', SECOND_PARENT)),
+        'two roots': (YAML, URDF.replace('</robot>', '<link name="other"/></robot>')),
+        'no mass at all': (YAML, re.sub(r'<mass value="\d+"/>', '<mass value="0"/>', URDF)),
+        'cycle of aliases': ('a: &a [*a]\n' + YAML, URDF),
         'cycle': (YAML, URDF.replace('<child link="arm"/>', '<child link="base"/>')),
         'negative mass': (YAML, URDF.replace('"20"', '"-20"')),
         'infinite mass': (YAML, URDF.replace('"20"', '"inf"')),
@@ -100,9 +112,10 @@ def hostile(folder: Path, patience: float = inf) -> Outcome:
 
 
 def large(folder: Path, joints: int, *, branches: bool, patience: float = inf) -> Outcome:
-    """Load a tree of `joints` joints, of which one is the robot's, and its margins."""
+    """Load a tree of `joints` joints, the first hundred of them the robot's; mass and torques."""
     theirs = '  lift:\n    limit_nm: 30\n  slide:\n    limit_n: 100\n'
-    yaml = YAML.replace(theirs, '  j_l0:\n    limit_nm: 30\n')
+    ours = min(joints, 100)
+    yaml = YAML.replace(theirs, ''.join(f'  j_l{k}:\n    limit_nm: 30\n' for k in range(ours)))
     yaml = yaml.replace('payload: {link: hand, mass_kg: 1}\n', '')
     start = time.perf_counter()
     path = write_robot(folder, yaml, chain(joints, branches=branches))
@@ -110,8 +123,13 @@ def large(folder: Path, joints: int, *, branches: bool, patience: float = inf) -
         robot = load(path).settings.robot
     except BadConfig as error:
         return Outcome(f'{joints} joints refused: {error}', held=False)
-    mass = sum(link.mass for link in robot.links)
     took = time.perf_counter() - start
+    mass = sum(link.mass for link in robot.links)
+    torque = static_torque(robot, [0.0] * ours, (0.0, 0.0, -9.81))
+    # Every link of a chain is a kg, 0.1 m further out than the one before it.
+    carried = [0 if branches else sum(range(joints - k)) for k in range(ours)]
+    wrong = max(abs(tau - 0.981 * x) for tau, x in zip(torque, carried, strict=True))
     shape = 'branches' if branches else 'links in a chain'
-    text = f'{joints} {shape}: mass {mass:g} kg of {joints + 1} kg, {took:.2f} s'
-    return Outcome(text, abs(mass - joints - 1) < 1e-9 and took < patience)
+    text = f'{joints} {shape}: mass {mass:g} kg of {joints + 1} kg, '
+    text += f'torques wrong by {wrong:.1e} N m, loaded in {took:.2f} s'
+    return Outcome(text, abs(mass - joints - 1) < 1e-9 and wrong < 1e-6 and took < patience)

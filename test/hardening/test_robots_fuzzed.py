@@ -18,8 +18,12 @@ def test_bombs_entities_and_cycles_are_refused(tmp_path: Path) -> None:
     assert outcome.held, outcome.measured
 
 
-@pytest.mark.parametrize(('joints', 'branches'), [(499, False), (100, True)])
-def test_large_robots_keep_their_mass(tmp_path: Path, joints: int, branches: bool) -> None:  # noqa: FBT001
-    """Five hundred links in a chain, a hundred on one base."""
+@pytest.mark.parametrize(('joints', 'branches'), [(499, False), (100, False), (100, True)])
+def test_large_robots_keep_their_mass_and_torques(
+    tmp_path: Path,
+    joints: int,
+    branches: bool,  # noqa: FBT001
+) -> None:
+    """Five hundred links in a chain, branches of a hundred joints, a hundred on one base."""
     outcome = robots_fuzzed.large(tmp_path, joints, branches=branches)
     assert outcome.held, outcome.measured
