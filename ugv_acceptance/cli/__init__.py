@@ -3,6 +3,7 @@
 A verb's module imports what it needs inside its function, so that --help and completion are quick.
 """
 
+import errno
 import sys
 from importlib import import_module
 
@@ -11,6 +12,8 @@ import typer
 from ugv_acceptance import AcceptanceError, __version__
 
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
+# A disk that is full, a quota or a limit that is reached, a file system that is read-only.
+NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 
 # In the order in which people meet them; the code of a verb is cli/VERB.py, function VERB.
 VERBS = (
@@ -68,6 +71,12 @@ def main() -> None:
         app()
     except AcceptanceError as error:
         typer.echo(f'ugv-acceptance: {error}', err=True)
+        sys.exit(BAD_INPUT)
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        where = f'{error.filename}: ' if error.filename else ''
+        typer.echo(f'ugv-acceptance: {where}cannot be written: {error.strerror}', err=True)
         sys.exit(BAD_INPUT)
 
 
