@@ -5,6 +5,8 @@ PYTHON ?= python3
 ifndef JAZZY_PYTHON
 JAZZY_PYTHON := $(shell .ci/find-python 3.12)
 endif
+# Pythons beside those of `make test` for which ROS has wheels.
+VERSIONS ?= 3.10 3.13
 # Processes that run tests side by side.
 JOBS ?= 2
 
@@ -12,7 +14,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help venv demo test lint pytest colcon hardening clean distclean
+.PHONY: help venv demo test lint pytest colcon versions hardening clean distclean
 
 # The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
 # libraries load.
@@ -39,6 +41,7 @@ help:
 	@echo 'make lint       ruff and mypy --strict'
 	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
 	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
+	@echo 'make versions   the tests, but for the browser, on $(VERSIONS), the oldest with NumPy 1.26; ARGS as above'
 	@echo 'make hardening  the faults of docs/threats.md, tried by the thousand: about an hour, by hand; ARGS="--only 1,2"'
 	@echo 'make clean      removes what was built; make distclean the virtual environments too'
 
@@ -57,6 +60,15 @@ venv: .venv/.installed
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
 	    -e '.[console,fast,sim,test]' colcon-common-extensions
+	touch $@
+
+# The pip that comes with 3.10 searches for over ten minutes before it finds versions that fit.
+.venv3%/.installed: $(REQUIREMENTS)
+	@python=$$(.ci/find-python 3.$*) || { echo 'expected a python3.$* on PATH, in pyenv or in uv, found none'; exit 1; }; \
+	test -x .venv3$*/bin/python || "$$python" -m venv .venv3$*
+	.venv3$*/bin/python -m pip install -qq --upgrade pip
+	.venv3$*/bin/python $(PIP_INSTALL) $(if $(filter 10,$*),-c requirements/jazzy.txt) -r requirements/ros.txt \
+	    -e '.[console,fast,sim,test]'
 	touch $@
 
 demo: venv
@@ -101,6 +113,11 @@ colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
+versions: $(foreach version,$(VERSIONS),.venv$(subst .,,$(version))/.installed)
+	failed=0; for version in $(VERSIONS); do \
+	    ".venv$${version/./}/bin/python" -m pytest -n $(JOBS) '--ignore-glob=*test_page_of_*' $(ARGS) || failed=1; \
+	done; exit $$failed
+
 hardening: venv
 	.venv/bin/python -m bench.hardening $(ARGS)
 
@@ -109,4 +126,4 @@ clean:
 	find . -path './.venv*' -prune -o -name __pycache__ -type d -print0 | xargs -0 rm -rf
 
 distclean: clean
-	rm -rf .venv .venv312
+	rm -rf .venv .venv3*
