@@ -42,6 +42,7 @@ def robots(share: float) -> Iterable[Outcome]:
         yield robots_fuzzed.fuzz(path, int(10_000 * share), patience=PATIENCE)
         yield robots_fuzzed.hostile(path, PATIENCE)
         yield robots_fuzzed.large(path, 499, branches=False, patience=PATIENCE)
+        yield robots_fuzzed.large(path, 100, branches=False, patience=PATIENCE)
         yield robots_fuzzed.large(path, 100, branches=True, patience=PATIENCE)
 
 
