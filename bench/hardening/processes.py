@@ -7,14 +7,14 @@ from pathlib import Path
 
 from hardening.outcome import Outcome
 
-from bench.hardening.mutation import TESTS, try_some
-from bench.hardening.suite import passed
+from bench.hardening.mutants import EQUIVALENT
+from bench.hardening.mutation import try_some
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def kills(share: float) -> Iterable[Outcome]:
-    """Kill twenty runs at random moments, and the black box as its tests do."""
+    """Kill twenty runs at random moments."""
     count = max(1, int(20 * share))
     command = [sys.executable, 'bench/bench_kill.py', '--kills', str(count)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -25,11 +25,15 @@ def kills(share: float) -> Iterable[Outcome]:
     most = max(lost, default=0.0)
     text = f'run: {whole} of {count} left all recordings readable, at most {most:.2f} s lost'
     yield Outcome(text, whole == count == len(rows) and most <= 1.0)
-    yield passed(['nodes/test_black_box.py'])
 
 
 def mutation(share: float) -> Iterable[Outcome]:
-    """Change the code of six files and see whether their tests notice."""
-    for name, (dead, tried) in try_some(TESTS, 1200 * share, 0).items():
-        rate = dead / tried if tried else 0.0
-        yield Outcome(f'{name}: {dead} of {tried} killed ({rate:.0%})', rate >= 0.85)
+    """Change the code of two rooms, 300 times in all, and see whether the tests notice."""
+    found = try_some(count=max(30, int(300 * share)))
+    for room in ('model', 'evaluation'):
+        mine = {file: n for file, n in found.items() if file.startswith(room)}
+        dead, tried = (sum(n) for n in zip(*mine.values(), strict=True))
+        each = ', '.join(f'{Path(file).stem} {k}/{n}' for file, (k, n) in mine.items())
+        text = f'{room}/: {dead} of {tried} killed ({dead / tried:.0%}): {each}'
+        yield Outcome(text, dead >= 0.85 * tried)
+    yield Outcome(f'{len(EQUIVALENT)} more can be seen by nobody and were left out', held=True)
