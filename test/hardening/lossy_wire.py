@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hardening.outcome import Outcome
-from hardening.relay import LANES, TOPICS, qos_of
+from hardening.relay import LANES, TOPICS, as_offered
 from hardening.wire import Ears, child, line_of
 from nodes.live_case import live_nodes, ros_context
 from rclpy.node import Node
@@ -37,7 +37,7 @@ class Recorder(Node):
                 writer.add_topic(f'/{topic}', name)
                 take = self._taker(writer, f'/{topic}')
                 place = f'/lane_{k}/{topic}'
-                self.create_subscription(kind, place, take, qos_of(topic), raw=True)
+                self.create_subscription(kind, place, take, as_offered(topic), raw=True)
 
     def _taker(self, writer: BagWriter, topic: str) -> Any:
         return lambda data: writer.write(topic, time.time_ns(), data)

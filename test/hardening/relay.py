@@ -19,8 +19,12 @@ from hardening.lossy import WAYS
 from hardening.robot import say
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
+
+from ugv_acceptance.bag.raw import Offered
+from ugv_acceptance.nodes.player import qos_of
+from ugv_acceptance.nodes.running import end
 
 # Way -> share lost, bursts a minute, their length (s), jitter (s). The first is the control.
 LANES = {'nothing lost': (0.0, 0.0, 0.0, 0.0), **WAYS}
@@ -72,23 +76,21 @@ class Lane:
             heapq.heappop(self.held)[2]()
 
 
-def qos_of(topic: str) -> QoSProfile:
+def as_offered(topic: str) -> QoSProfile:
     """Return the QoS of a topic, as the robot offers it."""
-    quick = topic != 'payload'
-    kinds = ReliabilityPolicy
-    return QoSProfile(depth=1000, reliability=kinds.BEST_EFFORT if quick else kinds.RELIABLE)
+    return qos_of(Offered('reliable' if topic == 'payload' else 'best_effort'))
 
 
 def relay(node: Node, lanes: list[Lane], topic: str, kind: Any) -> None:
     """Pass a topic on, on every lane."""
     places = [f'/lane_{k}/{topic}' for k in range(len(lanes))]
-    publishers = [node.create_publisher(kind, place, qos_of(topic)) for place in places]
+    publishers = [node.create_publisher(kind, place, as_offered(topic)) for place in places]
 
     def take(data: bytes) -> None:
         for lane, publisher in zip(lanes, publishers, strict=True):
             lane.take(lambda p=publisher: p.publish(data))  # type: ignore[misc]
 
-    node.create_subscription(kind, f'/sent/{topic}', take, qos_of(topic), raw=True)
+    node.create_subscription(kind, f'/sent/{topic}', take, as_offered(topic), raw=True)
 
 
 def main() -> None:
@@ -98,7 +100,12 @@ def main() -> None:
     lanes = [Lane(way, Random(f'{sys.argv[1]} {name}')) for name, way in LANES.items()]
     for topic, kind in TOPICS:
         relay(node, lanes, topic, kind)
-    node.create_timer(STEP, lambda: [lane.release() for lane in lanes])
+
+    def release() -> None:
+        for lane in lanes:
+            lane.release()
+
+    node.create_timer(STEP, release)
     executor = EventsExecutor()
     executor.add_node(node)
     ended: list[str] = []
@@ -106,7 +113,7 @@ def main() -> None:
     say('ready')
     while not ended:
         executor.spin_once(timeout_sec=0.1)
-    node.destroy_node()
+    end(node)
     rclpy.shutdown()
 
 

@@ -17,10 +17,11 @@ from typing import Any
 
 import rclpy
 from geometry_msgs.msg import InertiaStamped
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
+from ugv_acceptance.bag.raw import Offered
+from ugv_acceptance.nodes.player import qos_of
 from ugv_acceptance.nodes.running import end
 
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
@@ -62,7 +63,8 @@ def joints_of(kind: str) -> bytearray | None:
     """Return the joint states while something goes wrong; None: none."""
     if kind in ('silent joints', 'mute'):
         return None
-    names, q = NAMES, REACH if kind in ('overload', 'jolt') else CALM
+    names: tuple[str, ...] = NAMES
+    q: tuple[float, ...] = REACH if kind in ('overload', 'jolt') else CALM
     if kind == 'half':
         names, q = NAMES[:2], CALM[:2]
     if kind == 'nan':
@@ -115,8 +117,7 @@ def main() -> None:
     task = Task(**(words | {'faults': tuple(map(tuple, words['faults']))}))
     rclpy.init()
     node = rclpy.create_node(task.name)
-    quick = ReliabilityPolicy.RELIABLE if task.reliable else ReliabilityPolicy.BEST_EFFORT
-    qos = QoSProfile(depth=100, reliability=quick)
+    qos = qos_of(Offered('reliable' if task.reliable else 'best_effort'))
     publishers: list[Any] = [
         node.create_publisher(JointState, 'joint_states', qos),
         node.create_publisher(Imu, 'imu/data', qos),

@@ -16,10 +16,11 @@ from hardening.outcome import memory
 from hardening.robot import STAMP, Task
 from nodes.live_case import WARN, Live, live_nodes, ros_context
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 
+from ugv_acceptance.bag.raw import Offered
 from ugv_acceptance.nodes.outputs import LATCHED
+from ugv_acceptance.nodes.player import qos_of
 
 HERE = Path(__file__).parents[1]
 MONITOR = 'from ugv_acceptance.nodes.monitor import main; main()'
@@ -49,8 +50,7 @@ class Ears(Node):
         self.verdicts: list[DiagnosticStatus] = []
         self.diagnostics: dict[str, dict[str, str]] = {}
         self.last = {'joint_states': 0, 'imu': 0}
-        at, quick = 'acceptance_monitor', QoSProfile(depth=100)
-        quick.reliability = ReliabilityPolicy.BEST_EFFORT
+        at, quick = 'acceptance_monitor', qos_of(Offered('best_effort'))
         self.create_subscription(DiagnosticStatus, f'{at}/verdict', self.verdicts.append, LATCHED)
         self.create_subscription(DiagnosticArray, f'{at}/alerts', self._take_alerts, 50)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._take_diagnostics, 50)
