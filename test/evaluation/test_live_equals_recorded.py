@@ -23,12 +23,15 @@ from evaluation.streams import (
     settings,
     split,
     streams,
+    tilted,
+    upright,
 )
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.alerts import Alert
-from ugv_acceptance.evaluation.settings import Delays, ImuInput, Settings
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
+from ugv_acceptance.evaluation.wording import describe
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 
@@ -118,6 +121,28 @@ def test_long_runs_are_equal_too(cuts: list[int], seed: int) -> None:
     middle = len(messages) // 2
     messages.insert(middle, Carry(messages[middle - 1].time + 1, 3.0))
     compare(settings(), messages, cuts, [], S)
+
+
+@hypothesis.settings(max_examples=60)
+@given(streams(), st.lists(st.integers(0, 120), max_size=5), st.floats(0.05, 0.6))
+def test_sliding_is_the_same_too(messages: list[Message], cuts: list[int], friction: float) -> None:
+    """With a friction of the ground: who slides before he tips is told live and afterwards."""
+    limits = Limits((45.0, 30.0), friction=friction, tip_warn=0.3)
+    compare(settings(limits=limits, delays=Delays(tip_on=0.02, off=0.1)), messages, cuts, [], S)
+
+
+def test_a_robot_slides_before_it_tips_where_friction_says_so() -> None:
+    """On a slope of 15 degrees with a friction of 0.3 it does, with 0.5 there is no such alert."""
+    lean = tilted(math.radians(15.0))
+    messages = run_of(2.0, imu=Imu(0, lean, acceleration=upright(lean)))
+    for friction, wanted in ((0.3, 1), (0.5, 0), (math.inf, 0)):
+        told = settings(limits=Limits((45.0, 30.0), friction=friction))
+        _, evaluator = recorded(told, [messages], T0 + 2 * S)
+        slides = [a for a in evaluator.watch.log if a.rule.code == 'SLIDE']
+        assert len(slides) == wanted
+        for alert in slides:
+            assert math.degrees(-alert.peak) == pytest.approx(1.7, abs=0.01)
+            assert describe(alert, told).endswith(': 1.7 degrees of slope left')
 
 
 def test_a_payload_counts_from_the_next_joint_state_on() -> None:

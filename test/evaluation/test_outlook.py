@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.live import Margins
-from ugv_acceptance.evaluation.outlook import Outlook, slide_left
+from ugv_acceptance.evaluation.outlook import Outlook
 from ugv_acceptance.evaluation.payload_estimate import payload_estimate
+from ugv_acceptance.evaluation.prediction import slide_left
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import Stability
 from ugv_acceptance.model.statics import static_torque
@@ -88,15 +89,15 @@ def test_without_a_friction_nothing_slides() -> None:
 
 @given(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-0.8, 0.8))
 def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) -> None:
-    """Efforts of another load than the declared one give its mass; those of the same give none."""
+    """Efforts of a load at rest give its mass, and whether it is another than the declared one."""
     q, down = (0.3, 0.4, -0.2, 0.0), gravity_on_slope(9.81, tilt, 1.0)
     effort = static_torque(PACKBOT.robot, q, down, Payload(carried))
     found = payload_estimate(PACKBOT, q, STILL, effort.tolist(), down.tolist(), Payload(declared))
-    if abs(declared - carried) < 0.499:
-        assert found is None
-    elif abs(declared - carried) > 0.501:
-        assert found is not None
-        assert found.mass == pytest.approx(carried, abs=1e-6)
+    assert found is not None
+    assert found.mass == pytest.approx(carried, abs=1e-6)
+    if not 0.499 < abs(declared - carried) < 0.501:
+        assert found.differs == (abs(declared - carried) > 0.5)
+    assert f'as if {max(carried, 0.0):.1f} kg' in found.sentence
 
 
 def test_the_motors_tell_nothing_of_a_load_while_they_move() -> None:

@@ -76,7 +76,23 @@ def test_a_robot_that_slides_before_it_tips_is_told() -> None:
     wait_until(lambda: session.evaluator.margins, lambda: give(session, FOLDED, slope))
     verdict = verdict_of(session)
     assert verdict.values['slide_left_deg'] == pytest.approx(1.7, abs=0.01)
-    assert 'slide before it tips' in verdict.message
+    wait_until(lambda: session.active, lambda: give(session, FOLDED, slope))
+    (alert,) = session.active
+    assert (alert.rule.code, alert.rule.subject) == ('SLIDE', 'robot')
+    said = verdict_of(session).message
+    assert 'the tracks slide before it tips: 1.7 degrees of slope left' in said
+    assert 'stop; go back to where the slope is less' in said
+
+
+def test_a_robot_that_tips_before_it_slides_is_not_told_of_sliding() -> None:
+    """With a friction of 0.8 a stretched arm with its load tips first."""
+    limits = replace(PACKBOT.limits, friction=0.8)
+    session = session_with(replace(PACKBOT, limits=limits))
+    wait_until(
+        lambda: any(a.rule.code == 'TIP_OVER' for a in session.active),
+        lambda: give(session, STRETCHED, math.radians(30.0)),
+    )
+    assert not any(a.rule.code == 'SLIDE' for a in session.active)
 
 
 def test_a_load_that_the_motors_feel_is_offered() -> None:
@@ -86,10 +102,34 @@ def test_a_load_that_the_motors_feel_is_offered() -> None:
     wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
     told = []
     for _ in range(4):
-        session.counsel.feel()
+        session.feel()
         told.append(session.counsel.estimate is not None)
     assert told == [False, False, True, True]
+    alert = next(a for a in session.active if a.rule.code == 'PAYLOAD_DIFFERS')
+    assert alert.peak == pytest.approx(2.0, abs=0.01)
+    words = session.faults.sentence(alert, session.settings)
+    assert words == 'the motors work as if 6.0 kg were in the hand, 4.0 kg are declared'
+    assert 'declare the load' in session.counsel.do(alert)
     assert verdict_of(session).values['payload_estimate_kg'] == pytest.approx(6.0, abs=0.01)
+
+
+def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared() -> None:
+    """A moving arm tells nothing: the alert stays; efforts that agree end it."""
+    session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
+    effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
+    wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
+    for _ in range(3):
+        session.feel()
+    moving = joint_state_cdr(
+        time.time_ns(), '', PACKBOT.robot.joint_names, q, (0.0, 0.3, 0.0, 0.0), effort
+    )
+    session.take_joint_state(moving)
+    session.feel()
+    assert session.counsel.estimate is not None
+    session.evaluator.payload = Payload(6.0)
+    give(session, q, 0.0, effort)
+    session.feel()
+    assert session.counsel.estimate is None
 
 
 def test_a_tilt_that_grows_fast_is_urgent() -> None:

@@ -11,6 +11,7 @@ from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
 from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.prediction import slides_first
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.watch import InputSignals, Watch
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
@@ -225,6 +226,9 @@ class LiveEvaluator:
             if -angle >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, -angle)
                 error.step(now, -angle)
+        if watch.slide.on < math.inf:
+            friction = self.settings.limits.friction
+            watch.slide.step(now, float(slides_first(self._gravity, min(angles), friction)))
         fallen = stability.state >= NO_CONTACT
         if fallen or not watch.support.quiet:
             watch.support.step(now, 1.0 if fallen else 0.0)

@@ -119,14 +119,3 @@ def _line(time: 'np.ndarray', values: 'np.ndarray') -> tuple[float, float]:
     away = time - time.mean()
     rate = float(away @ values / (away @ away))
     return float(values.mean() - rate * time.mean()), rate
-
-
-def slide_left(gravity: tuple[float, float, float], friction: float) -> float:
-    """Return the slope (rad) that is left until the tracks slide; infinite where friction is.
-
-    `gravity` in `base_link`, of a robot on its tracks; `friction` is their coefficient.
-    """
-    x, y, z = gravity
-    return (
-        math.inf if math.isinf(friction) else math.atan(friction) - math.atan2(math.hypot(x, y), -z)
-    )

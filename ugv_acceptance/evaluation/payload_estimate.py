@@ -23,11 +23,16 @@ class PayloadEstimate:
     declared: float
 
     @property
+    def differs(self) -> bool:
+        """Whether it is another load than the declared one."""
+        return abs(self.mass - self.declared) >= DIFFERS
+
+    @property
     def sentence(self) -> str:
         """What to tell the operator."""
         return (
             f'the motors work as if {max(self.mass, 0.0):.1f} kg were in the hand, '
-            f'{self.declared:.1f} kg are declared: declare the load'
+            f'{self.declared:.1f} kg are declared'
         )
 
 
@@ -39,7 +44,7 @@ def payload_estimate(
     gravity: Sequence[float],
     payload: Payload,
 ) -> PayloadEstimate | None:
-    """Return the payload that explains `effort` (j,) where it differs from the declared one.
+    """Return the payload that explains `effort` (j,), be it the declared one or another.
 
     None while a joint moves, where no effort is known, where the posture does not tell, or where no
     payload would explain it. rad, rad/s, N m (N), m/s2.
@@ -55,6 +60,7 @@ def payload_estimate(
         return None
     more = float(felt @ open_ / (felt @ felt))
     rest = open_ - more * felt
-    if abs(more) < DIFFERS or not rest @ rest <= (1.0 - EXPLAINED) * (open_ @ open_):
+    # A difference that no load explains tells nothing of the load.
+    if rest @ rest > max((1.0 - EXPLAINED) * (open_ @ open_), DIFFERS**2 * (felt @ felt)):
         return None
     return PayloadEstimate(payload.mass + more, payload.mass)

@@ -3,6 +3,8 @@
 Not part of the alert rules: docs/plan_and_run.md says what it gains and what false alerts it costs.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -69,3 +71,25 @@ def time_to_saturation(
 ) -> Floats:
     """Return the time (..., j) in s until a static torque's size is at its limit (j,)."""
     return time_to(limits, np.abs(np.asarray(now)), np.abs(np.asarray(then)), seconds)
+
+
+def slide_left(gravity: Sequence[ArrayLike], friction: float) -> Floats:
+    """Return the slope (...) in rad that is left until the tracks slide; infinite where unknown.
+
+    `gravity` is x, y, z (...) in `base_link`, of a robot on its tracks; `friction` that of the
+    tracks, infinite: not known.
+    """
+    x, y, z = (np.asarray(axis, dtype=np.float64) for axis in gravity)
+    slope = np.arctan2(np.hypot(x, y), -z)
+    left: Floats = np.full(slope.shape, np.inf)
+    return left if friction == np.inf else np.arctan(friction) - slope
+
+
+def slides_first(gravity: Sequence[ArrayLike], least: ArrayLike, friction: float) -> Floats:
+    """Return minus the slope (...) left where the tracks slide before the robot tips, else -inf.
+
+    `least` (...) is the smallest tilt left (rad).
+    """
+    left = slide_left(gravity, friction)
+    worse: Floats = np.where(left < np.asarray(least), -left, -np.inf)
+    return worse

@@ -12,6 +12,7 @@ from ugv_acceptance.evaluation.freshness import Freshness
 from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.payload import PayloadHistory, payload_from
+from ugv_acceptance.evaluation.prediction import slides_first
 from ugv_acceptance.evaluation.rows import Floats, MarginRows, Pairs, Times
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -248,6 +249,10 @@ class RecordedEvaluator:
             feed(error, time, worse)
         state = rows.state if all_known else rows.state[rows.known]
         feed(self.watch.support, time, state >= NO_CONTACT)
+        if self.watch.slide.on < np.inf:
+            gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
+            friction = self.settings.limits.friction
+            feed(self.watch.slide, time, slides_first(tuple(gravity.T), least, friction))
         self.watch.foresee_rows(rows)
 
 

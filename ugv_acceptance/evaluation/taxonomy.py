@@ -34,6 +34,7 @@ FIRST_SUSPECT = {
     'TIP_OVER': FailureSource.INTERACTION,
     'NO_SUPPORT': FailureSource.INTERACTION,
     'STATIC_MODEL': FailureSource.INTERACTION,
+    'SLIDE': FailureSource.INTERACTION,
     'TIP_AHEAD': FailureSource.INTERACTION,
     'TORQUE_AHEAD': FailureSource.INTERACTION,
     'EFFORT_LIMIT': FailureSource.EFFECTOR,

@@ -39,6 +39,7 @@ class Watch:
     leaps: list[Signal] = field(init=False)
     attitude: 'AttitudeSignals' = field(init=False)
     foresight: Foresight = field(init=False)
+    slide: Signal = field(init=False)
 
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
@@ -66,6 +67,7 @@ class Watch:
         self.leaps = [self._leap(name) for name in names]
         self.attitude = self._attitude()
         self.foresight = foresight_of(self.settings, self._warning)
+        self.slide = self._slide()
 
     def foresee(self) -> None:
         """Judge what live samples gave the foresight; before time passes."""
@@ -93,6 +95,13 @@ class Watch:
         """The watched value is minus the tilt left (rad), so that larger is worse."""
         at = (-angle, -angle - self.settings.limits.tip_deadband)
         return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
+
+    def _slide(self) -> Signal:
+        """The watched value is minus the slope left (rad) where it slides before it tips."""
+        limits, delay = self.settings.limits, self.settings.delays.tip_on
+        known = limits.friction < float('inf')
+        on = -limits.tip_warn if known else float('inf')
+        return self._warning('SLIDE', 'robot', (on, on - limits.tip_deadband), delay)
 
     def _fault(self, code: str, subject: str, level: int, on_delay: float | None = None) -> Signal:
         """A fault is watched as 1 (there) or 0 (not there)."""
@@ -137,7 +146,15 @@ class Watch:
         of = self.attitude
         attitude = [of.frame, of.orientation, of.strange, of.disagreement]
         faults = [self.support, self.payload, self.missing, *attitude]
-        return [*pairs, *self.speed, *self.leaps, *inputs, *faults, *self.foresight.signals()]
+        return [
+            *pairs,
+            *self.speed,
+            *self.leaps,
+            *inputs,
+            *faults,
+            self.slide,
+            *self.foresight.signals(),
+        ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,10 @@ WORDS = {
         '{subject} moves at {peak:.2f} {rate}; the static model was shown to hold to {limit:.2f}',
         'move the joint more slowly',
     ),
+    'SLIDE': (
+        'the tracks slide before it tips: {slope:.1f} degrees of slope left',
+        'stop; go back to where the slope is less, straight up or down it',
+    ),
     'TIP_AHEAD': (
         'tips to the {subject} within {seconds:.1f} s if it goes on like this',
         'stop the motion that brings it there',
@@ -105,6 +109,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         rate='rad/s' if turning else 'm/s',
         tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
+        slope=max(math.degrees(-alert.peak), 0.0),
         seconds=-peak,
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from ugv_acceptance.evaluation.advice import COMPUTED, Advice, advise
 from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
-from ugv_acceptance.evaluation.outlook import Ahead, Outlook, slide_left
+from ugv_acceptance.evaluation.outlook import Ahead, Outlook
 from ugv_acceptance.evaluation.payload_estimate import PayloadEstimate, payload_estimate
+from ugv_acceptance.evaluation.prediction import slide_left
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.nodes.faults import what_to_do
 
@@ -74,8 +75,15 @@ class Counsel:
             found = payload_estimate(
                 evaluator.settings, margins.q, rates, efforts, margins.gravity, evaluator.payload
             )
-        self._felt = self._felt + 1 if found else 0
-        self.estimate = found if self._felt >= PERSISTENT else None
+        self.felt(found)
+
+    def felt(self, found: PayloadEstimate | None) -> None:
+        """Take what the efforts tell of the load; None, such as in motion, changes nothing."""
+        if found is None:
+            return
+        self._felt = self._felt + 1 if found.differs else 0
+        if self._felt == 0 or self._felt >= PERSISTENT:
+            self.estimate = found if self._felt else None
 
     def do(self, alert: Alert) -> str:
         """Return what to do about an alert: computed for its margin if it is, else in general."""
@@ -126,7 +134,7 @@ class Counsel:
         margins, settings = self.evaluator.margins, self.evaluator.settings
         if margins is None:
             return math.inf
-        return slide_left(margins.gravity, settings.limits.friction)
+        return float(slide_left(margins.gravity, settings.limits.friction))
 
     def hints(self, now: int) -> list[str]:
         """Return what the operator should know beside the alerts, in plain words."""
@@ -134,15 +142,6 @@ class Counsel:
         soon = self.ahead(now)
         if soon and soon[0].seconds > 0.0:
             hints.append(_ahead_words(soon[0]))
-        margins = self.evaluator.margins
-        if margins is not None:
-            slide, tilt = self.slide(), min(map(float, margins.stability.angle))
-            if slide < tilt and slide < self.evaluator.settings.limits.tip_warn:
-                hints.append(
-                    f'the tracks slide before it tips: {max(math.degrees(slide), 0.0):.0f} deg left'
-                )
-        if self.estimate is not None:
-            hints.append(self.estimate.sentence)
         return hints
 
 

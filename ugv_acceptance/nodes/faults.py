@@ -45,6 +45,11 @@ WORDS = {
         'use_sim_time is true but nothing came on /clock',
         'start the simulation, or set use_sim_time to false',
     ),
+    'PAYLOAD_DIFFERS': (
+        WARN,
+        '{detail}',
+        'declare the load that is in the hand; else see what the arm touches',
+    ),
     'MONITOR_FAULT': (
         ERROR,
         'the monitor could not evaluate a message of {subject}: {detail}',
@@ -60,6 +65,7 @@ SUSPECTS = {
     'INPUT_QOS': FailureSource.DESIGN,
     'MESSAGES_LOST': FailureSource.COMMUNICATIONS,
     'NO_CLOCK': FailureSource.CONTROL_SYSTEM,
+    'PAYLOAD_DIFFERS': FailureSource.INTERACTION,
     'MONITOR_FAULT': FailureSource.CONTROL_SYSTEM,
 }
 

@@ -192,7 +192,7 @@ class Monitor(LifecycleNode):
         if self.session is not None and self._inputs is not None:
             self._inputs.look_around(self._value('allowed_publishers'))
             self.session.measure_rates()
-            self.session.counsel.feel()
+            self.session.feel()
             self.session.tick()
         if self._margins is not None:
             self._margins.look_for_listeners()

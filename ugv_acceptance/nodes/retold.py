@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.alerts import OK, STALE, Alert
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.payload_estimate import payload_estimate
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.nodes.counsel import PERSISTENT, Counsel
+from ugv_acceptance.nodes.counsel import Counsel
 from ugv_acceptance.nodes.receipt import ReceiptClock
 from ugv_acceptance.nodes.session import Session
 
@@ -53,8 +53,7 @@ class PastCounsel(Counsel):
         if margins is not None:
             known = evaluator.settings, margins.q, *self.measured, margins.gravity
             found = payload_estimate(*known, evaluator.payload)
-        self._felt = self._felt + 1 if found else 0
-        self.estimate = found if self._felt >= PERSISTENT else None
+        self.felt(found)
 
     def do(self, alert: Alert) -> str:
         """Return what to do now; else what was to be done when the alert was raised."""

@@ -102,6 +102,16 @@ class Session:
         self.faults.advance(now)
         self._look()
 
+    def feel(self) -> None:
+        """Look whether the motors feel the declared load; to be called once a second."""
+        self.counsel.feel()
+        now, found = self.clock.now(), self.counsel.estimate
+        if found is None:
+            self.faults.clear(now, 'PAYLOAD_DIFFERS', 'payload')
+        else:
+            more = abs(found.mass - found.declared)
+            self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
+
     def measure_rates(self) -> None:
         """Set `rates` (Hz) of the inputs since the call before."""
         now, (since, before) = self.clock.now(), self._counted
