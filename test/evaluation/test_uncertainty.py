@@ -140,7 +140,10 @@ def test_the_root_sum_of_squares_is_the_spread_of_random_robots() -> None:
     np.testing.assert_allclose(spread.std(axis=0)[1:3], bound[1:3], rtol=0.15)
 
 
-@given(st.lists(st.floats(-5, 5), min_size=1, max_size=8))
+# The square of less than 1e-150 has lost digits.
+@given(
+    st.lists(st.floats(-5, 5).filter(lambda x: x == 0.0 or abs(x) > 1e-150), min_size=1, max_size=8)
+)
 @hypothesis.settings(max_examples=50)
 def test_the_worst_case_is_never_below_the_root_sum_of_squares(effects: list[float]) -> None:
     """Both are the effect itself where there is one."""
