@@ -18,6 +18,7 @@ from nodes.live_case import PATIENCE
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.config import load
 from ugv_acceptance.plan.plan import Plan, write_plan
+from ugv_acceptance.run.verdicts import seen_in
 
 HOME = {'turret_joint': 0, 'shoulder_joint': 95, 'elbow_joint': 140, 'flipper_joint': 180}
 # A start on a busy machine, and a step.
@@ -33,11 +34,11 @@ def step(name: str, **change: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-# Falls over sideways: the arm up, 4 kg, on a slope of 40 degrees.
+# Falls over sideways: the arm out, 2 kg, on a slope of 25 degrees.
 TIP = step(
-    'tips', where='simulation', action='tip', payload_kg=4.0, hold_s=2.0,
-    ground={'orientation': 'left', 'tilt_deg': 36.0},
-    posture_deg={**HOME, 'turret_joint': 90, 'shoulder_joint': 85, 'elbow_joint': 60},
+    'tips', where='simulation', action='tip', payload_kg=2.0, speed_degps=57.0,
+    ground={'orientation': 'left', 'tilt_deg': 25.0},
+    posture_deg={**HOME, 'turret_joint': 90, 'shoulder_joint': 40, 'elbow_joint': -85},
     alerts={'must': ['ERROR TIP_OVER left'], 'must_not': []},
 )  # fmt: skip
 
@@ -53,12 +54,13 @@ def plan_file(folder: Path, *steps: dict[str, Any]) -> Path:
 
 
 @contextmanager
-def running(plan: Path, out: Path, *more: str) -> Iterator['subprocess.Popen[str]']:
+def running(plan: Path | None, out: Path, *more: str) -> Iterator['subprocess.Popen[str]']:
     """Run the verb in a process of its own, in a session that is ended at the end."""
+    named = [str(plan)] if plan else []
     env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     code = 'from ugv_acceptance.cli import main; main()'
     process = subprocess.Popen(
-        [sys.executable, '-c', code, 'run', str(plan), '--sim', '--out', str(out), *more],
+        [sys.executable, '-c', code, 'run', *named, '--sim', '--out', str(out), *more],
         env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
         start_new_session=True,
     )  # fmt: skip
@@ -100,6 +102,18 @@ def recording(out: Path, name: str, at_least: int) -> Path | None:
     return path if path.is_file() and path.stat().st_size >= at_least else None
 
 
+def positions(folder: Path) -> list[float]:
+    """Return the shoulder's positions (rad) in a recording, as far as it goes."""
+    config = load()
+    _, q, _, _ = seen_in(folder, config).joined()
+    return [float(x) for x in q[:, config.settings.robot.joint_names.index('shoulder_joint')]]
+
+
+def moved(path: Path | None) -> bool:
+    """Return whether a recording shows that the shoulder has left home."""
+    return path is not None and min(positions(path)) < math.radians(HOME['shoulder_joint'] - 3)
+
+
 def gone(pid: int) -> bool:
     """Return whether a process has ended."""
     path = Path(f'/proc/{pid}/stat')
@@ -136,15 +150,23 @@ def test_an_alert_that_is_not_expected_freezes_the_robot(tmp_path: Path) -> None
 
 @pytest.mark.skipif(not Path('/proc/self').exists(), reason='reads processes from /proc')
 def test_the_run_stops_when_the_monitor_dies(tmp_path: Path) -> None:
-    """The runner's own watchdog freezes the robot; nothing passes that nobody watched."""
-    plan, out = plan_file(tmp_path, step('long', hold_s=60.0)), tmp_path / 'out'
+    """The runner's own watchdog freezes a moving arm; nothing passes that nobody watched."""
+    far = {**HOME, 'shoulder_joint': 35}
+    plan, out = (
+        plan_file(tmp_path, step('long', posture_deg=far, speed_degps=5.0)),
+        tmp_path / 'out',
+    )
     with running(plan, out) as process:
-        until(lambda: recording(out, 'long', 1))
+        until(lambda: moved(recording(out, 'long', 60_000)))
         os.kill(children(process)['monitor'], signal.SIGKILL)
         code, text = finished(process)
     assert code == 3, text
     assert 'the monitor has said nothing' in text
     assert json.loads((out / 'result.json').read_text())['verdict'] == 'INCONCLUSIVE'
+    shoulder = positions(out / 'steps' / 'long')
+    last = shoulder[-50:]
+    assert max(last) - min(last) < math.radians(1.0)
+    assert last[-1] > math.radians(HOME['shoulder_joint'] - 40)
 
 
 @pytest.mark.skipif(not Path('/proc/self').exists(), reason='reads processes from /proc')

@@ -2,7 +2,6 @@
 
 import os
 import select
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -91,24 +90,28 @@ def say_stop(console: Console, reason: str) -> None:
     console.print(f'[bold red]STOP[/] motion is frozen: {escape(reason)}', soft_wrap=True)
 
 
-def ask(text: str, going: Callable[[], bool]) -> bool:
-    """Tell a person what to do and return whether it was done.
+def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
+    """Return what tells a person what to do and returns whether it was done.
 
     Enter: done; s and Enter, or the end of the input: not done. While it waits it hears `going`.
     """
-    sys.stderr.write(f'\n{text}\nEnter: done, s: skip this step > ')
-    sys.stderr.flush()
-    answer = b''
-    while going():
-        if not select.select([0], [], [], 0.1)[0]:
-            continue
-        letter = os.read(0, 1)
-        if not letter:
-            return False
-        if letter == b'\n':
-            return answer.strip().lower() not in {b's', b'skip'}
-        answer += letter
-    return False
+
+    def ask(text: str, going: Callable[[], bool]) -> bool:
+        console.print(f'[bold]{escape(text)}[/]', soft_wrap=True)
+        console.print('press Enter when it is done, s and Enter to skip this step')
+        answer = b''
+        while going():
+            if not select.select([0], [], [], 0.1)[0]:
+                continue
+            letter = os.read(0, 1)
+            if not letter:
+                return False
+            if letter == b'\n':
+                return answer.strip().lower() not in {b's', b'skip'}
+            answer += letter
+        return False
+
+    return ask
 
 
 def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Console) -> None:

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.run_text import Steps, ask, print_result, say_stop
+from ugv_acceptance.cli.run_text import Steps, asking, print_result, say_stop
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
@@ -150,7 +150,7 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
         guard = Guard(config, lambda reason: say_stop(shown.console, reason), shown.moved)
         stack.callback(guard.destroy_node)
         stack.enter_context(spinning(guard))
-        hands = Hands(guard, asked.mode, ask)
+        hands = Hands(guard, asked.mode, asking(shown.console))
         made = Runner(config, folder, guard, hands, lambda: stop.asked, asked.attempts)
         made.wait_for_all(START)
         yield made
@@ -181,7 +181,7 @@ def _offline(
             shown.moved,
             lambda: bool(stopped),
         )
-        hands = Hands(world, asked.mode, ask)
+        hands = Hands(world, asked.mode, asking(shown.console))
         yield Runner(config, folder, world, hands, world.asked, asked.attempts)
     finally:
         for number, handler in before.items():

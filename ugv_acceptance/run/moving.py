@@ -45,7 +45,7 @@ class Moves:
         self.trail.append(posture)
         target = radians_of(posture)
         if self.hands.mode == OPERATOR:
-            return self._told_to_go(target)
+            return self._told_to_go(target, step.id if step else 'way')
         seconds = self.hands.move(target, speed)
         if step is not None and not holds(step):
             self.pause(seconds)
@@ -74,12 +74,12 @@ class Moves:
             del self.trail[before + len(step.via_deg) :]
         return ''
 
-    def _told_to_go(self, target: dict[str, float]) -> str:
+    def _told_to_go(self, target: dict[str, float], what: str) -> str:
         """Have a person bring the arm to `target` (rad), again until joint states show it."""
         wanted = ', '.join(f'{n} {math.degrees(a):.0f} deg' for n, a in target.items())
         wrong = ''
         while self.going:
-            text = f'bring the arm to {wanted} and hold it'
+            text = f'{what}: bring the arm to {wanted} and hold it'
             if not self.hands.told(f'{wrong}; {text}' if wrong else text):
                 return REFUSED
             wrong = self._arrive(target)
