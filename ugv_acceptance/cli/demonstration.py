@@ -1,4 +1,4 @@
-"""The parts of the demo: a player in its own process, the monitor in this one, then the bag."""
+"""The parts of the demo: player and console as processes, the monitor here, then the bag."""
 
 import os
 import random
@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +23,11 @@ BAG = 'packbot_fail'
 WORKED, BROKEN = 0, 1
 
 
-def demonstrate(bag: Path | None, rate: float) -> int:
-    """Run the demo; return its exit code: 0 where live and recording were both judged."""
+def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
+    """Run the demo, with the console's `page` or without; return its exit code.
+
+    That is 0 where live and recording were both judged.
+    """
     from ugv_acceptance.cli.evaluate import judge_recording
     from ugv_acceptance.cli.summary import print_result
     from ugv_acceptance.config import load
@@ -38,7 +41,7 @@ def demonstrate(bag: Path | None, rate: float) -> int:
     console.print(
         f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}', soft_wrap=True
     )
-    alerts, played = live(path, rate, console)
+    alerts, played = live(path, rate, console, page=page)
     console.rule('2. The same run from the recording')
     result = judge_recording([path], load(), compare_effort=False)
     print_result(result)
@@ -68,28 +71,49 @@ def find(bag: Path | None) -> Path:
     return place
 
 
-def live(path: Path, rate: float, console: Console) -> tuple[list['Status'], bool]:
+def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple[list['Status'], bool]:
     """Play the recording into the monitor; return its alerts and whether the player succeeded."""
     from ugv_acceptance.cli.live_view import watch
 
-    with player(path, rate) as process:
-        alerts = watch(None, None, [], console, 2.0, lambda: process.poll() is not None)
-        return alerts, process.poll() == 0
+    play = ('replay', str(path), '--restamp', '--rate', str(rate))
+    with ExitStack() as stack:
+        if page:
+            announce(stack.enter_context(verb('console', '--port', '0')), console)
+        players: list[subprocess.Popen[str]] = []
+
+        def over() -> bool:
+            # Asked for the first time when the monitor listens: no message comes before it.
+            if not players:
+                players.append(stack.enter_context(verb(*play)))
+            return players[0].poll() is not None
+
+        alerts = watch(None, None, [], console, 2.0, over)
+        return alerts, bool(players) and players[0].poll() == 0
 
 
 @contextmanager
-def player(path: Path, rate: float) -> Iterator['subprocess.Popen[bytes]']:
-    """Run `replay` in a process of its own."""
+def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
+    """Run a verb in a process that ends when this one does; its output is to be read."""
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    code = 'from ugv_acceptance.cli import main; main()'
-    command = [sys.executable, '-c', code, 'replay', str(path), '--restamp', '--rate', str(rate)]
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)  # noqa: S603
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait()
+    code = 'from ugv_acceptance.nodes import child; child.end_with_parent()'
+    code += '; from ugv_acceptance.cli import main; main()'
+    command, pipe = [sys.executable, '-u', '-c', code, *words], subprocess.PIPE
+    with subprocess.Popen(  # noqa: S603 - our own command
+        command, env=environment, stdin=pipe, stdout=pipe, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
+def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
+    """Say where the console is; where it cannot be had, it said why, and the demo goes on."""
+    said = next(iter(process.stdout or ()), '').split()
+    if len(said) > 2:
+        text = f'Open {said[2]} in a browser on this machine to see it as an operator does.'
+        console.print(text, soft_wrap=True)
 
 
 def conclude(console: Console, alerts: list['Status'], played: bool, result: dict[str, Any]) -> int:

@@ -1,31 +1,52 @@
-"""`ugv-acceptance watch [BAG]`: the console in a terminal, such as over SSH."""
+"""`ugv-acceptance watch [BAG]`: the console in a terminal, such as over SSH; what it shows."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
+    from ugv_acceptance.console.feed import Feed
     from ugv_acceptance.console.recording import RecordingFeed
 
 __all__ = ['CONTEXT', 'watch']
 
 
+def _given(path: Path | None) -> Path | None:
+    """Take an empty text, such as a launch file's default, for none."""
+    return None if path == Path() else path
+
+
+Recording = Annotated[
+    Path | None, typer.Argument(help='Recording to show; without one, the live robot.')
+]
+RobotFile = Annotated[
+    Path | None,
+    typer.Option(
+        '--config',
+        '-c',
+        callback=_given,
+        help='YAML file, or the name of one that ships: packbot.',
+    ),
+]
+Urdf = Annotated[
+    Path | None,
+    typer.Option(callback=_given, help='URDF in place of the one the YAML names.'),
+]
+
+
 def watch(
     context: typer.Context,
-    bag: Annotated[
-        Path | None, typer.Argument(help='Recording to show; without one, the live robot.')
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
+    bag: Recording = None,
+    config: RobotFile = None,
+    urdf: Urdf = None,
 ) -> None:
     """Show verdict, alerts and margins in the terminal, in the words of the console. q leaves.
 
@@ -34,21 +55,39 @@ def watch(
       ugv-acceptance watch
       ugv-acceptance watch bags/packbot_fail
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    need('textual')
+    from ugv_acceptance.console.terminal import Terminal
+
+    with feed_of(context, bag, config, urdf) as feed:
+        Terminal(feed).run()
+
+
+def need(*libraries: str) -> None:
+    """Raise BadConfig where a library of the extra `console` is not installed."""
+    missing = [name for name in libraries if find_spec(name) is None]
+    if missing:
+        text = f"expected {', '.join(missing)}, found none: pip install 'ugv_acceptance[console]'"
+        raise BadConfig(text)
+
+
+@contextmanager
+def feed_of(
+    context: typer.Context, bag: Path | None, config: Path | None, urdf: Path | None
+) -> Iterator['Feed']:
+    """Yield what is to be shown: a recording, or the live robot."""
+    from ugv_acceptance.config import load
+
     # Where no bag is given, click takes --ros-args for it.
     if bag is not None and str(bag) == '--ros-args':
         context.args, bag = [str(bag), *context.args], None
-    ros = ros_arguments(context)
-    from ugv_acceptance.config import load
-    from ugv_acceptance.console.terminal import Terminal
-
-    loaded = load(config, urdf=urdf)
+    ros, loaded = ros_arguments(context), load(config, urdf=urdf)
     if bag is not None:
-        Terminal(recording_feed(bag, loaded)).run()
+        yield recording_feed(bag, loaded)
         return
     from ugv_acceptance.nodes.console import live_feed
 
     with live_feed(loaded, ros) as feed:
-        Terminal(feed).run()
+        yield feed
 
 
 def recording_feed(bag: Path, config: 'Config') -> 'RecordingFeed':

@@ -38,7 +38,12 @@ def child(
             process.wait()
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """Ask this process to end as soon as its input, the parent's pipe, is closed."""
+    threading.Thread(target=_wait_for_the_end, daemon=True).start()
+
+
+def _wait_for_the_end() -> None:
     # Not sys.stdin: its lock would be held when the interpreter ends.
     while os.read(0, 1024):
         pass
@@ -47,7 +52,7 @@ def _end_with_parent() -> None:
 
 def main() -> None:
     """Run the node named by the first argument."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     import_module(f'ugv_acceptance.nodes.{sys.argv[1]}').main(sys.argv[2:])
 
 
