@@ -10,9 +10,10 @@ from evaluation.streams import T0, Joints, Message, S, batch_of, run_of, setting
 from numpy.typing import NDArray
 from scipy import stats
 
-from ugv_acceptance.evaluation.comparison import MOST, ModelCheck
+from ugv_acceptance.evaluation.comparison import ModelCheck
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.regression import independent_samples, least_squares
+from ugv_acceptance.evaluation.sampling import MOST
 from ugv_acceptance.evaluation.settings import JointInput, Limits, Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
@@ -144,16 +145,21 @@ def test_the_share_of_slow_samples_is_counted() -> None:
 
 
 def test_a_long_run_keeps_a_bounded_number_of_samples() -> None:
-    """Samples are thinned; what is left still spans the run."""
-    check_of = ModelCheck(TOLD)
+    """Samples are thinned evenly; what is left still spans the run and says the same."""
+    check_of, short = ModelCheck(TOLD), ModelCheck(TOLD)
     evaluator = RecordedEvaluator(TOLD)
     evaluator.start(T0)
-    for start in range(0, 8000, 1000):
+    for start in range(0, 9000, 1000):
         run = run_of(1000.0, joints_hz=10.0, imu_hz=10.0)
         part = [replace(m, time=m.time + start * S) for m in run]
-        check_of.add(evaluator.batch(batch_of(part)))
+        rows = evaluator.batch(batch_of(part))
+        check_of.add(rows)
+        if not start:
+            short.add(rows)
     found = check_of.result()
-    assert MOST * 0.4 < found['samples'] * (found['spacing_s'] / 0.1) <= 80_000 * 1.01
+    assert MOST / 2 <= found['samples'] <= MOST
+    assert found['samples'] * found['spacing_s'] == pytest.approx(9000.0, rel=0.01)
+    assert found['joints'] == short.result()['joints']
 
 
 def test_least_squares_gives_the_line_and_interval_of_scipy() -> None:

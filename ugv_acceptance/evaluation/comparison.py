@@ -13,6 +13,7 @@ from scipy.special import fdtri
 
 from ugv_acceptance.evaluation.regression import Fit, independent_samples, least_squares
 from ugv_acceptance.evaluation.rows import MarginRows
+from ugv_acceptance.evaluation.sampling import Sampler
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
@@ -22,9 +23,8 @@ Json = dict[str, Any]
 
 # Slower than this (rad/s or m/s) is at rest, faster than MOVING is in motion.
 REST, MOVING = 0.02, 0.05
-# Samples are taken this far apart (ns); of more than MOST every second one is dropped.
+# Samples are taken this far apart (ns).
 SPACING = 100_000_000
-MOST = 100_000
 # Fewer samples tell nothing.
 LEAST = 30
 # A scale needs torques that differ (standard deviation, N m or N), a payload a lever (N m a kg).
@@ -39,32 +39,11 @@ class ModelCheck:
     """Gathers samples of a run (at most ten a second) and compares them with the model."""
 
     settings: Settings
-    _parts: list[NDArray[np.float32]] = field(default_factory=list)
-    _count: int = 0
-    _spacing: int = SPACING
-    _slot: int = -1
+    _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
-        if not len(rows.time):
-            return
-        slots = rows.time // self._spacing
-        picked = np.flatnonzero(np.diff(slots, prepend=self._slot))
-        self._slot = int(slots[-1])
-        # A robot that has tipped rests on its arm.
-        with np.errstate(invalid='ignore'):
-            stands = ~(rows.angle[picked].min(axis=1) <= 0.0)
-        picked = picked[rows.known[picked] & stands]
-        if not len(picked):
-            return
-        joints, of = rows.pairs.joints, rows.pairs.of_joints[picked]
-        gravity = rows.pairs.imu.gravity[rows.pairs.of_imu[picked]]
-        lever = self._lever(joints.q[of], gravity)
-        parts = (joints.effort[of], rows.torque[picked], lever, joints.qd[of])
-        self._parts.append(np.hstack(parts).astype(np.float32))
-        self._count += len(picked)
-        if self._count > MOST:
-            self._thin()
+        """Take the next stretch of margins. A robot that has tipped rests on its arm: not those."""
+        self._samples.add(rows, standing=True)
 
     def _lever(self, q: Floats, gravity: Floats) -> Floats:
         robot = self.settings.robot
@@ -74,25 +53,19 @@ class ModelCheck:
         )
         return lever
 
-    def _thin(self) -> None:
-        table = np.concatenate(self._parts)[::2]
-        self._parts, self._count, self._spacing = [table], len(table), 2 * self._spacing
-        self._slot //= 2
-
     def result(self) -> Json:
         """Return the comparison for JSON: each joint's, the payload of all, the speed's share."""
-        n = len(self.settings.joints)
-        table = np.concatenate(self._parts or [np.empty((0, 4 * n), np.float32)])
-        effort, torque, lever, rate = np.hsplit(table.astype(np.float64), 4)
         names = self.settings.robot.joint_names
+        time, (effort, torque, rate, q, gravity) = self._samples.samples(len(names))
+        lever = self._lever(q, gravity)
         slow = np.abs(np.nan_to_num(rate)).max(axis=1, initial=0.0) <= REST
         clipped = np.abs(effort) >= CLIPPED * np.array(self.settings.limits.torque)
         effort = np.where(clipped, np.nan, effort)
         columns = zip(effort.T, torque.T, lever.T, rate.T, clipped.T, strict=True)
         samples = [_Samples(*column, slow) for column in columns]
         return {
-            'samples': len(table),
-            'spacing_s': self._spacing / 1e9,
+            'samples': len(time),
+            'spacing_s': self._samples.spacing / 1e9,
             'speed_validity': self._speed_validity(rate),
             'payload': _pooled_payload(samples),
             'joints': {name: _joint(s) for name, s in zip(names, samples, strict=True)},

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.rows import MarginRows
+from ugv_acceptance.evaluation.rows import MarginRows, Times
+from ugv_acceptance.evaluation.sampling import Sampler
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
@@ -46,54 +47,52 @@ class Plateau:
     saturated: bool
 
 
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """What the model says of samples (n,): a joint's static torque, postures (n, j), gravity."""
+
+    torque: Floats
+    q: Floats
+    gravity: Floats
+
+    def rows(self, rows: slice) -> '_Held':
+        """Some of the samples."""
+        return _Held(self.torque[rows], self.q[rows], self.gravity[rows])
+
+
 @dataclass(slots=True)
 class EffortComparison:
-    """Gathers samples at rest, at most twenty a second, and splits them into plateaus of effort."""
+    """Gathers samples of a run, at most twenty a second; splits rest into plateaus of effort."""
 
     settings: Settings
-    _rows: list[tuple[NDArray[np.int64], Floats]] = field(default_factory=list)
-    _next: int = 0
+    _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
 
     def add(self, rows: MarginRows) -> None:
         """Take the next stretch of margins."""
-        picked: list[int] = []
-        at = int(np.searchsorted(rows.time, self._next))
-        while at < len(rows.time):
-            picked.append(at)
-            self._next = int(rows.time[at]) + SPACING
-            at = int(np.searchsorted(rows.time, self._next))
-        some = np.array(picked, dtype=np.intp)
-        some = some[rows.known[some]]
-        if some.size:
-            parts = (rows.effort, rows.torque, rows.qd, rows.q, rows.gravity)
-            self._rows.append((rows.time[some], np.hstack([part[some] for part in parts])))
+        self._samples.add(rows)
 
     def plateaus(self, j: int) -> list[Plateau]:
         """Return the plateaus of joint number j; none where no effort was recorded."""
-        if not self._rows:
-            return []
-        n = len(self.settings.joints)
-        time = np.concatenate([t for t, _ in self._rows])
-        table = np.concatenate([x for _, x in self._rows])
-        moving = np.abs(np.nan_to_num(table[:, 2 * n + j])) > REST
-        good = np.isfinite(table[:, j]) & ~moving
-        time, table = time[good], table[good]
-        most = float(np.abs(table[:, j]).max(initial=0.0))
+        time, (effort, torque, rate, q, gravity) = self._samples.samples(len(self.settings.joints))
+        moving = np.abs(np.nan_to_num(rate[:, j])) > REST
+        good = np.isfinite(effort[:, j]) & ~moving
+        told, held = effort[good, j], _Held(torque[good, j], q[good], gravity[good])
+        most = float(np.abs(told).max(initial=0.0))
+        time = time[good]
         return [
-            self._plateau(j, time[rows], table[rows], most) for rows in _split(time, table[:, j])
+            self._plateau(j, time[rows], told[rows], held.rows(rows), most)
+            for rows in _split(time, told)
         ]
 
-    def _plateau(self, j: int, time: NDArray[np.int64], table: Floats, most: float) -> Plateau:
+    def _plateau(self, j: int, time: Times, effort: Floats, held: '_Held', most: float) -> Plateau:
         """Return a plateau; `most` is the largest effort (N m; N) of the whole run."""
-        n = len(self.settings.joints)
-        measured, model = float(np.median(table[:, j])), float(np.median(table[:, n + j]))
-        q = np.median(table[:, 3 * n : 4 * n], axis=0)
-        gravity = np.median(table[:, 4 * n :], axis=0)
+        measured, model = float(np.median(effort)), float(np.median(held.torque))
+        q, gravity = np.median(held.q, axis=0), np.median(held.gravity, axis=0)
         robot = self.settings.robot
         cog = robot.payload.cog
         loads = [static_torque(robot, q, gravity, Payload(m, cog))[j] for m in (0.0, 1.0)]
         slope = float(loads[1] - loads[0])
-        saturated = self._saturated(j, table[:, j], model, most)
+        saturated = self._saturated(j, effort, model, most)
         tells = abs(slope) >= SLOPE_LEAST and not saturated
         payload = (measured - model) / slope if tells else None
         return Plateau(int(time[0]), int(time[-1]), measured, model, slope, payload, saturated)
