@@ -173,8 +173,9 @@ def test_a_person_is_asked_for_everything(played: Played) -> None:
 
 def test_joint_states_say_whether_it_was_done(played: Played) -> None:
     """Enter without moving the arm is not believed: what is off is told, and asked for again."""
-    (again,) = [text for text in played.asked if 'was not reached: shoulder_joint is ' in text]
-    assert re.search(r'shoulder_joint is (9\.\d|10\.\d) deg off', again)
+    again = [text for text in played.asked if 'was not reached: shoulder_joint is ' in text]
+    assert again, played.text
+    assert re.search(r'shoulder_joint is (9\.\d|10\.\d) deg off', again[0])
     result = played.result['steps'][1]
     assert result['verdict'] == 'PASS', result
     assert result['covered'] > 0.9
