@@ -2,6 +2,7 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -9,11 +10,18 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 
+def ours(name: str) -> PythonLaunchDescriptionSource:
+    """Return another launch file of this package."""
+    share = FindPackageShare('ugv_acceptance')
+    return PythonLaunchDescriptionSource(PathJoinSubstitution([share, 'launch', name]))
+
+
 def generate_launch_description() -> LaunchDescription:
-    """Return the monitor and a player that publishes the recording on its own topics."""
-    monitor = PathJoinSubstitution(
-        [FindPackageShare('ugv_acceptance'), 'launch', 'monitor.launch.py']
-    )
+    """Return monitor, console and a player that publishes the recording on its own topics."""
+    robot = {
+        'config': LaunchConfiguration('config'),
+        'namespace': LaunchConfiguration('namespace'),
+    }
     return LaunchDescription(
         [
             DeclareLaunchArgument('bag', description='recording: a rosbag2 folder or one file'),
@@ -36,12 +44,14 @@ def generate_launch_description() -> LaunchDescription:
                 default_value='true',
                 description='move header stamps to now: the monitor compares them with its clock',
             ),
+            DeclareLaunchArgument(
+                'console', default_value='true', description='serve the operator page as well'
+            ),
+            IncludeLaunchDescription(ours('monitor.launch.py'), launch_arguments=robot.items()),
             IncludeLaunchDescription(
-                PythonLaunchDescriptionSource(monitor),
-                launch_arguments={
-                    'config': LaunchConfiguration('config'),
-                    'namespace': LaunchConfiguration('namespace'),
-                }.items(),
+                ours('console.launch.py'),
+                launch_arguments=robot.items(),
+                condition=IfCondition(LaunchConfiguration('console')),
             ),
             Node(
                 package='ugv_acceptance',

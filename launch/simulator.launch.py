@@ -2,6 +2,7 @@
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
@@ -9,11 +10,18 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 
+def ours(name: str) -> PythonLaunchDescriptionSource:
+    """Return another launch file of this package."""
+    share = FindPackageShare('ugv_acceptance')
+    return PythonLaunchDescriptionSource(PathJoinSubstitution([share, 'launch', name]))
+
+
 def generate_launch_description() -> LaunchDescription:
-    """Return the simulated robot, obeying cmd_vel and joint trajectories, and the monitor."""
-    monitor = PathJoinSubstitution(
-        [FindPackageShare('ugv_acceptance'), 'launch', 'monitor.launch.py']
-    )
+    """Return the simulated robot, obeying cmd_vel and trajectories, its monitor and console."""
+    robot = {
+        'config': LaunchConfiguration('config'),
+        'namespace': LaunchConfiguration('namespace'),
+    }
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -25,12 +33,14 @@ def generate_launch_description() -> LaunchDescription:
                 'namespace', default_value='', description='namespace of the robot'
             ),
             DeclareLaunchArgument('seed', default_value='1', description='of noise and faults'),
+            DeclareLaunchArgument(
+                'console', default_value='true', description='serve the operator page as well'
+            ),
+            IncludeLaunchDescription(ours('monitor.launch.py'), launch_arguments=robot.items()),
             IncludeLaunchDescription(
-                PythonLaunchDescriptionSource(monitor),
-                launch_arguments={
-                    'config': LaunchConfiguration('config'),
-                    'namespace': LaunchConfiguration('namespace'),
-                }.items(),
+                ours('console.launch.py'),
+                launch_arguments=robot.items(),
+                condition=IfCondition(LaunchConfiguration('console')),
             ),
             Node(
                 package='ugv_acceptance',

@@ -1,4 +1,7 @@
-"""The launch files against what they start: read as syntax trees, for launch has no wheel."""
+"""The launch files against what they start: read as syntax trees, for launch has no wheel.
+
+What they start is started here as launch would, where it is no node of its own.
+"""
 
 import ast
 import re
@@ -8,6 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from console.servers import COMMAND, address_of, running
 
 LAUNCH_FILES = sorted((Path(__file__).resolve().parents[1] / 'launch').glob('*.launch.py'))
 NODES = {'Node', 'LifecycleNode'}
@@ -53,7 +57,7 @@ def declared_parameters(executable: str) -> dict[str, type]:
     assert spec.origin is not None
     declared: dict[str, type] = {'use_sim_time': bool}
     own = Path(spec.origin)
-    for path in (own, own.with_name('parameters.py')):
+    for path in {own, *own.parent.glob('parameters.py')}:
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
             if isinstance(node, ast.Call) and 'declare' in ast.unparse(node.func):
                 match node.args:
@@ -92,15 +96,52 @@ def test_every_argument_is_described(path: Path) -> None:
 def test_an_included_launch_file_takes_what_it_is_given(path: Path) -> None:
     """The arguments handed on are arguments of the file included, which is one of ours."""
     tree = ast.parse(path.read_text(encoding='utf-8'))
+    given = {
+        key.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'robot'
+        for key in getattr(node.value, 'keys', ())
+    }
     for call in calls(path, {'IncludeLaunchDescription'}):
-        texts = [n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)]
+        assert ast.unparse(keywords(call)['launch_arguments']) == 'robot.items()'
+        texts = [n.value for n in ast.walk(call) if isinstance(n, ast.Constant)]
         (name,) = (t for t in texts if isinstance(t, str) and re.fullmatch(r'\w+\.launch\.py', t))
-        given = {
-            key.value
-            for node in ast.walk(keywords(call)['launch_arguments'])
-            if isinstance(node, ast.Dict)
-            for key in node.keys
-            if isinstance(key, ast.Constant)
-        }
         assert given
         assert given <= first_arguments(path.with_name(name), 'DeclareLaunchArgument')
+
+
+def words_of(path: Path, **given: str) -> list[str]:
+    """Return the command-line words of a launch file's only node, by the arguments' defaults."""
+    values = {
+        ast.literal_eval(call.args[0]): ast.literal_eval(keywords(call)['default_value'])
+        for call in calls(path, {'DeclareLaunchArgument'})
+    } | given
+    (node,) = calls(path, NODES)
+    words = []
+    for word in getattr(keywords(node)['arguments'], 'elts', ()):
+        parts = getattr(word, 'elts', [word])
+        words.append(
+            ''.join(
+                values[ast.literal_eval(part.args[0])]
+                if isinstance(part, ast.Call)
+                else ast.literal_eval(part)
+                for part in parts
+            )
+        )
+    return words
+
+
+def test_the_console_starts_as_launched() -> None:
+    """The words of console.launch.py and what launch adds to them give a page that is served."""
+    (path,) = (path for path in LAUNCH_FILES if path.name == 'console.launch.py')
+    added = [
+        '--ros-args',
+        '-r',
+        '__node:=console',
+        '-r',
+        '__ns:=/robot1',
+        '-p',
+        'use_sim_time:=true',
+    ]
+    with running(*COMMAND, *words_of(path, port='0'), *added) as process:
+        assert address_of(process).startswith('http://127.0.0.1:')
