@@ -105,6 +105,7 @@ class Guard(Node):
         bag = BagWriter(folder)
         for name, type_, qos in self._topics:
             bag.add_topic(name, type_, qos)
+        bag.flush()  # from now on it can be read, whatever happens
         with self._recording.lock:
             self._recording.bag = bag
 

@@ -104,6 +104,7 @@ class Offline:
         sensor = Qos(reliability='best_effort')
         for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
             self.bag.add_topic(topic, kind, qos)
+        self.bag.flush()  # from now on it can be read, whatever happens
 
     def stop_recording(self) -> None:
         """Close the recording, if there is one."""
