@@ -43,7 +43,7 @@ TESTS = (
     ('test/model', 'test/studies'),
     ('test/evaluation',),
 )
-PARTS = (PACKAGE, 'test', 'msg_configs', 'urdf', 'bags')
+PARTS = (PACKAGE, 'test', 'msg_configs', 'urdf', 'bags', 'docs')
 # Seconds of tests that a mutant is tried by, and seconds after which it hangs.
 PATIENCE, HANGS = 10.0, 60.0
 OPTIONS = ('-q', '-x', '-p', 'no:cacheprovider', '-p', 'no:xdist')
