@@ -2,8 +2,8 @@
 
 `python -m bench.hardening.mutation --count 300 --seed 0 [PATTERN ...]` draws mutants from all files
 that match, prints each survivor and a table. First all tests run once to learn which ran what line;
-a mutant is then tried in a forked copy of this process by the tests that ran its line, the quickest
-first, until one fails or PATIENCE of them passed. So what is said to survive may still be
+a mutant is then tried in a forked copy of this process by the tests that ran its line, those of its
+own file first, then the quickest, until one fails or PATIENCE of them passed. So what is said to survive may still be
 noticed by a slower test: the rate is a lower bound.
 """
 
@@ -45,7 +45,7 @@ TESTS = (
 )
 PARTS = (PACKAGE, 'test', 'msg_configs', 'urdf', 'bags', 'docs')
 # Seconds of tests that a mutant is tried by, and seconds after which it hangs.
-PATIENCE, HANGS = 10.0, 60.0
+PATIENCE, HANGS = 40.0, 90.0
 OPTIONS = ('-q', '-x', '-p', 'no:cacheprovider', '-p', 'no:xdist')
 PROFILE = '--hypothesis-profile=mutants'
 # What tests import before they begin: paid for once, before the forks.
@@ -79,11 +79,12 @@ class Reach:
     seconds: dict[str, float]
 
     def of(self, mutant: Mutant) -> list[str]:
-        """Return the tests to try a mutant by, the quickest first, PATIENCE in all."""
+        """Return the tests to try a mutant by: its file's own, then the quickest; PATIENCE in all."""
         by_line = self.tests.get(mutant.file, {})
         lines = [str(line) for line in mutant.lines if any(by_line.get(str(line), ()))]
         found = {test for line in lines or by_line for test in by_line[line] if test}
-        ordered = sorted(found, key=lambda test: self.seconds[test])
+        own = f'/test_{Path(mutant.file).stem}.py::'
+        ordered = sorted(found, key=lambda test: (own not in test, self.seconds[test]))
         total = accumulate(self.seconds[test] for test in ordered)
         return [test for test, sum_ in zip(ordered, total, strict=True) if sum_ < PATIENCE]
 
