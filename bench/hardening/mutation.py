@@ -3,8 +3,8 @@
 `python -m bench.hardening.mutation --count 300 --seed 0 [PATTERN ...]` draws mutants from all files
 that match, prints each survivor and a table. First all tests run once to learn which ran what line;
 a mutant is then tried in a forked copy of this process by the tests that ran its line, those of its
-own file first, then the quickest, until one fails or PATIENCE of them passed. So what is said to survive may still be
-noticed by a slower test: the rate is a lower bound.
+own file first, then the quickest, until one fails or PATIENCE of them passed. So what is said to
+survive may still be noticed by a slower test: the rate is a lower bound.
 """
 
 import argparse
@@ -79,7 +79,7 @@ class Reach:
     seconds: dict[str, float]
 
     def of(self, mutant: Mutant) -> list[str]:
-        """Return the tests to try a mutant by: its file's own, then the quickest; PATIENCE in all."""
+        """Return the tests to try a mutant by: its file's own, then the quickest; to PATIENCE."""
         by_line = self.tests.get(mutant.file, {})
         lines = [str(line) for line in mutant.lines if any(by_line.get(str(line), ()))]
         found = {test for line in lines or by_line for test in by_line[line] if test}
