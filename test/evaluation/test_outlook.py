@@ -11,7 +11,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.outlook import Outlook
 from ugv_acceptance.evaluation.payload_estimate import payload_estimate
-from ugv_acceptance.evaluation.prediction import slide_left
+from ugv_acceptance.evaluation.sliding import slide_left
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import Stability
 from ugv_acceptance.model.statics import static_torque

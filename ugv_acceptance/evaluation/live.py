@@ -11,8 +11,8 @@ from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
 from ugv_acceptance.evaluation.payload import payload_from
-from ugv_acceptance.evaluation.prediction import slides_first
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.sliding import slides_first
 from ugv_acceptance.evaluation.watch import InputSignals, Watch
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload

@@ -12,10 +12,10 @@ from ugv_acceptance.evaluation.freshness import Freshness
 from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.payload import PayloadHistory, payload_from
-from ugv_acceptance.evaluation.prediction import slides_first
 from ugv_acceptance.evaluation.rows import Floats, MarginRows, Pairs, Times
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.sliding import slides_first
 from ugv_acceptance.evaluation.watch import InputSignals, Watch
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.rows import ALL, Rows, pick

@@ -13,7 +13,7 @@ from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.outlook import Ahead, Outlook
 from ugv_acceptance.evaluation.payload_estimate import PayloadEstimate, payload_estimate
-from ugv_acceptance.evaluation.prediction import slide_left
+from ugv_acceptance.evaluation.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.nodes.faults import what_to_do
 
