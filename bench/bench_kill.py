@@ -81,16 +81,14 @@ def kill(out: Path, after: float) -> Left:
     """Start a run, kill it and return what was left."""
     env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     command = [sys.executable, '-c', CODE, 'run', str(PLAN), '--sim', '--out', str(out)]
-    run = subprocess.Popen(
-        command,
-        env=env,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    said = out.with_name('said')
+    with said.open('wb') as file:
+        run = subprocess.Popen(
+            command, env=env, stdout=file, stderr=subprocess.STDOUT, start_new_session=True
+        )
     time.sleep(after)
     if run.poll() is not None:
-        raise SystemExit(f'{" ".join(command)}: ended by itself with {run.returncode}')
+        raise SystemExit(f'ended by itself with {run.returncode}:\n{said.read_text()}')
     others = [int(p) for p in Path(f'/proc/{run.pid}/task/{run.pid}/children').read_text().split()]
     run.kill()
     killed = time.time()

@@ -1,6 +1,7 @@
 """A derived plan against the model, posture by posture and way by way."""
 
 import math
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -16,8 +17,9 @@ from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.plan.card import card_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
-from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Step, read_plan, vector_of
+from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.plan.ways import Routes, safe_way
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
@@ -179,12 +181,40 @@ def test_the_short_plan_that_ships_is_the_one_derived(repository: Path) -> None:
 
 
 def test_the_card_shows_every_step_and_loads_nothing() -> None:
-    """One file: every step, the hash, what the alerts mean; no address to fetch from."""
+    """One file: every step, drawn, the hash, what the alerts mean; no address to fetch from."""
     card = card_of(PLAN, CONFIG)
-    assert all(f'{step.id}:' in card for step in PLAN.steps)
+    assert all(f'</span>{step.title}</h3>' in card for step in PLAN.steps)
+    assert card.count('aria-label="the robot from') == len(PLAN.steps)
     assert PLAN.sha256 in card
     assert 'src=' not in card
     assert '<link' not in card
     used = {p.split()[1] for s in PLAN.steps for p in s.alerts.must}
     assert used <= set(WORDS)
     assert all(f'<code>{code}</code>' in card for code in used)
+
+
+@pytest.mark.parametrize(
+    ('ground', 'turret', 'view', 'lean'),
+    [
+        ('nose-down', 0.0, 'from its right side', 25.0),
+        ('nose-up', 0.0, 'from its right side', -25.0),
+        ('right', -90.0, 'from behind', 25.0),
+        ('left', 90.0, 'from behind', -25.0),
+    ],
+)
+def test_a_drawing_leans_to_the_low_side(
+    ground: str, turret: float, view: str, lean: float
+) -> None:
+    """Ahead is right in a side view, the robot's right is right from behind; clockwise is plus."""
+    step = PLAN.steps[0].model_copy(
+        update={'ground': Ground(orientation=ground, tilt_deg=25.0), 'payload_kg': 1.0}
+    )
+    posture = {**PLAN.home_deg, 'turret_joint': turret, 'shoulder_joint': 0.0, 'elbow_joint': 0.0}
+    drawn = sketch(Arm(CONFIG.settings, roles_of(CONFIG.settings)), vector(posture), step)
+    assert f'aria-label="the robot {view}"' in drawn
+    assert float(re.findall(r'rotate\((-?[\d.]+)\)', drawn)[0]) == pytest.approx(lean)
+    line = re.findall(r'polyline points="([^"]+)"', drawn)[0]
+    points = [tuple(map(float, p.split(','))) for p in line.split()]
+    # The arm stretched out points to the low side: towards the side it is turned to, level.
+    assert (points[-1][0] - points[0][0]) * (1.0 if 'up' in ground else lean) > 0.0
+    assert points[-1][1] == pytest.approx(points[0][1], abs=0.02)

@@ -1,6 +1,7 @@
 """The operator's card: a printable page a step group, what alerts mean, the safe map."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -12,8 +13,9 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
 from ugv_acceptance.plan.order import duration
-from ugv_acceptance.plan.plan import Plan, Posture, Step
+from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
 from ugv_acceptance.plan.search import Arm, look, roles_of
+from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.report.regions import (
     degree_axes,
     draw_regions,
@@ -22,6 +24,7 @@ from ugv_acceptance.report.regions import (
     svg_of,
 )
 from ugv_acceptance.studies.maps import Levels
+from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Code -> what it means to the person at the robot.
 MEANINGS = {
@@ -42,19 +45,37 @@ LEVELS = (
     ('ERROR', 'a limit is passed', 'stop, unless this step expects it'),
     ('STALE', 'margins are not known', 'stop: nothing protects the robot now'),
 )
+# Lines of a step's preparation that say ground and load, which stand in their own rows.
+GROUND_AND_LOAD = 2
 # Steps (deg) of the map; a joint's range in it.
 MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A step as the card shows it, all texts."""
+    """A step as the card shows it, all texts; what its whole group has is left out."""
 
     step: Step
+    number: str
     posture: str
     expected: str
     ground: str
     load: str
+    before: tuple[str, ...]
+    sketch: str
+    must_not: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A page of the card: the steps of a group, and what all of them have."""
+
+    name: str
+    where: str
+    rows: list[Row]
+    preparation: list[str]
+    must_not: list[str]
+    stop: str
 
 
 def card_of(plan: Plan, config: Config) -> str:
@@ -63,10 +84,11 @@ def card_of(plan: Plan, config: Config) -> str:
         loader=PackageLoader('ugv_acceptance.plan'), autoescape=True, undefined=StrictUndefined
     )
     template = environment.get_template('card.html')
+    arm = Arm(config.settings, roles_of(config.settings))
     order = sorted(plan.steps, key=lambda s: (s.where, _first(plan, s.group)))
     groups = [
-        {'name': name, 'where': where, 'rows': [row_of(plan, s) for s in steps]}
-        for (where, name), steps in groupby(order, key=lambda s: (s.where, s.group))
+        group_of(arm, plan, list(steps))
+        for _, steps in groupby(order, key=lambda s: (s.where, s.group))
     ]
     return template.render(
         plan=plan,
@@ -75,7 +97,7 @@ def card_of(plan: Plan, config: Config) -> str:
         groups=groups,
         levels=LEVELS,
         meanings=[(code, text, advice(code)) for code, text in MEANINGS.items()],
-        maps=safe_maps(config),
+        maps=safe_maps(arm, plan),
         minutes=round(duration(plan) / 60.0),
         home=_text(plan.home_deg),
     )
@@ -85,42 +107,85 @@ def _first(plan: Plan, group: str) -> int:
     return next(k for k, step in enumerate(plan.steps) if step.group == group)
 
 
-def row_of(plan: Plan, step: Step) -> Row:
-    """Return a step's texts; joints at home are left out."""
+def group_of(arm: Arm, plan: Plan, steps: list[Step]) -> Group:
+    """Return the page of a group's steps."""
+    common = [text for text in steps[0].preparation if all(text in s.preparation for s in steps)]
+    never = [p for p in steps[0].alerts.must_not if all(p in s.alerts.must_not for s in steps)]
+    rows = [row_of(arm, plan, step, common, never) for step in steps]
+    return Group(steps[0].group, steps[0].where, rows, common, never, steps[0].stop)
+
+
+def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Sequence[str]) -> Row:
+    """Return a step's texts; joints at home, and what the group has in common, are left out."""
     moved = {n: a for n, a in step.posture_deg.items() if a != plan.home_deg.get(n)}
     told = {'tilt_left_deg': '{:.1f}° of tilt left', 'use': '{:.0%} of the torque limit'}
     expected = [told[key].format(value) for key, value in step.expected.items() if key in told]
     tilt = step.ground.tilt_deg
-    ground = f'{step.ground.orientation} {tilt:g}°' if tilt else 'level'
-    return Row(step, _text(moved) or 'home', '; '.join(expected), ground, f'{step.payload_kg:g} kg')
+    words = ORIENTATIONS[step.ground.orientation].words
+    q = np.array(vector_of(arm.robot, plan.home_deg, step.posture_deg))
+    return Row(
+        step,
+        step.id.partition('-')[0],
+        _text(moved) or 'home',
+        ', '.join(expected),
+        f'ramp of {tilt:g}°, {words}' if tilt else words,
+        f'{step.payload_kg:g} kg' if step.payload_kg else 'none',
+        tuple(p for p in step.preparation[GROUND_AND_LOAD:] if p not in common),
+        sketch(arm, q, step),
+        tuple(p for p in step.alerts.must_not if p not in never),
+    )
 
 
 def _text(posture: Posture) -> str:
     return ', '.join(f'{n.removesuffix("_joint")} {a:g}°' for n, a in posture.items())
 
 
-def safe_maps(config: Config) -> list[dict[str, str]]:
-    """Return the maps of tilt left and torque used over both arm joints, empty and fully loaded."""
-    arm = Arm(config.settings, roles_of(config.settings))
-    limits, full = config.settings.limits, config.settings.robot.payload.mass
+def safe_maps(arm: Arm, plan: Plan) -> list[dict[str, str]]:
+    """Return the maps of tilt left and torque used over both arm joints, a page's row a load.
+
+    The numbers on them are the plan's steps on level ground with that load; H is home.
+    """
+    limits, full = arm.settings.limits, arm.robot.payload.mass
     axis = np.radians(np.arange(*MAP_RANGE, MAP_STEP))
     q = np.broadcast_to(arm.folded, (len(axis), len(axis), len(arm.folded))).copy()
     names = arm.robot.joint_names
     q[..., names.index(arm.roles.axes[0])] = axis[:, None]
     q[..., names.index(arm.roles.axes[1])] = axis
     maps = []
-    for load in dict.fromkeys((0.0, full)):
+    for load in dict.fromkeys((0.0, full / 2.0, full)):
         found = look(arm, q.reshape(-1, q.shape[-1]), ('level', 0.0), load)
         tilt = np.degrees(found.tilt).reshape(len(axis), -1)
         use = found.most.reshape(len(axis), -1)
         bounds = Levels(math.degrees(limits.tip_warn), math.degrees(limits.tip_error))
         torque = Levels(1.0 - limits.torque_warn, 1.0 - limits.torque_error)
-        maps.append(_drawn(arm, axis, ((tilt, bounds), (1.0 - use, torque)), load))
+        marks = _marks(arm, plan, load)
+        maps.append(_drawn(arm, axis, ((tilt, bounds), (1.0 - use, torque)), load, marks))
     return maps
 
 
-def _drawn(arm: Arm, axis: Any, fields: Any, load: float) -> dict[str, str]:  # noqa: ANN401 - arrays
-    made = figure(7.4, 3.7)
+def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
+    """Return shoulder and elbow (deg) of home and of the steps on level ground with a load."""
+    first, second = arm.roles.axes
+    held = [
+        s
+        for s in plan.steps
+        if s.action == 'hold' and not s.ground.tilt_deg and s.payload_kg == round(load, 3)
+    ]
+    found = [(plan.home_deg[first], plan.home_deg[second], 'H')]
+    for step in held:
+        at = {**plan.home_deg, **step.posture_deg}
+        found.append((at[first], at[second], step.id.partition('-')[0]))
+    return found
+
+
+def _drawn(
+    arm: Arm,
+    axis: Any,  # noqa: ANN401 - arrays
+    fields: Any,  # noqa: ANN401 - arrays
+    load: float,
+    marks: Sequence[tuple[float, float, str]],
+) -> dict[str, str]:
+    made = figure(7.4, 3.1)
     shoulder, elbow = (name.removesuffix('_joint') for name in arm.roles.axes)
     for k, (title, (margin, levels)) in enumerate(
         zip(('tip-over', 'motor torque'), fields, strict=True), 1
@@ -130,6 +195,12 @@ def _drawn(arm: Arm, axis: Any, fields: Any, load: float) -> dict[str, str]:  # 
         draw_regions(axes, degrees, degrees, margin, levels)
         degree_axes(axes, shoulder, elbow)
         axes.set_title(title)
+        for x, y, word in marks:
+            box = {'facecolor': 'white', 'edgecolor': 'black', 'pad': 1.0, 'linewidth': 0.5}
+            axes.text(x, y, word, fontsize=6, ha='center', va='center', bbox=box)
     legend(made, loc='outside lower center', ncols=3)
-    caption = f'{load:g} kg in the gripper, level ground' if load else 'gripper empty, level ground'
+    caption = f'{load:g} kg in the gripper' if load else 'gripper empty: safe everywhere'
+    worst = min(float(margin.min()) - levels.caution for margin, levels in fields)
+    if not load and worst < 0.0:
+        caption = 'gripper empty'
     return {'svg': svg_of(made, f'map{load:g}'.replace('.', '_')), 'caption': caption}

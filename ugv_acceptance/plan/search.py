@@ -124,6 +124,11 @@ class Arm:
         good: Mask = ~bad[..., 1:].any(axis=-1)
         return good
 
+    def chain(self, q: Floats) -> Floats:
+        """Return the arm's joints and the load's place (k, 3) in m, base, of a posture (j,)."""
+        found: Floats = self._points(q)[: len(self.roles.axes) + 1]
+        return found
+
     def _points(self, q: Floats) -> Floats:
         """Return the shoulder, then points along the arm up to the load (..., k, 3) m, base."""
         chain = _chain(self.robot, self.robot.payload_link or self.robot.root)[::-1]

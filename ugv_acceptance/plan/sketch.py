@@ -1,0 +1,60 @@
+"""A small drawing of a step's posture: the robot on its ground, seen from where the arm shows.
+
+Drawn from the model's own points, so the picture cannot differ from the numbers beside it.
+"""
+
+import math
+
+import numpy as np
+
+from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.plan.plan import Step
+from ugv_acceptance.plan.search import Arm
+from ugv_acceptance.studies.orientations import ORIENTATIONS
+
+# Size of the picture (m of the robot's world: half width, above and below the ground's middle).
+WIDE, HIGH, DEEP = 1.3, 1.45, 0.45
+# Height (m) of the hull as it is drawn; radius of the load.
+HULL, LOAD = 0.18, 0.05
+# A turret turned by more than this (rad) is seen from behind.
+ASIDE = math.radians(45.0)
+
+
+def sketch(arm: Arm, q: Floats, step: Step) -> str:
+    """Return an SVG of the posture `q` (j,) in rad on the step's ground, with its load."""
+    turret = arm.turret(q)
+    aside = abs(math.sin(turret)) > math.sin(ASIDE)
+    # From the left, the front is to the right; from behind, the robot's right is to the right.
+    axis = 1 if aside else 0
+    sign = -1.0 if aside else 1.0
+    points = [(sign * float(p[axis]), float(p[2])) for p in arm.chain(q)]
+    feet = np.array([c.position for c in arm.robot.contacts if c.link == arm.robot.root])
+    low, high = sorted((sign * float(f)) for f in (feet[:, axis].min(), feet[:, axis].max()))
+    lean = _lean(step, aside=aside)
+    parts = [
+        f'<line x1="{-WIDE}" y1="0" x2="{WIDE}" y2="0" class="ground"/>',
+        f'<rect x="{low:.3f}" y="{-HULL}" width="{high - low:.3f}" height="{HULL}" rx="0.06"/>',
+        '<polyline points="{}"/>'.format(' '.join(f'{x:.3f},{-y:.3f}' for x, y in points)),
+        *(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r="0.025"/>' for x, y in points[:-1]),
+    ]
+    if step.payload_kg:
+        x, y = points[-1]
+        parts.append(f'<circle cx="{x:.3f}" cy="{-y:.3f}" r="{LOAD}" class="load"/>')
+    view = 'from behind' if aside else 'from its right side'
+    body = ''.join(parts)
+    return (
+        f'<svg viewBox="{-WIDE} {-HIGH} {2 * WIDE} {HIGH + DEEP}" role="img"'
+        f' aria-label="the robot {view}"><line x1="{-WIDE}" y1="0" x2="{WIDE}" y2="0"'
+        f' class="level"/><g transform="rotate({lean:.1f})">{body}</g>'
+        f'<text x="{-WIDE + 0.05}" y="{-HIGH + 0.15}">{view}</text></svg>'
+    )
+
+
+def _lean(step: Step, *, aside: bool) -> float:
+    """Return by how much (deg) the ground leans clockwise in the picture."""
+    heading = ORIENTATIONS[step.ground.orientation].heading
+    if heading is None or not step.ground.tilt_deg:
+        return 0.0
+    towards = -math.sin(heading) if aside else math.cos(heading)
+    tilt = math.radians(step.ground.tilt_deg)
+    return math.degrees(math.atan(math.tan(tilt) * towards))
