@@ -33,22 +33,44 @@ def test_a_slow_tip_over_is_warned_of_in_time() -> None:
 
 
 def test_a_dead_imu_is_alarmed_before_the_robot_tips() -> None:
-    """Margins that are not known are said to be so; the prediction has nothing to say."""
+    """Margins that are not known are said to be so; nothing is predicted from them."""
     (event,) = [e for e in labelled('tilt', 1, fault='dead').events if e.kind == TIP]
     assert event.alarmed < 3.0
     assert event.predicted == np.inf
 
 
 def test_a_reach_saturates_and_is_warned_of() -> None:
-    """The shoulder gives all it has; the WARN at 80 % came before."""
+    """The shoulder gives all it has; that its motor neared its limit was told well before."""
     events = [e for e in labelled('reach', 0).events if e.kind == SATURATION]
     assert [e.subject for e in events] == ['shoulder_joint']
-    assert events[0].warned < events[0].time
+    assert events[0].warned < events[0].time - 0.3
+
+
+def test_a_weak_motor_is_told_when_it_gives_no_more() -> None:
+    """No level is near at 30 N m of 50 declared: only that effort no longer follows the need."""
+    found = [
+        label(CONFIG, *case) for case in cases(CONFIG, 200, 0) if case[0] == 'reach+weak-motor'
+    ]
+    told = [e.warned - e.time for r in found for e in r.events]
+    assert len(told) > 2
+    assert all(0.2 < late < 0.6 for late in told)
+
+
+def test_braking_is_an_impact_and_a_swinging_arm_is_none() -> None:
+    """What shoves the base before it tips is an impact; gravity and a moving arm are not."""
+    dashed = [e.impact for s in (0, 1, 4) for e in labelled('dash', s).events if e.kind == TIP]
+    swung = [e.impact for s in range(6) for e in labelled('swing', s).events if e.kind == TIP]
+    snatched = [e.impact for s in (2,) for e in labelled('snatch', s).events if e.kind == TIP]
+    lifted = [e.impact for s in (1, 6, 9) for e in labelled('grasp', s).events if e.kind == TIP]
+    assert dashed == [True] * 3
+    assert swung == [False] * len(swung) != []
+    assert snatched == [True]
+    assert lifted == [False] * 3
 
 
 def test_quiet_work_is_quiet() -> None:
-    """No event, no alarm, no prediction."""
-    found = labelled('work', 1, seconds=40.0)
+    """No event, no alarm, no prediction, obstacles and loads included."""
+    found = labelled('work', 1, seconds=120.0)
     assert found.events == ()
     assert found.for_nothing == ()
     assert found.predictions_for_nothing == 0

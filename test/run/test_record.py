@@ -103,6 +103,7 @@ TOLD: dict[str, str | None] = {
     'wrong-mounting': None,
     'identity-orientation': None,
     'clock-jump': 'CLOCK',
+    'second-publisher': None,  # live, its publisher is told: SECOND_PUBLISHER
     'heavy-payload': None,
     'weak-motor': None,
 }

@@ -11,6 +11,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.simulation import shape
 from ugv_acceptance.simulation.run import run
 from ugv_acceptance.simulation.scenario import Command, Noise, Recording, Scenario
 from ugv_acceptance.simulation.scenarios import SCENARIOS, STOWED
@@ -157,6 +158,83 @@ def test_it_turns_left_on_a_positive_yaw_rate(robot: Robot) -> None:
     found = run(robot, still(2.0, commands=(Command(0.0, drive=(0.0, 0.5)),)), seed=0)
     yaw = Rotation.from_quat(found.imu.orientation[-1]).as_euler('xyz')[2]
     assert 0.1 < yaw < 1.2
+
+
+@pytest.mark.parametrize('drive', [(0.0, 0.5), (0.3, 0.0), (0.2, -0.4)])
+def test_a_drive_does_not_shake_the_imu(robot: Robot, drive: tuple[float, float]) -> None:
+    """Turning on the spot or driving and braking, the accelerometer stays within 5 m/s2 of g."""
+    commands = (Command(0.2, drive=drive), Command(2.2, drive=(0.0, 0.0)))
+    force = run(robot, still(4.0, commands=commands), seed=0).imu.linear_acceleration
+    assert np.abs(np.linalg.norm(force, axis=1) - 9.81).max() < 5.0
+
+
+@pytest.mark.parametrize('heading', [0.0, np.pi / 2, np.pi])
+def test_brakes_hold_on_a_slope(robot: Robot, heading: float) -> None:
+    """On 24 degrees, down any way, it creeps less than 1 mm in five seconds."""
+    at = run(robot, replace(still(6.0), slope=(np.radians(24.0), heading)), 0).truth
+    crept = at.position[-1] - at.position[at.stamp.searchsorted(1.0)]
+    assert np.linalg.norm(crept) < 1e-3
+
+
+def test_a_brake_stops_what_drives_down_a_slope(robot: Robot) -> None:
+    """Told to stop on 15 degrees down, it stands within a few centimetres, and stays."""
+    commands = (Command(0.2, drive=(0.3, 0.0)), Command(2.2, drive=(0.0, 0.0)))
+    sloped = replace(still(5.0, commands=commands), slope=(np.radians(15.0), 0.0))
+    truth = run(robot, sloped, 0).truth
+    x = truth.position[:, 0]
+    assert x[-1] - x[truth.stamp.searchsorted(2.2)] < 0.15
+    assert x[-1] - x[truth.stamp.searchsorted(3.2)] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ('blocks', 'height', 'lean'),
+    [
+        ((shape.step(0.6, 0.06),), 0.06, 14.0),
+        (shape.stairs(0.6, 0.06, 0.3, 3), 0.18, 14.0),
+        (shape.ramp(0.6, np.radians(12.0), 1.0), np.sin(np.radians(12.0)), 12.5),
+    ],
+)
+def test_it_climbs_what_lies_ahead(
+    robot: Robot, blocks: tuple[shape.Block, ...], height: float, lean: float
+) -> None:
+    """Its wheels end as high as the obstacle says; on the way it leans as far and no further."""
+    commands = (Command(0.2, drive=(0.25, 0.0)),)
+    climbing = replace(still(7.5, payload=Payload(0.0), commands=commands), blocks=blocks)
+    truth = run(robot, replace(climbing, start=STOWED), seed=0).truth
+    assert truth.position[:, 2].max() == pytest.approx(height, abs=0.02)
+    assert 0.5 * lean < np.degrees(truth.lean.max()) < lean + 1.0
+
+
+def test_what_blocks_explain_is_no_lean(robot: Robot) -> None:
+    """A ramp of 16 degrees is above the 15 that count as tipped; its robot has not tipped."""
+    ramp = shape.ramp(0.5, np.radians(16.0))
+    drive = (Command(0.2, drive=(0.3, 0.0)),)
+    climbing = replace(still(5.0, commands=drive), blocks=ramp, lean=np.radians(16.5))
+    found = run(robot, climbing, seed=0)
+    assert found.truth.position[-1, 2] > 0.1
+    assert found.truth.tipped_at == np.inf
+
+
+def test_a_load_lifted_off_the_ground_comes_gradually(robot: Robot) -> None:
+    """Over a second the hand bears more and more, and the shoulder gives more and more."""
+    lift = Command(1.0, payload=Payload(3.0), payload_time=1.0)
+    found = run(robot, still(3.0, payload=Payload(0.0), commands=(lift,)), seed=0)
+    at = found.truth.stamp.searchsorted([0.9, 1.5, 2.2])
+    assert found.truth.load[at] == pytest.approx([0.0, 1.5, 3.0], abs=0.03)
+    effort = found.joints.effort[at, robot.joint_names.index('shoulder_joint')]
+    assert effort[1] - effort[0] == pytest.approx(effort[2] - effort[1], rel=0.15)
+    assert effort[2] - effort[0] > 15.0
+
+
+def test_the_imu_integrates_between_samples(robot: Robot) -> None:
+    """The specific force is the change of velocity over the period, whatever rattles in between."""
+    simulation = Simulation(robot, STOWED, (0.0, 0.0), Payload(0.0))
+    simulation.apply(Command(0.0, drive=(0.5, 0.0), drive_rate=2.0))
+    felt = []
+    for _ in range(100):
+        simulation.advance(0.01)
+        felt.append(simulation.imu()[2][0])
+    assert sum(felt) * 0.01 == pytest.approx(0.5, abs=0.02)
 
 
 def test_an_unknown_joint_is_refused(robot: Robot) -> None:

@@ -78,6 +78,16 @@ def test_a_frozen_encoder_is_the_same_row_by_row() -> None:
     assert np.array_equal(np.concatenate([r.position for r in rows]), at_once.joints(log).position)
 
 
+def test_another_robot_stands_where_this_one_was() -> None:
+    """Behind each message comes one that tells the first position again; rates of a row at rest."""
+    fault = Fault('second-publisher', 'joint_states', start=1.0, end=4.0)
+    log = joint_log()
+    told = Corruption((fault,), ROBOT.joint_names).joints(log)
+    assert told.stamp.tolist() == [0.0, 1.0, 1.001, 2.0, 2.001, 3.0, 3.001, 4.0]
+    rows = [0, 1, 1, 2, 1, 3, 1, 4]
+    assert np.array_equal(told.position, log.position[rows])
+
+
 def test_a_turned_imu_tells_what_a_turned_sensor_measures() -> None:
     """Vectors and orientation turn together, as scipy turns them."""
     rng = np.random.default_rng(0)

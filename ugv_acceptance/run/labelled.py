@@ -7,26 +7,35 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
-from ugv_acceptance.evaluation.prediction import margins_ahead, time_to_saturation, time_to_tip
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
-from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
+from ugv_acceptance.model.attitude import up_from_orientation
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.stability import margins
 from ugv_acceptance.run.catalogue import Case
 from ugv_acceptance.run.messages import EPOCH
 from ugv_acceptance.run.record import SATURATED_FOR, lasting, play
 from ugv_acceptance.simulation.corruption import DELAY, JITTER, Corruption, overload
-from ugv_acceptance.simulation.faults import fault_of
+from ugv_acceptance.simulation.faults import PHYSICAL, fault_of
 from ugv_acceptance.simulation.repertoire import KINDS, SECONDS
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Recording
 
 TIP, SATURATION = 'tip-over', 'saturation'
+# Alerts that tell of each kind of event: the level is near, or comes at the present rate.
+TELL = {
+    TIP: ('TIP_OVER', 'TIP_AHEAD'),
+    SATURATION: ('TORQUE_LIMIT', 'TORQUE_AHEAD', 'EFFORT_LIMIT', 'MOTOR_WEAK'),
+}
+AHEAD = ('TIP_AHEAD', 'TORQUE_AHEAD')
+# Alerts, beside STALE ones, that say that margins are not known or wrong.
+UNKNOWN = ('INPUT_INVALID', 'IMU_INCONSISTENT', 'IMU_GRAVITY', 'POSITION_LEAP', 'ENCODER_FROZEN')
 # A warning counts up to this long (s) after the event: the alert's own delay is part of it.
-TOO_LATE = 0.3
-# Prediction: how far ahead (s), from how short a time left (s), held how long (s).
-AHEAD, SOON, HELD = 0.5, 1.0, 0.1
+TOO_LATE = 0.5
+# An impact: within so long (s) before the event the base was accelerated by more than m/s2 (mean of
+# so many s), or a load cost more than rad of tilt between two samples.
+BEFORE, SHOVE, MEAN, JOLT = 0.5, 1.0, 0.1, 0.0175
 # Kinds of events with how many runs of each hundred; what is faulty is a kind of its own.
-MIX = {'tilt': 20, 'swing': 20, 'reach': 16, 'grasp': 16, 'dash': 12}
+MIX = {'tilt': 18, 'swing': 18, 'reach': 14, 'grasp': 12, 'snatch': 4, 'dash': 10, 'climb': 6}
 FAULTY = (
     ('tilt', 'dead', 'imu'),
     ('swing', 'frozen-encoder', 'shoulder_joint'),
@@ -36,15 +45,19 @@ FAULTY = (
     ('tilt', 'identity-orientation', ''),
     ('tilt', 'dropped', ''),
     ('swing', 'late', ''),
+    ('swing', 'second-publisher', 'joint_states'),
 )
+# Rates (Hz) of joints and IMU in quiet work: those of the live simulator.
+JOINTS, IMU = 100.0, 200.0
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something critical that really happened at `time` (s), and what was said of it.
 
-    `warned`, `alarmed` and `predicted` (s) are when the WARN, the critical alert and the prediction
-    came that were there when it happened; infinite where none was.
+    `warned`, `alarmed` and `predicted` (s) are when the first alert, the critical one and the
+    prediction came that were there when it happened; infinite where none was. `impact` says that
+    something hit it: see BEFORE.
     """
 
     kind: str
@@ -53,13 +66,15 @@ class Event:
     warned: float = np.inf
     alarmed: float = np.inf
     predicted: float = np.inf
+    impact: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Labelled:
-    """A run with its truth: `events` in order, and critical alerts and predictions without one.
+    """A run with its truth: `events` in order, and what was said where there was none.
 
-    `for_nothing` lists (level, code, subject) of critical alerts with which no event came.
+    `for_nothing` lists (level, code, subject) of critical alerts with which no event came,
+    `warnings` those of level WARN.
     """
 
     kind: str
@@ -67,7 +82,12 @@ class Labelled:
     seconds: float
     events: tuple[Event, ...]
     for_nothing: tuple[tuple[str, str, str], ...]
-    predictions_for_nothing: int
+    warnings: tuple[tuple[str, str, str], ...]
+
+    @property
+    def predictions_for_nothing(self) -> int:
+        """How many predictions came with no event."""
+        return sum(code in AHEAD for _, code, _ in self.warnings)
 
 
 def cases(config: Config, count: int, seed: int) -> Iterator[tuple[str, int, Case]]:
@@ -77,20 +97,20 @@ def cases(config: Config, count: int, seed: int) -> Iterator[tuple[str, int, Cas
     shares += [(k, f, s, (100 - sum(MIX.values())) // len(FAULTY)) for k, f, s in FAULTY]
     number = seed
     for kind, fault, subject, share in shares:
-        for _ in range(max(1, round(share * count / 100))):
+        for _ in range(max(1, round(share * count / 100)) if count else 0):
             number += 1
             scenario = KINDS[kind](robot, np.random.default_rng(number), SECONDS[kind])
-            start = 0.0 if fault in {'heavy-payload', 'weak-motor'} else 3.0
+            start = 0.0 if fault in PHYSICAL else 3.0
             faults = (fault_of(fault, subject, start),) if fault else ()
             yield f'{kind}+{fault}' if fault else kind, number, Case(scenario, faults)
 
 
 def work_cases(config: Config, hours: float, seed: int) -> Iterator[tuple[str, int, Case]]:
     """Yield quiet work, `hours` in all, in runs of ten minutes."""
-    for k in range(max(1, round(hours * 6))):
+    for k in range(round(hours * 6)):
         number = 1_000_000 + seed + k
         made = KINDS['work'](config.settings.robot, np.random.default_rng(number), 600.0)
-        yield 'work', number, Case(made)
+        yield 'work', number, Case(replace(made, joint_rate=JOINTS, imu_rate=IMU))
 
 
 def label(config: Config, kind: str, seed: int, case: Case) -> Labelled:
@@ -98,19 +118,12 @@ def label(config: Config, kind: str, seed: int, case: Case) -> Labelled:
     (recording,) = play(config, case, seed, length=np.inf)
     evaluator = RecordedEvaluator(config.settings)
     evaluator.start(EPOCH)
-    rows = evaluator.batch(batch_of(config, recording, case, seed))
+    evaluator.batch(batch_of(config, recording, case, seed))
     evaluator.finish(EPOCH + round(case.scenario.duration * 1e9))
     log = evaluator.watch.log
-    ahead = predicted(config, recording, rows, case)
-    events = tuple(_said(event, log, ahead) for event in events_of(config, recording))
-    return Labelled(
-        kind,
-        seed,
-        case.scenario.duration,
-        events,
-        tuple(_for_nothing(log, events)),
-        0 if events else _count(ahead),
-    )
+    events = tuple(_said(event, log) for event in events_of(config, recording))
+    for_nothing, warnings = _for_nothing(log, events)
+    return Labelled(kind, seed, case.scenario.duration, events, for_nothing, warnings)
 
 
 def events_of(config: Config, recording: Recording) -> Iterator[Event]:
@@ -124,7 +137,34 @@ def events_of(config: Config, recording: Recording) -> Iterator[Event]:
         if np.isfinite(limit) and at < tipped:
             yield Event(SATURATION, name, at)
     if np.isfinite(tipped):
-        yield Event(TIP, 'robot', tipped)
+        yield Event(TIP, 'robot', tipped, impact=hit(config, recording, tipped))
+
+
+def hit(config: Config, recording: Recording, time: float) -> bool:
+    """Return whether an impact came shortly before a time (s), by the truth: see BEFORE."""
+    truth, joints, imu = recording.truth, recording.joints, recording.imu
+    rows = np.flatnonzero((truth.stamp >= time - BEFORE - MEAN) & (truth.stamp <= time))
+    half = round(MEAN / 2.0 * recording.scenario.joint_rate)
+    place = truth.position[rows]
+    if len(rows) > 2 * half:
+        shove = place[2 * half :] - 2.0 * place[half:-half] + place[: -2 * half]
+        if (np.linalg.norm(shove, axis=1) > SHOVE * (MEAN / 2.0) ** 2).any():
+            return True
+    # Only the load differs between the two margins of a pair of samples.
+    robot, load = config.settings.robot, truth.load[rows]
+    jumps = rows[1:][np.diff(load) != 0.0]
+    for k in jumps.tolist():
+        told = np.searchsorted(imu.stamp, truth.stamp[k])
+        x, y, z, w = imu.orientation[min(int(told), len(imu.stamp) - 1)].tolist()
+        up = up_from_orientation(x, y, z, w, config.settings.imu.mounting)
+        down = -robot.gravity * np.array(up)
+        least = [
+            min(margins(robot, joints.position[k], down, replace(robot.payload, mass=m)).angle)
+            for m in (truth.load[k - 1], truth.load[k])
+        ]
+        if least[0] - least[1] > JOLT:
+            return True
+    return False
 
 
 def batch_of(config: Config, recording: Recording, case: Case, seed: int) -> Batch:
@@ -177,86 +217,36 @@ def _payloads(config: Config, recording: Recording, case: Case) -> PayloadColumn
     return PayloadColumns(frame, _ns(times), _ns(times), mass, com)
 
 
-def predicted(
-    config: Config, recording: Recording, rows: MarginRows, case: Case
-) -> dict[tuple[str, str], list[tuple[float, float]]]:
-    """Return when (from, to in s) each event was predicted: (kind, subject) -> spans."""
-    known = np.flatnonzero(rows.known)[::4]
-    time = (rows.time[known] - EPOCH) / 1e9
-    if not len(time):
-        return {}
-    settings, log = config.settings, recording.imu
-    gyro = log.angular_velocity[np.clip(np.searchsorted(log.stamp, time), 0, len(log.stamp) - 1)]
-    omega = gyro @ np.array(settings.imu.mounting).T
-    spans: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    load = np.searchsorted([t for t, _ in recording.payload], time, side='right') - 1
-    soon = np.zeros((len(time), 1 + len(settings.robot.joint_names)), dtype=np.bool_)
-    for number, (_, payload) in enumerate(recording.payload):
-        k = np.flatnonzero(load == number)
-        if not len(k):
-            continue
-        at = known[k]
-        carried = replace(payload, mass=payload.mass / overload(case.faults))
-        then = margins_ahead(
-            settings.robot, rows.q[at], rows.qd[at], rows.gravity[at], omega[k], AHEAD, carried
-        )
-        limits = settings.limits
-        soon[k, 0] = time_to_tip(rows.angle[at], then.angle, 0.0, AHEAD) < SOON
-        left = time_to_saturation(rows.torque[at], then.torque, np.array(limits.torque), AHEAD)
-        soon[k, 1:] = left < SOON
-    subjects = [(TIP, 'robot'), *((SATURATION, n) for n in settings.robot.joint_names)]
-    for column, subject in zip(soon.T, subjects, strict=True):
-        spans[subject] = _spans(column, time)
-    return spans
-
-
-def _spans(
-    on: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], time: Floats
-) -> list[tuple[float, float]]:
-    """Return the spans in which `on` held for HELD at least; dated when that was known."""
-    edges = np.flatnonzero(np.diff(on.astype(np.int8), prepend=0, append=0))
-    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return [(float(time[a] + HELD), float(time[b])) for a, b in pairs if time[b] - time[a] >= HELD]
-
-
-def _said(
-    event: Event, log: Sequence[Alert], ahead: dict[tuple[str, str], list[tuple[float, float]]]
-) -> Event:
-    code = 'TIP_OVER' if event.kind == TIP else 'TORQUE_LIMIT'
-    about = [
-        alert
-        for alert in log
-        if (alert.rule.code == code and (event.kind == TIP or alert.rule.subject == event.subject))
-        or LEVELS[alert.rule.level] == 'STALE'
-        or alert.rule.code in {'INPUT_INVALID', 'IMU_INCONSISTENT'}
-    ]
+def _said(event: Event, log: Sequence[Alert]) -> Event:
+    """Return the event with when it was told of, by alerts that were there when it happened."""
     at = EPOCH + round(event.time * 1e9)
-    there = [a for a in about if a.start <= at + TOO_LATE * 1e9 and (a.end is None or a.end >= at)]
-    first = {
-        critical: min(
-            (
-                (a.start - EPOCH) / 1e9
-                for a in there
-                if (LEVELS[a.rule.level] != 'WARN') is critical
-            ),
-            default=np.inf,
-        )
-        for critical in (False, True)
-    }
-    spans = ahead.get((event.kind, event.subject), [])
-    told = min((a for a, b in spans if a <= event.time and b >= event.time - 0.5), default=np.inf)
-    return replace(event, warned=min(first.values()), alarmed=first[True], predicted=told)
+    there = [
+        a
+        for a in log
+        if (_tells(a, event) or LEVELS[a.rule.level] == 'STALE' or a.rule.code in UNKNOWN)
+        and a.start <= at + TOO_LATE * 1e9
+        and (a.end is None or a.end >= at)
+    ]
+    alarms = [a for a in there if LEVELS[a.rule.level] != 'WARN']
+    ahead = [a for a in there if a.rule.code in AHEAD]
+    warned, alarmed, predicted = map(_first, (there, alarms, ahead))
+    return replace(event, warned=warned, alarmed=alarmed, predicted=predicted)
 
 
-def _for_nothing(log: Sequence[Alert], events: Sequence[Event]) -> Iterator[tuple[str, str, str]]:
-    """Yield the critical alerts of a run in which nothing critical happened."""
-    if events:
-        return
-    for alert in log:
-        level = LEVELS[alert.rule.level]
-        if level != 'WARN':
-            yield level, alert.rule.code, alert.rule.subject
+def _tells(alert: Alert, event: Event) -> bool:
+    about = alert.rule.code in TELL[event.kind]
+    return about and (event.kind == TIP or alert.rule.subject == event.subject)
 
 
-def _count(ahead: dict[tuple[str, str], list[tuple[float, float]]]) -> int:
-    return sum(len(spans) for spans in ahead.values())
+def _first(alerts: Sequence[Alert]) -> float:
+    return min(((a.start - EPOCH) / 1e9 for a in alerts), default=np.inf)
+
+
+Said = tuple[tuple[str, str, str], ...]
+
+
+def _for_nothing(log: Sequence[Alert], events: Sequence[Event]) -> tuple[Said, Said]:
+    """Return the critical alerts and the warnings of a run in which nothing critical happened."""
+    said = [] if events else [(LEVELS[a.rule.level], a.rule.code, a.rule.subject) for a in log]
+    critical = tuple(one for one in said if one[0] != 'WARN')
+    return critical, tuple(one for one in said if one[0] == 'WARN')

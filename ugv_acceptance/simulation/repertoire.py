@@ -125,19 +125,19 @@ def _obstacle(robot: Robot, rng: Rng, height: float) -> tuple[tuple[Block, ...],
     half = max(c.position[0] for c in wheel_contacts(robot))
     rise, at = float(rng.uniform(0.5, 1.0)) * height, float(rng.uniform(0.5, 0.8))
     lean = atan(rise / half) + radians(1.0)
-    made = ((step(at, rise),), stairs(at, rise, 0.35, 3), (ramp(at, lean, 0.75),))
+    made = ((step(at, rise),), stairs(at, rise, 0.35, 3), ramp(at, lean, 0.75))
     return made[rng.integers(3)], lean
 
 
 def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm is up with a load; the ground tilts until something gives."""
+    """The arm is up with a load; the ground tilts until something gives, or it nearly slides."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
     q = poses.vector(
         turret_joint=rng.uniform(-pi, pi),
         shoulder_joint=radians(rng.uniform(60, 95)),
         elbow_joint=radians(rng.uniform(-60, 0)),
     )
-    slope = radians(55.0), float(rng.uniform(-pi, pi))
+    slope = radians(38.0), float(rng.uniform(-pi, pi))
     rate = float(rng.uniform(0.03, 0.12))
     ramp = Command(2.0, slope=slope, slope_rate=rate)
     return Scenario('tilt', seconds, poses.named(q), (0.0, 0.0), load, (ramp,))

@@ -77,7 +77,7 @@ def fetch() -> Scenario:
         ),
         joint_rate=100.0,
         imu_rate=200.0,
-        blocks=(ramp(0.6, radians(10)),),
+        blocks=ramp(0.6, radians(10)),
         lean=radians(10.5),
     )
 

@@ -44,13 +44,13 @@ def stairs(at: float, rise: float, run: float, count: int) -> tuple[Block, ...]:
     return tuple(step(at + k * run, (k + 1) * rise) for k in range(count))
 
 
-def ramp(at: float, angle: float, length: float = 3.0) -> Block:
-    """Return a ramp up by `angle` (rad) from `at` x (m), its slope `length` (m) long."""
+def ramp(at: float, angle: float, length: float = 3.0) -> tuple[Block, Block]:
+    """Return a ramp up by `angle` (rad) from `at` x (m), `length` (m) along it, and level then."""
     s, c = math.sin(angle), math.cos(angle)
     depth = length / 2.0
     # The upper face goes through (at, 0): half a length along it, then `depth` down its normal.
     middle = (at + length / 2.0 * c + depth * s, 0.0, length / 2.0 * s - depth * c)
-    return Block(middle, (length / 2.0, 2.0, depth), -angle)
+    return Block(middle, (length / 2.0, 2.0, depth), -angle), step(at + length * c, length * s)
 
 
 def numbers(values: Iterable[float]) -> str:
