@@ -101,13 +101,13 @@ class Annotation:
     def _stretch(self, rows: MarginRows) -> Iterator[Said]:
         payloads, heard = self.judgement.examination.payloads, rows.pairs.joints.time
         of, until = rows.pairs.of_joints.tolist(), rows.until.tolist()
-        rates, efforts = rows.pairs.joints.qd, rows.pairs.joints.effort
+        felt = (rows.pairs.joints.qd, rows.pairs.joints.effort)
+        measured = list(zip(*(map(tuple, table.tolist()) for table in felt), strict=True))
         for k, (now, stamp, margins) in enumerate(_margins(rows)):
             yield from self._up_to(now)
             self._until, self._stamp = until[k], stamp
             j = of[k]
-            measured = tuple(rates[j].tolist()), tuple(efforts[j].tolist())
-            self._session.take(margins, payloads.at(int(heard[j])), measured)
+            self._session.take(margins, payloads.at(int(heard[j])), measured[j])
             if margins is not None:
                 yield from self._margins(now, stamp, margins)
 
