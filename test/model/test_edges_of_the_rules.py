@@ -8,9 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import DOWN, at, places, random_robot, tracked
 
+from ugv_acceptance import BadConfig
+from ugv_acceptance.model.attitude import is_rotation
 from ugv_acceptance.model.blocks import BLOCK, in_blocks
 from ugv_acceptance.model.expressions import Scalar
-from ugv_acceptance.model.hull import THIN, heights_above, hull
+from ugv_acceptance.model.hull import THIN, drawn_in, heights_above, hull
 from ugv_acceptance.model.kernels import compile_kernel
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Matrix, Payload, Robot, Vector
@@ -214,3 +216,40 @@ def test_utilisation_is_a_share_of_the_limit() -> None:
     """Without sign; nothing of a limit that is infinite."""
     assert utilisation((-20.0, 30.0), (40.0, 20.0)).tolist() == [0.5, 1.5]
     assert utilisation((20.0,), (math.inf,)).tolist() == [0.0]
+
+
+def test_a_place_beyond_a_corner_is_drawn_to_that_corner() -> None:
+    """Whichever of the points it is, by a billionth of the way inside; also for many places."""
+    points: list[Vector] = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
+    for k, (x, y, _) in enumerate(points):
+        turned = points[k + 1 :] + points[: k + 1]
+        assert drawn_in(turned, (3.0 * x, 3.0 * y, 0.5)) == pytest.approx((x, y), abs=1e-8)
+    x, y = drawn_in(points, (np.array((3.0, 0.0)), np.array((0.5, -2.0)), 0.0))
+    assert x == pytest.approx((1.0, 0.0), abs=1e-8)
+    assert y == pytest.approx((0.5 / 3.0, -1.0), abs=1e-8)
+    assert abs(x[0]) < 1.0
+
+
+@pytest.mark.parametrize('part', range(4))
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+def test_a_turn_about_one_axis_is_a_rotation(part: int, sign: float) -> None:
+    """Each component counts alike, whatever its sign; with half of it there is none."""
+    q = sign * np.eye(4)[part]
+    assert is_rotation(*q)
+    assert not is_rotation(*(0.5 * q))
+    mixed = np.full(4, 0.5)
+    mixed[part] *= -1.0
+    assert is_rotation(*mixed)
+
+
+def test_joints_that_are_no_tree_are_refused() -> None:
+    """A link with two parents, and links that hang on nothing."""
+    links = (Link('a', 1.0), Link('b', 1.0), Link('c', 1.0), Link('d', 1.0))
+    twice = (Joint('x', 'fixed', 'a', 'b'), Joint('y', 'fixed', 'a', 'c'),
+             Joint('z', 'fixed', 'c', 'b'), Joint('w', 'fixed', 'a', 'd'))  # fmt: skip
+    with pytest.raises(BadConfig, match='joint z: link b has a parent already'):
+        mechanics_of(Robot('r', links, twice, ()))
+    lost = (Joint('x', 'fixed', 'a', 'b'), Joint('y', 'fixed', 'c', 'd'),
+            Joint('z', 'fixed', 'd', 'c'))  # fmt: skip
+    with pytest.raises(BadConfig, match='links c, d do not hang on root link a'):
+        mechanics_of(Robot('r', links, lost, ()))

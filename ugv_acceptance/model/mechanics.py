@@ -15,7 +15,6 @@ from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.levers import PointLoad, carried_by, in_base, steps_of
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.rows import Rows, pick
 from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
 
 Triple = tuple[Number, Number, Number]
@@ -145,9 +144,3 @@ def posture_once(
     """
     formula = _posture_formula(robot, tree_of(robot))
     return Posture(*formula(*q, mass, *cog))
-
-
-def take(posture: Posture, rows: Rows) -> Posture:
-    """Return the rows of a posture of arrays; what is the same for all samples stays a float."""
-    p = posture
-    return Posture(*pick((p.levers, p.mass, p.cog, p.contacts), rows))
