@@ -136,8 +136,8 @@ def recorded(out: Path, killed: float) -> tuple[int, int, int, float | None]:
             continue
         # What is closed must be whole; what is not is salvaged up to where it breaks off.
         readable += not (closed and bag.salvaged)
-        if not closed and bag.end_ns:
-            lost = killed - bag.end_ns / 1e9
+        if not closed:
+            lost = killed - (bag.end_ns / 1e9 or bag.paths[0].stat().st_mtime)
     return steps, len(recordings), readable, lost
 
 

@@ -90,7 +90,7 @@ def test_a_tip_over_is_seen_and_the_next_step_stands_again(tmp_path: Path) -> No
     assert (first['verdict'], second['verdict']) == ('PASS', 'PASS')
     path = tmp_path / 'out' / 'steps' / 's0'
     time, _, _, tilt = seen_in(path, CONFIG).joined()
-    fallen = time[tilt < math.radians(-20.0)]
+    fallen = time[tilt.min(axis=1) < math.radians(-20.0)]
     assert len(fallen)
     raised = next(a for a in first['alerts'] if a['level'] == 'ERROR' and a['code'] == 'TIP_OVER')
     assert raised['start_s'] < (fallen[0] - open_bag(path).start_ns) / 1e9

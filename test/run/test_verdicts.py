@@ -9,6 +9,7 @@ import pytest
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
+from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.plan import Step, read_plan, write_plan
 from ugv_acceptance.run.catalogue import case_of
@@ -101,8 +102,10 @@ def test_coverage_counts_the_cells_that_were_visited(tmp_path: Path) -> None:
     record(CONFIG, case_of('gentle', CONFIG.settings.robot, 1, 1.0), 1, tmp_path / 'run')
     found = coverage_of(CONFIG, [seen_in(tmp_path / 'run', CONFIG)])
     assert found['cells_visited'] <= 2  # noise may cross the line between two
-    assert found['torque_limit']['outside'] is None
-    assert found['torque_limit']['inside'] > 0.3
+    for name in ('shoulder_joint', 'elbow_joint'):
+        assert found['torque_limit'][name]['outside'] is None
+        assert found['torque_limit'][name]['inside'] > 0.3
+    assert all(found['tip_limit_deg'][side]['inside'] > 20.0 for side in SIDES)
 
 
 def test_cells_do_not_see_whole_turns() -> None:

@@ -1,5 +1,6 @@
 """How much of the failure map a run visited, and how close to each boundary it came."""
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.search import STEP_DEG, Arm, roles_of
 from ugv_acceptance.run.verdicts import Seen
 
@@ -15,14 +17,16 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     """Return the coverage of the arm's postures by what was recorded, for JSON.
 
     Cells are squares of the two arm joints' positions; of all, only those that keep clear of
-    ground and deck count. `inside` and `outside` are the closest approaches to each limit: a
-    share of the torque limit, degrees of tilt; None on a side the run was never on.
+    ground and deck count. `inside` and `outside` are the closest approaches to the torque limit of
+    each joint (a share of it) and to the tilt limit on each of SIDES (deg); None on a side the run
+    was never on.
     """
     arm = Arm(config.settings, roles_of(config.settings))
     axes = [arm.robot.joint_names.index(name) for name in arm.roles.axes]
     reachable = cells(arm.grid[:, axes])
     visited: set[tuple[int, int]] = set()
-    use, tilt = [np.empty(0)], [np.empty(0)]
+    names = arm.robot.joint_names
+    use, tilt = [np.empty((0, len(names)))], [np.empty((0, len(SIDES)))]
     for one in seen:
         _, q, used, left = one.joined()
         visited |= cells(q[:, axes])
@@ -31,14 +35,15 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     limits = config.settings.limits
     torque = np.concatenate(use) - limits.torque_error
     angle = np.degrees(limits.tip_error - np.concatenate(tilt))
+    limited = [(n, k) for k, n in enumerate(names) if math.isfinite(limits.torque[k])]
     return {
         'cell_deg': STEP_DEG,
         'joints': list(arm.roles.axes),
         'cells_reachable': len(reachable),
         'cells_visited': len(visited & reachable),
         'share': round(len(visited & reachable) / max(len(reachable), 1), 4),
-        'torque_limit': _approach(torque),
-        'tip_limit_deg': _approach(angle),
+        'torque_limit': {name: _approach(torque[:, k]) for name, k in limited},
+        'tip_limit_deg': {side: _approach(angle[:, k]) for k, side in enumerate(SIDES)},
     }
 
 

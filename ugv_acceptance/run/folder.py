@@ -164,9 +164,11 @@ def report_of(result: dict[str, Any]) -> str:
 
 def approaches(coverage: Mapping[str, Any]) -> list[str]:
     """Return how close a run came to each limit on either side, a line each."""
+    kinds = (('torque limit', 'torque_limit', 100.0, '%'), ('tilt', 'tip_limit_deg', 1.0, ' deg'))
     return [
-        _approach_line('torque limit', coverage['torque_limit'], 100.0, '%'),
-        _approach_line('tilt limit', coverage['tip_limit_deg'], 1.0, ' deg'),
+        _approach_line(f'{what}, {name}', found, scale, unit)
+        for what, key, scale, unit in kinds
+        for name, found in coverage[key].items()
     ]
 
 
@@ -187,4 +189,4 @@ def _approach_line(what: str, found: dict[str, float | None], scale: float, unit
         f'{side} by {value * scale:.1f}{unit}' if value is not None else f'never {side}'
         for side, value in found.items()
     ]
-    return f'closest to the {what}: {", ".join(sides)}'
+    return f'closest to the limit: {what}: {", ".join(sides)}'

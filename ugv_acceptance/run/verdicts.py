@@ -14,6 +14,7 @@ from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.plan import Step, matches
 
 PASS, FAIL, INCONCLUSIVE, SKIPPED = 'PASS', 'FAIL', 'INCONCLUSIVE', 'SKIPPED'
@@ -43,7 +44,11 @@ class Done:
 
 @dataclass(slots=True)
 class Seen:
-    """Margins of a recording, gathered stretch by stretch: time (n,) ns, q, use and tilt (rad)."""
+    """Margins of a recording, gathered stretch by stretch.
+
+    Times (n,) in ns, positions `q` (n, j), shares `use` (n, j) of the torque limits, tilt left
+    (n, 4) in rad towards each of SIDES.
+    """
 
     limits: Floats
     time: list[NDArray[np.int64]] = field(default_factory=list)
@@ -56,13 +61,14 @@ class Seen:
         known = rows.known
         self.time.append(rows.time[known])
         self.q.append(rows.q[known])
-        self.use.append((np.abs(rows.torque[known]) / self.limits).max(axis=1))
-        self.tilt.append(rows.angle[known].min(axis=1))
+        self.use.append(np.abs(rows.torque[known]) / self.limits)
+        self.tilt.append(rows.angle[known])
 
     def joined(self) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
         """Return time, q, use and tilt of the whole recording."""
+        none = np.empty((0, len(self.limits)))
         if not self.time:
-            return np.empty(0, np.int64), np.empty((0, len(self.limits))), np.empty(0), np.empty(0)
+            return np.empty(0, np.int64), none, none, np.empty((0, len(SIDES)))
         q, use, tilt = (np.concatenate(c) for c in (self.q, self.use, self.tilt))
         return np.concatenate(self.time), q, use, tilt
 
@@ -158,8 +164,8 @@ def measured(seen: Seen, done: Done) -> dict[str, float]:
     if not rows.any():
         return {}
     return {
-        'tilt_left_deg': round(float(np.degrees(np.median(tilt[rows]))), 2),
-        'use': round(float(np.median(use[rows])), 4),
+        'tilt_left_deg': round(float(np.degrees(np.median(tilt[rows].min(axis=1)))), 2),
+        'use': round(float(np.median(use[rows].max(axis=1))), 4),
     }
 
 
