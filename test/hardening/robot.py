@@ -1,8 +1,8 @@
 """A robot's driver as a process of its own: publishes both inputs as it is told, counts them.
 
 The one argument is a Task as JSON. It prints "ready" and the time (ns) once its publishers are
-there, and at the end a Sent as JSON. On stdin it takes the name of a kind of fault, which then
-lasts, or "end".
+there, "joined" and the time once it is listened to, and at the end a Sent as JSON. On stdin it
+takes the name of a kind of fault, which then lasts, or "end".
 """
 
 import json
@@ -125,7 +125,8 @@ def main() -> None:
     load = node.create_publisher(InertiaStamped, 'payload', 10)
     say(f'ready {time.time_ns()}')
     while min(p.get_subscription_count() for p in publishers) < task.listeners:
-        time.sleep(0.05)
+        time.sleep(0.01)
+    say(f'joined {time.time_ns()}')
     streams = [
         Stream(publishers[0].publish, joints_of, NS / task.joints_hz),
         Stream(publishers[1].publish, imu_of, NS / task.imu_hz),

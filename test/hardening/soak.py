@@ -40,7 +40,7 @@ def trial(seconds: float, seed: int = 0) -> Outcome:
     with listening() as (live, ears), monitor() as watcher:
         live.until(lambda: ears.verdicts)
         with robot(task) as load:
-            line_of(load)
+            line_of(load), line_of(load)
             memory, end = [], time.monotonic() + seconds
             while time.monotonic() < end:
                 live.spin(min(2.0, seconds / 10))

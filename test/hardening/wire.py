@@ -44,7 +44,7 @@ class Heard:
 class Ears(Node):
     """Hears what the robot sends and what the monitor says. `last` are the newest stamps (ns)."""
 
-    def __init__(self, namespace: str = '') -> None:
+    def __init__(self, namespace: str = '', *, inputs: bool = True) -> None:
         super().__init__('ears', namespace=namespace)
         self.alerts: list[Heard] = []
         self.verdicts: list[DiagnosticStatus] = []
@@ -58,7 +58,7 @@ class Ears(Node):
             ('joint_states', JointState, 'joint_states'),
             ('imu', Imu, 'imu/data'),
         )
-        for name, kind, topic in kinds:
+        for name, kind, topic in kinds if inputs else ():
             self.create_subscription(kind, topic, self._stamped(name), quick, raw=True)
 
     def _stamped(self, name: str) -> Callable[[bytes], None]:
@@ -141,10 +141,10 @@ def line_of(process: 'subprocess.Popen[str]') -> str:
 
 
 @contextmanager
-def listening() -> Iterator[tuple[Live, Ears]]:
-    """Give an executor and who listens on it."""
+def listening(*, inputs: bool = True) -> Iterator[tuple[Live, Ears]]:
+    """Give an executor and who listens on it, also to the `inputs` unless told otherwise."""
     with ros_context(), live_nodes() as live:
-        ears: Ears = live.add(Ears())
+        ears: Ears = live.add(Ears(inputs=inputs))
         yield live, ears
 
 

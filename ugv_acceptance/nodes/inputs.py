@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 
 from geometry_msgs.msg import InertiaStamped
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.config import Topic, Topics
@@ -20,6 +23,10 @@ _DURABILITY = {
     'volatile': DurabilityPolicy.VOLATILE,
     'transient_local': DurabilityPolicy.TRANSIENT_LOCAL,
 }
+# What ROS calls a node while its publisher is known and its name is not yet.
+_UNKNOWN = 'NODE_NAME_UNKNOWN'
+# Seconds between looks for publishers after one has come or gone, looks, and ns to wait for a name.
+_SOON, _LOOKS, _NAMED = 0.1, 10, 1_000_000_000
 
 
 def qos_of(topic: Topic, depth: int) -> QoSProfile:
@@ -37,6 +44,11 @@ class Inputs:
     def __init__(self, node: Node, topics: Topics, session: Session, depth: int) -> None:
         self._node = node
         self._session = session
+        self._allowed: frozenset[str] = frozenset()
+        self._looks = 0
+        self._unnamed: dict[str, int] = {}
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._soon: Timer = node.create_timer(_SOON, self._look, clock=steady)
         self.publishers: dict[str, list[str]] = {}
         rows = (
             ('joint_states', JointState, topics.joint_states, session.take_joint_state),
@@ -68,31 +80,64 @@ class Inputs:
             count = float(session.counts[name].lost)
             session.faults.set(session.clock.now(), 'MESSAGES_LOST', name, count)
 
-        return SubscriptionEventCallbacks(incompatible_qos=mismatch, message_lost=lost)
+        def matched(_: object) -> None:
+            self._look_soon()
+
+        return SubscriptionEventCallbacks(
+            incompatible_qos=mismatch, message_lost=lost, matched=matched
+        )
+
+    def _look_soon(self) -> None:
+        """Look for publishers every now and then for a second: one has come or gone."""
+        self._looks = 0
+        self._soon.reset()
+
+    def _look(self) -> None:
+        self._looks += 1
+        if self._looks >= _LOOKS:
+            self._soon.cancel()
+        try:
+            self._see_publishers(self._session.clock.now())
+        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+            self._session.fail('publishers', error)
 
     def look_around(self, allowed: Sequence[str]) -> None:
         """See who publishes the inputs, and which faults are over. To be called once a second."""
+        self._allowed = frozenset(node for node in allowed if node)
         now, faults = self._session.clock.now(), self._session.faults
-        for name, subscription in self.subscriptions.items():
-            infos = self._node.get_publishers_info_by_topic(subscription.topic_name)
-            nodes = sorted(_node_name(info.node_namespace, info.node_name) for info in infos)
-            self.publishers[name] = nodes
-            known = {node for node in allowed if node}
-            foreign = [node for node in nodes if known and node not in known]
-            if len(nodes) > 1:
-                faults.set(now, 'SECOND_PUBLISHER', name, float(len(nodes)), ', '.join(nodes))
-            else:
-                faults.clear(now, 'SECOND_PUBLISHER', name)
-            if foreign:
-                faults.set(now, 'FOREIGN_PUBLISHER', name, 1.0, ', '.join(foreign))
-            else:
-                faults.clear(now, 'FOREIGN_PUBLISHER', name)
+        self._see_publishers(now)
+        for name in self.subscriptions:
             count = self._session.counts[name]
             if count.malformed == self._malformed[name]:
                 faults.clear(now, 'INPUT_MALFORMED', name)
                 faults.clear(now, 'MONITOR_FAULT', name)
             self._malformed[name] = count.malformed
         self._look_at_the_clock(now)
+
+    def _see_publishers(self, now: int) -> None:
+        for name, subscription in self.subscriptions.items():
+            infos = self._node.get_publishers_info_by_topic(subscription.topic_name)
+            nodes = sorted(_node_name(info.node_namespace, info.node_name) for info in infos)
+            if self._nameless(name, now, nodes):
+                continue
+            self.publishers[name] = nodes
+            foreign = [node for node in nodes if self._allowed and node not in self._allowed]
+            several = nodes if len(nodes) > 1 else []
+            self._tell(now, 'SECOND_PUBLISHER', name, several, float(len(nodes)))
+            self._tell(now, 'FOREIGN_PUBLISHER', name, foreign, 1.0)
+
+    def _nameless(self, name: str, now: int, nodes: Sequence[str]) -> bool:
+        """Return whether to wait for the name of a node, which comes a little later."""
+        if not any(_UNKNOWN in node for node in nodes):
+            self._unnamed.pop(name, None)
+            return False
+        return now - self._unnamed.setdefault(name, now) < _NAMED
+
+    def _tell(self, now: int, code: str, name: str, nodes: Sequence[str], count: float) -> None:
+        if nodes:
+            self._session.faults.set(now, code, name, count, ', '.join(nodes))
+        else:
+            self._session.faults.clear(now, code, name)
 
     def _look_at_the_clock(self, now: int) -> None:
         clock = self._session.clock
@@ -103,6 +148,7 @@ class Inputs:
 
     def destroy(self) -> None:
         """Stop listening."""
+        self._node.destroy_timer(self._soon)
         for subscription in self.subscriptions.values():
             self._node.destroy_subscription(subscription)
 
