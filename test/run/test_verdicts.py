@@ -179,4 +179,5 @@ def test_the_result_names_the_plan_and_every_step(tmp_path: Path) -> None:
     assert result['plan']['sha256'] == PLAN.sha256
     assert [s['id'] for s in result['steps']] == [s.id for s in PLAN.steps]
     assert result['verdict'] == 'INCONCLUSIVE'
-    assert PLAN.sha256 in (folder.path / 'report.txt').read_text()
+    for name in ('report.txt', 'report.html'):
+        assert PLAN.sha256 in (folder.path / name).read_text()

@@ -116,7 +116,7 @@ def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
 
 def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Console) -> None:
     """Print what came of the run: the verdict, what it covered, where it is."""
-    from ugv_acceptance.run.folder import approaches
+    from ugv_acceptance.run.report import approaches
 
     counts = ', '.join(f'{count} {word}' for word, count in result['counts'].items() if count)
     verdict, covered = result['verdict'], result['coverage']
@@ -126,4 +126,6 @@ def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Consol
     )
     for line in approaches(covered):
         console.print(line, soft_wrap=True)
-    console.print(f'{escape(str(folder.path))}/report.txt, result.json, steps/', soft_wrap=True)
+    console.print(
+        f'{escape(str(folder.path))}/report.html, report.txt, result.json, steps/', soft_wrap=True
+    )

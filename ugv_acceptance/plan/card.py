@@ -1,10 +1,8 @@
 """The operator's card: a printable page a step group, what alerts mean, the safe map."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -12,18 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
+from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
-from ugv_acceptance.plan.search import Arm, look, roles_of
+from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
-from ugv_acceptance.report.regions import (
-    degree_axes,
-    draw_regions,
-    figure,
-    legend,
-    svg_of,
-)
-from ugv_acceptance.studies.maps import Levels
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Code -> what it means to the person at the robot.
@@ -47,8 +38,6 @@ LEVELS = (
 )
 # Lines of a step's preparation that say ground and load, which stand in their own rows.
 GROUND_AND_LOAD = 2
-# Steps (deg) of the map; a joint's range in it.
-MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,69 +127,3 @@ def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Seque
 
 def _text(posture: Posture) -> str:
     return ', '.join(f'{n.removesuffix("_joint")} {a:g}°' for n, a in posture.items())
-
-
-def safe_maps(arm: Arm, plan: Plan) -> list[dict[str, str]]:
-    """Return the maps of tilt left and torque used over both arm joints, a page's row a load.
-
-    The numbers on them are the plan's steps on level ground with that load; H is home.
-    """
-    limits, full = arm.settings.limits, arm.robot.payload.mass
-    axis = np.radians(np.arange(*MAP_RANGE, MAP_STEP))
-    q = np.broadcast_to(arm.folded, (len(axis), len(axis), len(arm.folded))).copy()
-    names = arm.robot.joint_names
-    q[..., names.index(arm.roles.axes[0])] = axis[:, None]
-    q[..., names.index(arm.roles.axes[1])] = axis
-    maps = []
-    for load in dict.fromkeys((0.0, full / 2.0, full)):
-        found = look(arm, q.reshape(-1, q.shape[-1]), ('level', 0.0), load)
-        tilt = np.degrees(found.tilt).reshape(len(axis), -1)
-        use = found.most.reshape(len(axis), -1)
-        bounds = Levels(math.degrees(limits.tip_warn), math.degrees(limits.tip_error))
-        torque = Levels(1.0 - limits.torque_warn, 1.0 - limits.torque_error)
-        marks = _marks(arm, plan, load)
-        maps.append(_drawn(arm, axis, ((tilt, bounds), (1.0 - use, torque)), load, marks))
-    return maps
-
-
-def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
-    """Return shoulder and elbow (deg) of home and of the steps on level ground with a load."""
-    first, second = arm.roles.axes
-    held = [
-        s
-        for s in plan.steps
-        if s.action == 'hold' and not s.ground.tilt_deg and s.payload_kg == round(load, 3)
-    ]
-    found = [(plan.home_deg[first], plan.home_deg[second], 'H')]
-    for step in held:
-        at = {**plan.home_deg, **step.posture_deg}
-        found.append((at[first], at[second], step.id.partition('-')[0]))
-    return found
-
-
-def _drawn(
-    arm: Arm,
-    axis: Any,  # noqa: ANN401 - arrays
-    fields: Any,  # noqa: ANN401 - arrays
-    load: float,
-    marks: Sequence[tuple[float, float, str]],
-) -> dict[str, str]:
-    made = figure(7.4, 3.1)
-    shoulder, elbow = (name.removesuffix('_joint') for name in arm.roles.axes)
-    for k, (title, (margin, levels)) in enumerate(
-        zip(('tip-over', 'motor torque'), fields, strict=True), 1
-    ):
-        axes = made.add_subplot(1, 2, k)
-        degrees = np.degrees(axis)
-        draw_regions(axes, degrees, degrees, margin, levels)
-        degree_axes(axes, shoulder, elbow)
-        axes.set_title(title)
-        for x, y, word in marks:
-            box = {'facecolor': 'white', 'edgecolor': 'black', 'pad': 1.0, 'linewidth': 0.5}
-            axes.text(x, y, word, fontsize=6, ha='center', va='center', bbox=box)
-    legend(made, loc='outside lower center', ncols=3)
-    caption = f'{load:g} kg in the gripper' if load else 'gripper empty: safe everywhere'
-    worst = min(float(margin.min()) - levels.caution for margin, levels in fields)
-    if not load and worst < 0.0:
-        caption = 'gripper empty'
-    return {'svg': svg_of(made, f'map{load:g}'.replace('.', '_')), 'caption': caption}

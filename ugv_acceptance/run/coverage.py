@@ -16,10 +16,10 @@ from ugv_acceptance.run.verdicts import Seen
 def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     """Return the coverage of the arm's postures by what was recorded, for JSON.
 
-    Cells are squares of the two arm joints' positions; of all, only those that keep clear of
-    ground and deck count. `inside` and `outside` are the closest approaches to the torque limit of
-    each joint (a share of it) and to the tilt limit on each of SIDES (deg); None on a side the run
-    was never on.
+    Cells are squares of the two arm joints' positions, `visited_deg` their lower corners (first
+    joint -> second); only those that keep clear of ground and deck count. `inside` and `outside`
+    are the closest approaches to the torque limit of each joint (a share of it) and to the tilt
+    limit on each of SIDES (deg); None on a side the run was never on.
     """
     arm = Arm(config.settings, roles_of(config.settings))
     axes = [arm.robot.joint_names.index(name) for name in arm.roles.axes]
@@ -35,6 +35,9 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     limits = config.settings.limits
     torque = np.concatenate(use) - limits.torque_error
     angle = np.degrees(limits.tip_error - np.concatenate(tilt))
+    there: dict[str, list[float]] = {}
+    for a, b in sorted(visited & reachable):
+        there.setdefault(f'{a * STEP_DEG - 180.0:g}', []).append(b * STEP_DEG - 180.0)
     limited = [(n, k) for k, n in enumerate(names) if math.isfinite(limits.torque[k])]
     return {
         'cell_deg': STEP_DEG,
@@ -42,6 +45,7 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
         'cells_reachable': len(reachable),
         'cells_visited': len(visited & reachable),
         'share': round(len(visited & reachable) / max(len(reachable), 1), 4),
+        'visited_deg': there,
         'torque_limit': {name: _approach(torque[:, k]) for name, k in limited},
         'tip_limit_deg': {side: _approach(angle[:, k]) for k, side in enumerate(SIDES)},
     }

@@ -1,6 +1,6 @@
 """The folder of a run: what is done already, one recording and one result a step, the report.
 
-    plan.yaml  run.json  journal.jsonl  result.json  report.txt
+    plan.yaml  run.json  journal.jsonl  result.json  report.txt  report.html
     steps/ID/{ID_0.mcap,metadata.yaml}  steps/ID.json
 
 A step counts as done once its JSON is there; what was recorded before an interruption, or in an
@@ -9,7 +9,6 @@ for whatever began or ended, written at once.
 """
 
 import json
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -19,6 +18,7 @@ from ugv_acceptance import BadConfig, __version__
 from ugv_acceptance.bag.result import write_json, write_text
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.plan import Plan, Step, write_plan
+from ugv_acceptance.run.report import html_of, report_of
 from ugv_acceptance.run.verdicts import VERDICTS, whole
 
 RESULT_VERSION = 1
@@ -84,7 +84,9 @@ class RunFolder:
             'steps': results,
         }
         write_json(self.path / 'result.json', result)
-        write_text(self.path / 'report.txt', report_of(result))
+        text = report_of(result)
+        write_text(self.path / 'report.txt', text)
+        write_text(self.path / 'report.html', html_of(text, self.plan, config, coverage))
         return result
 
 
@@ -141,52 +143,3 @@ def _check_same(state: Path, head: dict[str, str]) -> None:
     for key, value in head.items():
         if found.get(key) != value:
             raise BadConfig(f'{state}: {key}: expected {value}, got {found.get(key)}')
-
-
-def report_of(result: dict[str, Any]) -> str:
-    """Return a run's report as plain text."""
-    coverage = result['coverage']
-    lines = [
-        '{}: plan {} on {} ({})'.format(
-            result['verdict'], result['plan']['name'], result['robot']['name'], result['mode']
-        ),
-        f'plan sha256 {result["plan"]["sha256"]}',
-        ', '.join(f'{count} {verdict}' for verdict, count in result['counts'].items() if count),
-        '',
-        *(line for step in result['steps'] for line in _step_lines(step)),
-        '',
-        'failure map: {cells_visited} of {cells_reachable} cells of {cell_deg:g} deg visited'
-        ' ({share:.1%})'.format(**coverage),
-        *approaches(coverage),
-    ]
-    return '\n'.join(lines) + '\n'
-
-
-def approaches(coverage: Mapping[str, Any]) -> list[str]:
-    """Return how close a run came to each limit on either side, a line each."""
-    kinds = (('torque limit', 'torque_limit', 100.0, '%'), ('tilt', 'tip_limit_deg', 1.0, ' deg'))
-    return [
-        _approach_line(f'{what}, {name}', found, scale, unit)
-        for what, key, scale, unit in kinds
-        for name, found in coverage[key].items()
-    ]
-
-
-def _step_lines(step: dict[str, Any]) -> Sequence[str]:
-    told, found = step.get('expected') or {}, step.get('measured') or {}
-    numbers = [
-        f'tilt left {told["tilt_left_deg"]:.1f} expected, {found["tilt_left_deg"]:.1f} deg found'
-        for _ in ('tilt',)
-        if 'tilt_left_deg' in told and 'tilt_left_deg' in found
-    ]
-    tried = [f'an attempt before: {"; ".join(e["reasons"])}' for e in step.get('earlier', ())]
-    reasons = [f'    {reason}' for reason in (*step['reasons'], *numbers, *tried)]
-    return [f'{step["verdict"]:<13}{step["id"]}: {step["title"]}', *reasons]
-
-
-def _approach_line(what: str, found: dict[str, float | None], scale: float, unit: str) -> str:
-    sides = [
-        f'{side} by {value * scale:.1f}{unit}' if value is not None else f'never {side}'
-        for side, value in found.items()
-    ]
-    return f'closest to the limit: {what}: {", ".join(sides)}'

@@ -1,0 +1,90 @@
+"""The failure map of the robot that a plan is for: tip-over and torque over both arm joints."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance.plan.plan import Plan
+from ugv_acceptance.plan.search import STEP_DEG, Arm, look
+from ugv_acceptance.report.regions import degree_axes, draw_regions, figure, legend, svg_of
+from ugv_acceptance.studies.maps import Levels
+
+# Steps (deg) of the map; a joint's range in it.
+MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
+
+
+def safe_maps(
+    arm: Arm, plan: Plan, visited: Mapping[str, Sequence[float]] | None = None
+) -> list[dict[str, str]]:
+    """Return the maps of tilt left and torque used over both arm joints, a page's row a load.
+
+    The numbers on them are the plan's steps on level ground with that load; H is home. `visited`
+    are the cells of a run's coverage: first joint (deg) -> second joint (deg).
+    """
+    cells = [(float(a), b) for a, row in (visited or {}).items() for b in row]
+    limits, full = arm.settings.limits, arm.robot.payload.mass
+    axis = np.radians(np.arange(*MAP_RANGE, MAP_STEP))
+    q = np.broadcast_to(arm.folded, (len(axis), len(axis), len(arm.folded))).copy()
+    names = arm.robot.joint_names
+    q[..., names.index(arm.roles.axes[0])] = axis[:, None]
+    q[..., names.index(arm.roles.axes[1])] = axis
+    maps = []
+    for load in dict.fromkeys((0.0, full / 2.0, full)):
+        found = look(arm, q.reshape(-1, q.shape[-1]), ('level', 0.0), load)
+        tilt = np.degrees(found.tilt).reshape(len(axis), -1)
+        use = found.most.reshape(len(axis), -1)
+        bounds = Levels(math.degrees(limits.tip_warn), math.degrees(limits.tip_error))
+        torque = Levels(1.0 - limits.torque_warn, 1.0 - limits.torque_error)
+        marks = _marks(arm, plan, load)
+        fields = ((tilt, bounds), (1.0 - use, torque))
+        maps.append(_drawn(arm, axis, fields, load, (marks, cells)))
+    return maps
+
+
+def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
+    """Return shoulder and elbow (deg) of home and of the steps on level ground with a load."""
+    first, second = arm.roles.axes
+    held = [
+        s
+        for s in plan.steps
+        if s.action == 'hold' and not s.ground.tilt_deg and s.payload_kg == round(load, 3)
+    ]
+    found = [(plan.home_deg[first], plan.home_deg[second], 'H')]
+    for step in held:
+        at = {**plan.home_deg, **step.posture_deg}
+        found.append((at[first], at[second], step.id.partition('-')[0]))
+    return found
+
+
+def _drawn(
+    arm: Arm,
+    axis: Any,  # noqa: ANN401 - arrays
+    fields: Any,  # noqa: ANN401 - arrays
+    load: float,
+    on_it: tuple[Sequence[tuple[float, float, str]], Sequence[tuple[float, float]]],
+) -> dict[str, str]:
+    marks, cells = on_it
+    made = figure(7.4, 3.1)
+    shoulder, elbow = (name.removesuffix('_joint') for name in arm.roles.axes)
+    for k, (title, (margin, levels)) in enumerate(
+        zip(('tip-over', 'motor torque'), fields, strict=True), 1
+    ):
+        axes = made.add_subplot(1, 2, k)
+        degrees = np.degrees(axis)
+        draw_regions(axes, degrees, degrees, margin, levels)
+        degree_axes(axes, shoulder, elbow)
+        axes.set_title(title)
+        if cells:
+            x, y = (np.array(cells) + STEP_DEG / 2.0).T
+            axes.plot(x, y, 's', markersize=1.6, color='#1f4e8c')
+        for x, y, word in marks:
+            box = {'facecolor': 'white', 'edgecolor': 'black', 'pad': 1.0, 'linewidth': 0.5}
+            axes.text(x, y, word, fontsize=6, ha='center', va='center', bbox=box)
+    legend(made, loc='outside lower center', ncols=3)
+    caption = f'{load:g} kg in the gripper' if load else 'gripper empty: safe everywhere'
+    worst = min(float(margin.min()) - levels.caution for margin, levels in fields)
+    if not load and worst < 0.0:
+        caption = 'gripper empty'
+    return {'svg': svg_of(made, f'map{load:g}'.replace('.', '_')), 'caption': caption}
