@@ -50,7 +50,9 @@ def payload_estimate(
     payload would explain it. rad, rad/s, N m (N), m/s2.
     """
     measured, rates = np.array(effort, dtype=np.float64), np.nan_to_num(np.array(qd))
-    known = np.isfinite(measured) & np.isfinite(np.array(settings.limits.torque))
+    # Many drivers that measure no effort send zeros.
+    known = np.isfinite(measured) & (measured != 0.0)
+    known &= np.isfinite(np.array(settings.limits.torque))
     if not known.any() or (np.abs(rates) > REST).any():
         return None
     loads = [Payload(mass, payload.cog) for mass in (payload.mass, payload.mass + 1.0)]
