@@ -291,3 +291,22 @@ def test_other_limits_count_from_the_next_message_on() -> None:
     evaluator.adopt(replace(evaluator.settings, robot=robot))
     assert evaluator.payload.mass == 3.0
     assert evaluator.watch.torque[0][1].rule.on == 99.0
+
+
+def test_the_period_is_the_middle_of_thirty_two_intervals() -> None:
+    """Squares in ms, in any order: (16^2 + 17^2) / 2 = 272.5 ms; alone, in columns, in pieces."""
+    intervals = np.random.default_rng(2).permutation(np.arange(1, 33) ** 2) * MS
+    times = T0 + np.concatenate(([0], np.cumsum(intervals)))
+    one = Freshness(Delays())
+    for now in times:
+        one.message(int(now))
+    assert (one.period, one.limit) == (272.5 * MS, round(817.5 * MS))
+    for cut in (0, 1, 7, 32, 33):
+        many = Freshness(Delays())
+        limits: list[int] = []
+        for part in (times[:cut], times[cut:]):
+            if len(part):
+                limits += many.messages(part)[1].tolist()
+        assert (many.period, many.limit) == (one.period, one.limit)
+        assert limits == [*[500 * MS] * 32, one.limit]
+        assert many.last == times[-1]
