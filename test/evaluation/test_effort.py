@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from evaluation.streams import MS, T0, Joints, Message, S, batch_of, run_of, settings
 
-from ugv_acceptance.evaluation.effort import EffortComparison, Plateau, _split
+from ugv_acceptance.evaluation.effort import (
+    EffortComparison,
+    Plateau,
+    _split,
+    opposed_joints,
+)
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import JointInput, Limits
 
@@ -146,3 +151,22 @@ def test_a_plateau_is_split_at_whole_seconds_of_its_run() -> None:
     assert list(_split(time[:0], effort[:0])) == []
     assert list(_split(time[:29], effort[:29])) == [slice(0, 29)]
     assert list(_split(time[:20], effort[:20])) == []
+
+
+@pytest.mark.parametrize(
+    ('rate', 'effort', 'named'),
+    [
+        (0.0, -LEVEL_TORQUE, True),
+        (math.nan, -0.6 * LEVEL_TORQUE, True),
+        (0.0, LEVEL_TORQUE, False),
+        (0.0, -0.3 * LEVEL_TORQUE, False),
+        (0.0, -1.7 * LEVEL_TORQUE, False),
+        (0.0, math.nan, False),
+        (0.5, -LEVEL_TORQUE, False),
+    ],
+)
+def test_an_effort_of_the_other_sign_is_named(rate: float, effort: float, named: bool) -> None:  # noqa: FBT001
+    """At rest, about as large as what the load needs, and against it; the slide tells nothing."""
+    torque = (LEVEL_TORQUE, 1.0)
+    found = opposed_joints(TOLD, torque, (rate, 0.0), (effort, -1.0))
+    assert found == (['lift'] if named else [])

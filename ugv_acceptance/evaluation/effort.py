@@ -1,6 +1,6 @@
 """Measured effort beside static torque at rest: where they differ, what payload that would be."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -28,6 +28,9 @@ STEP_LEAST = 1.0
 SLOPE_LEAST = 1.0
 # An effort this close to a limit (as a share of it) is clipped there.
 CLIPPED = 0.999
+# The share of a joint's limit that its load must need before the sign of its effort tells anything,
+# and how far from the load, as a share of it, the opposite effort may be.
+TELLING, ALIKE = 0.1, 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,25 @@ class _Held:
     def rows(self, rows: slice) -> '_Held':
         """Some of the samples."""
         return _Held(self.torque[rows], self.q[rows], self.gravity[rows])
+
+
+def opposed_joints(
+    settings: Settings, torque: Sequence[float], rates: Sequence[float], effort: Sequence[float]
+) -> list[str]:
+    """Return the joints at rest whose effort is about minus what their load needs.
+
+    N m (N), rad/s (m/s); a rate or effort that is not known is NaN.
+    """
+    joints = zip(
+        settings.robot.joint_names, settings.limits.torque, torque, rates, effort, strict=True
+    )
+    return [
+        name
+        for name, limit, tau, rate, measured in joints
+        if TELLING * limit <= abs(tau)
+        and not abs(rate) > REST
+        and abs(measured + tau) <= ALIKE * abs(tau)
+    ]
 
 
 @dataclass(slots=True)

@@ -40,6 +40,11 @@ WORDS = {
         '{peak:.0f} messages of {subject} were lost before the monitor could take them',
         'raise the parameter depth, or free the processor',
     ),
+    'EFFORT_SIGN': (
+        WARN,
+        'the effort of {subject} is the opposite of what its load needs',
+        'if nothing holds the arm up, set effort_sign of this joint in the configuration',
+    ),
     'NO_CLOCK': (
         WARN,
         'use_sim_time is true but nothing came on /clock',
@@ -64,6 +69,7 @@ SUSPECTS = {
     'INPUT_MALFORMED': FailureSource.COMMUNICATIONS,
     'INPUT_QOS': FailureSource.DESIGN,
     'MESSAGES_LOST': FailureSource.COMMUNICATIONS,
+    'EFFORT_SIGN': FailureSource.DESIGN,
     'NO_CLOCK': FailureSource.CONTROL_SYSTEM,
     'PAYLOAD_DIFFERS': FailureSource.INTERACTION,
     'MONITOR_FAULT': FailureSource.CONTROL_SYSTEM,

@@ -1,5 +1,6 @@
 """The monitor's subscriptions: raw bytes into the session, and who publishes on the topics."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from geometry_msgs.msg import InertiaStamped
@@ -13,6 +14,7 @@ from rclpy.timer import Timer
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.config import Topic, Topics
+from ugv_acceptance.evaluation.effort import opposed_joints
 from ugv_acceptance.nodes.session import Session
 
 _RELIABILITY = {
@@ -27,6 +29,8 @@ _DURABILITY = {
 _UNKNOWN = 'NODE_NAME_UNKNOWN'
 # Seconds between looks for publishers after one has come or gone, looks, and ns to wait for a name.
 _SOON, _LOOKS, _NAMED = 0.1, 10, 1_000_000_000
+# Looks in a row, one a second, at which an effort must be opposed: an arm may be held for a moment.
+_OPPOSED = 5
 
 
 def qos_of(topic: Topic, depth: int) -> QoSProfile:
@@ -47,6 +51,7 @@ class Inputs:
         self._allowed: frozenset[str] = frozenset()
         self._looks = 0
         self._unnamed: dict[str, int] = {}
+        self._opposed = Counter[str]()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._soon: Timer = node.create_timer(_SOON, self._look, clock=steady)
         self.publishers: dict[str, list[str]] = {}
@@ -113,6 +118,7 @@ class Inputs:
                 faults.clear(now, 'MONITOR_FAULT', name)
             self._malformed[name] = count.malformed
         self._look_at_the_clock(now)
+        self._look_at_efforts(now)
 
     def _see_publishers(self, now: int) -> None:
         for name, subscription in self.subscriptions.items():
@@ -145,6 +151,17 @@ class Inputs:
             self._session.faults.set(now, 'NO_CLOCK', 'clock', 1.0)
         else:
             self._session.faults.clear(now, 'NO_CLOCK', 'clock')
+
+    def _look_at_efforts(self, now: int) -> None:
+        """Name the joints whose effort was opposed at every look of the last seconds."""
+        margins, evaluator = self._session.evaluator.margins, self._session.evaluator
+        if margins is None:
+            return
+        found = opposed_joints(evaluator.settings, margins.torque, *evaluator.measured)
+        for name in evaluator.settings.robot.joint_names:
+            self._opposed[name] = self._opposed[name] + 1 if name in found else 0
+            told = [name] if self._opposed[name] >= _OPPOSED else []
+            self._tell(now, 'EFFORT_SIGN', name, told, 1.0)
 
     def destroy(self) -> None:
         """Stop listening."""
