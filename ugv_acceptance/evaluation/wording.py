@@ -110,7 +110,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
         slope=max(math.degrees(-alert.peak), 0.0),
-        seconds=-peak,
+        seconds=-rule.on,
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
     )
