@@ -33,12 +33,14 @@ Sink = Callable[[MarginRows], None]
 class Terms:
     """What a run is judged by: criteria (None: the limits of the configuration), what is uncertain.
 
-    With `detail` the sinks get moments, energies and ZMP too.
+    With `detail` the sinks get moments, energies and ZMP too. `readers` are the threads that read,
+    by default two where there is more than one core.
     """
 
     criteria: CriteriaSet | None = None
     sources: tuple[Source, ...] = ()
     detail: bool = False
+    readers: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def judge(
     told = AlertAdvice(settings, evaluator.watch.log, limits.payloads.at)
     takers = [summary.add, check.add, told.add, *(e.add for e in examinations), *sinks]
     evaluator.start(bag.start_ns)
-    reading = bag.batches(topics)
+    reading = bag.batches(topics, workers=terms.readers)
     for batch in _stretches(reading):
         for examination in examinations:
             examination.payloads.take(batch.payload)

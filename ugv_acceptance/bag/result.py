@@ -18,7 +18,12 @@ from ugv_acceptance.model.stability import SIDES, STATES
 
 def write_json(path: Path, result: object) -> None:
     """Write a result; a reader never meets half of it."""
-    write_text(path, json.dumps(result, indent=2, allow_nan=False, default=str) + '\n')
+    write_text(path, json_text(result))
+
+
+def json_text(result: object) -> str:
+    """Return a result as JSON for people and programs."""
+    return json.dumps(result, indent=2, allow_nan=False, default=str) + '\n'
 
 
 def write_text(path: Path, text: str) -> None:

@@ -7,10 +7,11 @@ run down that killed it.
 import multiprocessing
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError
@@ -18,10 +19,13 @@ from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Brief, Done, judge_source
 
 DIED = 'the process that judged it died (out of memory, or a crash in a library)'
-# Runs given out ahead, a worker: few are to be looked at again where one dies.
+# Batches given out ahead, a worker: few runs are to be looked at again where one dies.
 _AHEAD = 2
+# A batch is so many runs or bytes at most: short runs cost less than the way to a worker and back.
+_BATCH, _BATCH_BYTES = 16, 4 << 20
 
 Work = Callable[[Source], Done]
+Runs = list[Source]
 
 
 def cores() -> int:
@@ -43,38 +47,61 @@ def judge_all(
         )
 
 
-def in_processes(work: Work, sources: Iterable[Source], workers: int) -> Iterator[Done]:
+def in_processes(work: Work, sources: Sequence[Source], workers: int) -> Iterator[Done]:
     """Yield the outcome of `work` for every source, done by processes."""
-    waiting = deque(sources)
-    suspects: list[Source] = []
+    waiting = deque(batches(sources, workers))
+    suspects: Runs = []
     while waiting:
         yield from _round(work, waiting, workers, suspects)
     for source in suspects:
-        alone: list[Source] = []
-        yield from _round(work, deque([source]), 1, alone)
+        alone: Runs = []
+        yield from _round(work, deque([[source]]), 1, alone)
         yield from (Done(one, error=DIED) for one in alone)
 
 
-def _round(
-    work: Work, waiting: deque[Source], workers: int, suspects: list[Source]
-) -> Iterator[Done]:
+def batches(sources: Sequence[Source], workers: int) -> Iterator[Runs]:
+    """Yield the sources in batches, small enough for all workers to have some until the end."""
+    most = max(1, min(_BATCH, len(sources) // (8 * workers)))
+    batch: Runs = []
+    size = 0
+    for source in sources:
+        batch.append(source)
+        size += _BATCH_BYTES if source.remote else _bytes(source)
+        if len(batch) >= most or size >= _BATCH_BYTES:
+            yield batch
+            batch, size = [], 0
+    if batch:
+        yield batch
+
+
+def _bytes(source: Source) -> int:
+    return sum(Path(file).stat().st_size for file in source.files if Path(file).is_file())
+
+
+def _each(work: Work, batch: Runs) -> list[Done]:
+    return [work(source) for source in batch]
+
+
+def _round(work: Work, waiting: deque[Runs], workers: int, suspects: Runs) -> Iterator[Done]:
     """Work until nothing waits or a process dies; then those given out are the suspects."""
-    # Spawned, not forked: a fork of a process with threads may hang.
-    context = multiprocessing.get_context('spawn')
-    given: dict[Future[Done], Source] = {}
+    # Forked by a server that has all imported: a fork of this process, which has threads, may hang,
+    # and spawned processes would each import everything anew.
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload([judge_source.__module__])
+    given: dict[Future[list[Done]], Runs] = {}
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
         try:
             while waiting or given:
                 while waiting and len(given) < _AHEAD * workers:
-                    given[pool.submit(work, waiting[0])] = waiting[0]
+                    given[pool.submit(_each, work, waiting[0])] = waiting[0]
                     waiting.popleft()
                 ready, _ = wait(given, return_when=FIRST_COMPLETED)
                 for future in ready:
-                    done = future.result()
+                    found = future.result()
                     del given[future]
-                    yield done
+                    yield from found
         except BrokenProcessPool:
-            suspects += given.values()
+            suspects += [source for batch in given.values() for source in batch]
 
 
 def on_cluster(sources: Sequence[Source], brief: Brief, address: str) -> Iterator[Done]:

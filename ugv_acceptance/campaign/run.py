@@ -46,7 +46,7 @@ def carry_out(
     rows, effort = [], Effort()
     for done in judge_all(sources, brief, place.workers, place.scheduler):
         rows.append(_row(done, brief, place.folder))
-        if done.result is not None:
+        if done.row is not None:
             effort.judged += 1
             effort.size += done.size
         progress(done)
@@ -57,9 +57,9 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
     name = done.source.name
     if done.error:
         return broken_row(name, done.error)
-    if done.result is not None:
-        store.keep(folder, done.key, done.result)
-        return row_of(name, done.key, done.result)
+    if done.row is not None:
+        store.keep(folder, done.key, done.text)
+        return done.row
     try:
         return row_of(name, done.key, store.read(folder, done.key))
     except AcceptanceError:

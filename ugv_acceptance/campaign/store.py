@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.result import unwritable, write_json
+from ugv_acceptance.bag.result import unwritable, write_text
 
 Json = dict[str, Any]
 
@@ -27,9 +27,9 @@ def known_keys(folder: Path) -> frozenset[str]:
     return frozenset(p.stem for p in (folder / RUNS).glob('*.json') if len(p.stem) == _KEY)
 
 
-def keep(folder: Path, key: str, result: Json) -> None:
-    """Write a run's result, whole or not at all."""
-    write_json(folder / RUNS / f'{key}.json', result)
+def keep(folder: Path, key: str, text: str) -> None:
+    """Write a run's result, its JSON, whole or not at all."""
+    write_text(folder / RUNS / f'{key}.json', text)
 
 
 def read(folder: Path, key: str) -> Json:

@@ -1,7 +1,7 @@
 """One run of a campaign judged, wherever the work is done: in this process, another, a cluster."""
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,8 @@ from typing import Any
 from ugv_acceptance import AcceptanceError, __version__
 from ugv_acceptance.bag.judge import RESULT_VERSION, Terms, judge
 from ugv_acceptance.bag.reader import Bag, choose_topics, open_bag
+from ugv_acceptance.bag.result import json_text
+from ugv_acceptance.campaign.rows import Row, row_of
 from ugv_acceptance.campaign.sources import Source, local_paths
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.uncertain import sources_from
@@ -30,14 +32,25 @@ class Brief:
 class Done:
     """A run that was looked at: its source, size (bytes), and one of three outcomes.
 
-    `result` is a new result, `key` alone says that it is known, `error` that it could not be read.
+    `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
+    that it could not be read.
     """
 
     source: Source
     key: str = ''
     size: int = 0
-    result: Json | None = None
+    row: Row | None = None
+    text: str = ''
     error: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A result, its key and the size (bytes) of its recording; None: known."""
+
+    key: str
+    size: int
+    result: Json | None
 
 
 def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
@@ -50,30 +63,33 @@ def judge_source(source: Source, brief: Brief) -> Done:
     """Return what came of one run; whatever is wrong with it is said in `error`, never raised."""
     try:
         with local_paths(source) as paths:
-            return _renamed(_tried(source, paths, brief), paths)
+            try:
+                found = _judged(open_bag(paths), brief)
+            except AcceptanceError as error:
+                return Done(source, error=_renamed(str(error), source, paths))
+            except Exception as error:  # noqa: BLE001 - one broken bag never ends a campaign
+                text = f'{type(error).__name__}: {error}'
+                return Done(source, error=_renamed(text, source, paths))
+            if found.result is None:
+                return Done(source, found.key, found.size)
+            result = _renamed(found.result, source, paths)
     except AcceptanceError as error:
         return Done(source, error=str(error))
+    row = row_of(source.name, found.key, result)
+    return Done(source, found.key, found.size, row, json_text(result))
 
 
-def _tried(source: Source, paths: Path | list[Path], brief: Brief) -> Done:
-    try:
-        return _judged(source, open_bag(paths), brief)
-    except AcceptanceError as error:
-        return Done(source, error=str(error))
-    except Exception as error:  # noqa: BLE001 - one broken bag never ends a campaign
-        return Done(source, error=f'{type(error).__name__}: {error}')
-
-
-def _judged(source: Source, bag: Bag, brief: Brief) -> Done:
+def _judged(bag: Bag, brief: Brief) -> _Found:
     config, criteria = brief.config, brief.criteria
     said = criteria.sha256 if criteria else None
     key = key_of(bag.sha256(), config.sha256, said or 'limits')
     size = sum(path.stat().st_size for path in bag.paths)
     if key in brief.known:
-        return Done(source, key, size)
+        return _Found(key, size, None)
     wanted = config.topics
     topics = choose_topics(bag, wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
-    terms = Terms(criteria, sources_from(config))
+    # One thread: the other cores have runs of their own.
+    terms = Terms(criteria, sources_from(config), readers=1)
     result = judge(bag, topics, config.settings, terms=terms).result
     result['robot'] = {
         'name': config.name,
@@ -88,17 +104,15 @@ def _judged(source: Source, bag: Bag, brief: Brief) -> Done:
     began = datetime.fromtimestamp(bag.start_ns // 10**9, timezone.utc)
     result['recorded'] = began.strftime('%Y-%m-%d %H:%M:%S UTC') if bag.start_ns else None
     result['start_ns'] = bag.start_ns
-    return Done(source, key, size, result)
+    return _Found(key, size, result)
 
 
-def _renamed(done: Done, paths: Path | list[Path]) -> Done:
-    """Return an outcome in which a fetched copy goes by the name of what it was fetched from."""
-    if not done.source.remote:
-        return done
+def _renamed(said: Any, source: Source, paths: Path | list[Path]) -> Any:  # noqa: ANN401 - JSON
+    """Return what is said with a fetched copy named by what it was fetched from."""
+    if not source.remote:
+        return said
     copied = str(paths if isinstance(paths, Path) else paths[0].parent)
-    origin = done.source.files[0].rpartition('/')[0]
-    result, error = (_replaced(said, copied, origin) for said in (done.result, done.error))
-    return replace(done, result=result, error=error)
+    return _replaced(said, copied, source.files[0].rpartition('/')[0])
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:  # noqa: ANN401 - JSON

@@ -8,6 +8,7 @@ Newton-Euler algorithm (Luh, Walker and Paul 1980); the static torque is the sam
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.expressions import (
@@ -82,6 +83,7 @@ def rotation_about(axis: Vec, angle: Scalar) -> Mat:
     )
 
 
+@lru_cache(maxsize=256)  # a run's uncertainty asks for a hundred robots, each off by a little
 def tree_of(robot: Robot) -> Tree:
     """Return the moving bodies of `robot`. Raises BadConfig where the joints are not a tree."""
     frames, moving = _place_links(robot)
