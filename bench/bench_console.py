@@ -1,15 +1,18 @@
 """The console beside a live robot: `python bench/bench_console.py`.
 
 A driver (100 Hz joints, 200 Hz IMU), a monitor and a console are processes; a real Chromium paints.
-Prints the time from a message's stamp to the screen, the processor's share, and what ten clients
-change for the monitor.
+Prints the time from a message's stamp to the screen, frames that were dropped while maps are made
+anew, the processor's share, and what ten, then 220 more clients change for the monitor.
 """
 
+import json
 import os
+import signal
 import statistics
 import sys
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
@@ -20,21 +23,26 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'test'))
 
 from console.browser import Page, chromium  # noqa: E402 - the tests' helpers
-from console.servers import Live, Process, live_console  # noqa: E402 - the same
+from console.crowd import deaf, silent  # noqa: E402 - the same
+from console.servers import Live, Process, live_console, running  # noqa: E402 - the same
 
 SECONDS = 10.0
-CLIENTS = 10
+CLIENTS, DEAF, SILENT = 10, 20, 200
 TICK = os.sysconf('SC_CLK_TCK')
-# Records, at the refresh after each painted frame, its age since the newest joint state in it.
+# At each refresh of the screen: its interval; what was painted in the one before: number and age
+# since the stamp of its newest message; how many maps had come by then.
 RECORDER = """
-window.ages = []; window.changes = 0; let seen = 0, then = performance.now(); window.gaps = [];
+window.ages = []; window.numbers = []; window.refreshes = []; window.maps = 0;
+let seen = console_page.painted, then = performance.now();
+const count = e => { maps += e.data.startsWith('{"kind":"map"'); };
+console_page.socket.addEventListener('message', count);
 (function look() {
   const page = console_page, now = performance.now();
+  refreshes.push(now - then); then = now;
   if (page.painted !== seen) {
     seen = page.painted;
-    const f = page.frame, age = f.inputs[0].age_s;
-    ages.push(Date.now() - 1000 * (f.time_s - age));
-    gaps.push(now - then); then = now;
+    numbers.push(seen);
+    ages.push(Date.now() - 1000 * page.frame.stamp_s);
   }
   requestAnimationFrame(look);
 })();
@@ -53,6 +61,7 @@ def main() -> None:
         painted(page)
         share('console, one page', [robot.console])
         compare(robot)
+        crowd(robot)
 
 
 def robot_moves(robot: Live) -> None:
@@ -72,17 +81,28 @@ def robot_moves(robot: Live) -> None:
 
 
 def painted(page: Page) -> None:
-    """Print how old what is seen is, and whether a frame was dropped while maps are made anew."""
+    """Print how old what is seen is, and what was not seen while maps are made anew."""
     page.run(RECORDER)
     time.sleep(SECONDS)
-    ages = sorted(page.run('ages'))
-    gaps = sorted(page.run('gaps.slice(1)'))
-    p50, p99 = (ages[int(len(ages) * p)] for p in (0.5, 0.99))
-    print(f"stamp of a frame's newest message to screen  {p50:6.1f} ms, {p99:.1f} p99 (bar 150)")
-    rate, worst = len(ages) / SECONDS, gaps[int(len(gaps) * 0.99)]
-    print(
-        f'frames painted                               {rate:6.1f} a second, gap p99 {worst:.0f} ms'
+    ages, numbers, refreshes, maps = (
+        page.run(name) for name in ('ages', 'numbers', 'refreshes', 'maps')
     )
+    line = "stamp of a frame's newest message to screen"
+    print(f'{line:44} {quantile(ages, 0.5):6.1f} ms, {quantile(ages, 0.99):.1f} p99 (bar 150)')
+    made = numbers[-1] - numbers[0] + 1
+    print(
+        f'{"maps a second":44} {maps / SECONDS:6.1f}, meanwhile {made - len(numbers)} of {made}'
+        ' frames dropped'
+    )
+    print(
+        f'{"refreshes of the screen":44} {quantile(refreshes, 0.5):6.1f} ms apart,'
+        f' {quantile(refreshes, 0.99):.1f} p99, {max(refreshes):.0f} at most'
+    )
+
+
+def quantile(values: list[float], share: float) -> float:
+    """Return the value below which this share of all lies."""
+    return sorted(values)[int(len(values) * share)]
 
 
 def spent(process: Process) -> float:
@@ -126,6 +146,53 @@ def compare(robot: Live) -> None:
     print(
         f'messages a client                            {mean:6.1f} a second, least {min(rates):.1f}'
     )
+
+
+def crowd(robot: Live) -> None:
+    """Print what silent and deaf clients change for a monitor, and for one that reads."""
+    delays('monitor, message to margins', robot)
+    with ExitStack() as stack:
+        for make in (deaf,) * DEAF + (silent,) * SILENT:
+            stack.enter_context(make(robot.url))
+        before = resident(robot.console)
+        delays(f'beside {SILENT} silent and {DEAF} deaf clients', robot)
+        grown = (resident(robot.console) - before) / 1e6
+        print(f'{"memory that they cost the console":44} {grown:6.1f} MB')
+        with connect(
+            robot.url.replace('http', 'ws') + 'live', origin=Origin(robot.url.rstrip('/'))
+        ) as socket:
+            count, end = 0, time.monotonic() + SECONDS / 2
+            while time.monotonic() < end:
+                count += '"frame"' in str(socket.recv())[:20]
+        print(
+            f'{"frames of a client that reads, beside them":44} {2 * count / SECONDS:6.1f} a second'
+        )
+
+
+def delays(what: str, robot: Live) -> None:
+    """Print how long a second monitor takes from a message's stamp to its margins."""
+    with listening(robot) as heard:
+        time.sleep(SECONDS)
+    told = [latency / 1e6 for latency in heard[200:]]
+    p50, p99 = quantile(told, 0.5), quantile(told, 0.99)
+    print(f'{what:44} {p50:6.2f} ms, {p99:.2f} p99, of {len(told)} messages (bar 5)')
+
+
+@contextmanager
+def listening(robot: Live) -> Iterator[list[float]]:
+    """Run a monitor of its own beside; the list holds its latencies (ns) afterwards."""
+    heard: list[float] = []
+    program = str(ROOT / 'bench' / 'live_listener.py')
+    with running(sys.executable, program, 'monitor', domain=robot.domain) as process:
+        yield heard
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=20)
+        heard += json.loads(said.splitlines()[-1])['latencies']
+
+
+def resident(process: Process) -> int:
+    """Return the memory (bytes) of a process."""
+    return int(Path(f'/proc/{process.pid}/statm').read_text().split()[1]) * 4096
 
 
 if __name__ == '__main__':

@@ -73,6 +73,7 @@ class Live:
     """A driver, a monitor and a console on a ROS domain of their own."""
 
     url: str
+    domain: int
     driver: Process
     monitor: Process
     console: Process
@@ -103,4 +104,4 @@ def live_console() -> Iterator[Live]:
             running(*COMMAND, 'monitor', '--plain', '--every', '3600', domain=domain)
         )
         url, process = stack.enter_context(console(domain=domain))
-        yield Live(url, driver, monitor, process)
+        yield Live(url, domain, driver, monitor, process)

@@ -1,19 +1,23 @@
 """The server among clients: every question is answered, and who is slow harms nobody."""
 
 import json
-import socket
+import os
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import takewhile
+from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
+from console.crowd import deaf, is_closed, messages, silent
+from console.servers import console
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 from ugv_acceptance.console.hub import MOST_CLIENTS
+from ugv_acceptance.console.server import MOST_SILENT
 
 
 @contextmanager
@@ -82,37 +86,46 @@ def test_what_is_no_command_ends_that_client_only(bag_url: str, data: bytes | st
         next_of(good, 'frame')
 
 
-def test_a_slow_client_loses_old_frames_and_delays_nobody(bag_url: str) -> None:
-    """Beside clients that read nothing another gets 20 frames a second; theirs are dropped."""
-    with client(bag_url) as good:
-        where = urlsplit(bag_url)
-        slow = []
-        for _ in range(5):
-            one = socket.socket()
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            one.connect((str(where.hostname), int(where.port or 0)))
-            lines = (
-                'GET /live HTTP/1.1',
-                f'Host: {where.netloc}',
-                f'Origin: {bag_url.rstrip("/")}',
-                'Upgrade: websocket',
-                'Connection: Upgrade',
-                'Sec-WebSocket-Version: 13',
-                'Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==',
-            )
-            one.sendall('\r\n'.join([*lines, '', '']).encode())
-            slow.append(one)
+def test_a_crowd_delays_nobody_and_costs_no_memory(repository: Path) -> None:
+    """Beside 20 clients that read nothing and 100 silent ones another gets every frame."""
+    with console(str(repository / 'bags' / 'packbot_pass')) as (url, process), ExitStack() as stack:
+        good = stack.enter_context(client(url))
         first = next_of(good, 'frame')['number']
-        end = time.monotonic() + 4.0
-        got = last = first
-        count = 0
-        while time.monotonic() < end:
-            last = next_of(good, 'frame')['number']
-            count += 1
-        for one in slow:
-            one.close()
-    assert count >= 0.9 * (last - got)
-    assert count > 40
+        before = resident(process.pid)
+        for make in (deaf,) * 20 + (silent,) * 100:
+            stack.enter_context(make(url))
+        numbers = [next_of(good, 'frame')['number'] for _ in range(80)]
+        assert numbers[-1] - first <= len(numbers) + 8
+        assert resident(process.pid) - before < 20e6
+
+
+def resident(pid: int) -> int:
+    """Return the memory (bytes) of a process."""
+    return int(Path(f'/proc/{pid}/statm').read_text().split()[1]) * os.sysconf('SC_PAGE_SIZE')
+
+
+def test_a_slow_client_loses_old_frames_and_gets_the_newest(bag_url: str) -> None:
+    """Who reads after a while gets few old frames, then those of now: none were kept for it."""
+    with client(bag_url) as good, deaf(bag_url) as slow:
+        while next_of(good, 'frame')['number'] < 80:
+            pass
+        now = next_of(good, 'frame')['number']
+        read = (message['number'] for message in messages(slow) if message['kind'] == 'frame')
+        old = list(takewhile(lambda number: number < now, read))
+    assert old == sorted(set(old))
+    assert len(old) < 40
+    assert now - old[0] > 60
+
+
+def test_silent_connections_make_room(bag_url: str) -> None:
+    """Of many connections that ask for nothing some are closed at once; a client is served."""
+    with ExitStack() as stack:
+        crowd = [stack.enter_context(silent(bag_url)) for _ in range(MOST_SILENT + 40)]
+        while (closed := sum(map(is_closed, crowd))) < 40:
+            time.sleep(0.05)
+        assert closed < len(crowd)
+        with client(bag_url) as opened:
+            next_of(opened, 'frame')
 
 
 def test_more_clients_than_can_be_served_are_turned_away(bag_url: str) -> None:

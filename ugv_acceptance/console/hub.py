@@ -76,7 +76,7 @@ class Hub:
                 self._let_go(clock() - PATIENCE)
                 self._offer_frame()
                 if clock() >= self._map_due:
-                    self._map_due = clock() + MAP
+                    self._map_due = max(self._map_due + MAP, clock())
                     await self._offer_maps()
             # Late frames are left out, not made up for.
             due = max(due + FRAME, clock())

@@ -3,8 +3,10 @@
 import asyncio
 import contextlib
 import socket
+import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from starlette.applications import Starlette
@@ -20,8 +22,10 @@ from ugv_acceptance.console.security import App, Guard, check_address, guarded
 STATIC = Path(__file__).parent / 'static'
 # Bytes of a command; more is no command.
 LONGEST_COMMAND = 4096
-# A socket's send buffer (bytes): old frames are dropped here, not kept in the kernel.
-_BUFFER = 65536
+# What the kernel and we keep for a client (bytes): old frames are dropped, not kept for later.
+_BUFFER, _WRITTEN = 16384, 4096
+# Connections that have asked for nothing yet: more are not kept, nor one longer than this (s).
+MOST_SILENT, _SILENCE = 64, 15.0
 
 
 def application(hub: Hub, guard: Guard) -> App:
@@ -108,4 +112,27 @@ def serve(
         )
         name = f'[{host}]' if ':' in host else host
         ready(f'http://{name}:{listener.getsockname()[1]}/')
-        uvicorn.Server(config).run(sockets=[listener])
+        _Server(config).run(sockets=[listener])
+
+
+class _Server(uvicorn.Server):
+    """uvicorn's server, which lets go of who asks for nothing, and keeps little for who is slow."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._since: dict[Any, float] = {}
+
+    async def on_tick(self, counter: int) -> bool:
+        """Look at all connections, ten times a second."""
+        now, there = time.monotonic(), list(self.server_state.connections)
+        # A WebSocket has no cycle of request and answer.
+        silent = [c for c in there if getattr(c, 'cycle', c) is None]
+        self._since = {c: self._since.get(c, now) for c in silent}
+        oldest = sorted(silent, key=self._since.__getitem__)
+        late = [c for c in silent if now - self._since[c] > _SILENCE]
+        for connection in {*late, *oldest[: max(0, len(silent) - MOST_SILENT)]}:
+            connection.transport.close()
+        for connection in there:
+            if not hasattr(connection, 'cycle'):
+                connection.transport.set_write_buffer_limits(_WRITTEN)
+        return await super().on_tick(counter)
