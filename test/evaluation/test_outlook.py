@@ -100,12 +100,13 @@ def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) 
 
 
 def test_the_motors_tell_nothing_of_a_load_while_they_move() -> None:
-    """Efforts in motion are not static; unknown ones and zeros say nothing; friction is no load."""
+    """In motion, unknown, zero or turned round they say nothing; friction is no load."""
     q, ten, nan = (0.0, 0.4, -0.2, 0.0), (0.0, 90.0, 40.0, 0.0), (math.nan,) * 4
     moving = (0.0, 0.2, 0.0, 0.0)
     assert payload_estimate(PACKBOT, q, moving, ten, LEVEL, Payload(4.0)) is None
     assert payload_estimate(PACKBOT, q, STILL, nan, LEVEL, Payload(4.0)) is None
     assert payload_estimate(PACKBOT, q, STILL, (0.0,) * 4, LEVEL, Payload(4.0)) is None
     model = static_torque(PACKBOT.robot, q, LEVEL, Payload(4.0))
+    assert payload_estimate(PACKBOT, q, STILL, (-model).tolist(), LEVEL, Payload(4.0)) is None
     stuck = (model + np.array((0.0, 10.0, -10.0, 0.0))).tolist()
     assert payload_estimate(PACKBOT, q, STILL, stuck, LEVEL, Payload(4.0)) is None

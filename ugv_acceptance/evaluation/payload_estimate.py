@@ -65,4 +65,9 @@ def payload_estimate(
     # A difference that no load explains tells nothing of the load.
     if rest @ rest > max((1.0 - EXPLAINED) * (open_ @ open_), DIFFERS**2 * (felt @ felt)):
         return None
-    return PayloadEstimate(payload.mass + more, payload.mass)
+    # Nothing that hangs in a hand pulls it up: the arm leans on something, or a sign is wrong.
+    return (
+        None
+        if payload.mass + more < -DIFFERS
+        else PayloadEstimate(payload.mass + more, payload.mass)
+    )
