@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from evaluation.streams import LEVEL, REST, STILL, T0, S, settings
+from evaluation.streams import LEVEL, MS, REST, STILL, T0, Joints, S, batch_of, settings
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -66,6 +66,51 @@ def test_a_joint_that_leaps_ten_times_faster_than_it_can_is_lost(leap: float, to
         at = T0 + 2 * k * S
         merger.merge(at, ('hand_slide',), (leap * (k % 2),), (), ())
         assert math.isnan(merger.q[1]) == (told and k > 0)
+
+
+def slow_slide() -> Any:
+    """Return settings in which the joints make 0.1 m/s or rad/s and go anywhere."""
+    robot = settings().robot
+    joints = tuple(replace(j, lower=-99.0, upper=99.0, velocity=0.1) for j in robot.joints)
+    return replace(settings(), robot=replace(robot, joints=joints))
+
+
+@pytest.mark.parametrize(('apart', 'told'), [(0.49, False), (0.5, True)])
+def test_positions_are_compared_half_a_second_apart_or_more(apart: float, told: bool) -> None:  # noqa: FBT001
+    """Nearer together, a little jitter would look like a leap; the one before stays."""
+    watch = Watch(slow_slide())
+    merger = JointMerger(slow_slide(), watch.leaps)
+    for at, q in ((T0 + S - int(apart * 1e9) // 2, 0.0), (T0 + S + int(apart * 1e9) // 2, 0.9)):
+        merger.merge(at, ('hand_slide',), (q,), (), ())
+    assert math.isnan(merger.q[1]) == told
+    assert len(watch.log) == int(told)
+
+
+def test_columns_see_the_leaps_that_messages_show() -> None:
+    """Random walks of both joints, named together or alone, in two shapes: rows and alerts."""
+    rng = np.random.default_rng(12)
+    for _ in range(5):
+        steps = rng.choice((0.0, 0.3, 3.0), 60) * rng.choice((-1.0, 1.0), 60)
+        run = [
+            Joints(T0 + 130 * MS * k, names, (q,) * len(names))
+            for k, q in enumerate(np.cumsum(steps).tolist())
+            for names in [(('lift', 'hand_slide'), ('hand_slide',))[int(rng.integers(2))]]
+        ]
+        seen = Watch(slow_slide())
+        one = JointMerger(slow_slide(), seen.leaps)
+        expected = []
+        for m in run:
+            one.merge(m.time, m.names, m.position, (), ())
+            expected.append(list(one.q))
+        watch = Watch(slow_slide())
+        many = JointMerger(slow_slide(), watch.leaps)
+        rows = [many.merge_columns(batch_of(part).joints).q for part in (run[:23], run[23:])]
+        for found, log in ((np.concatenate(rows), watch.log), (np.array(expected), seen.log)):
+            assert [(a.start, a.end) for a in log] == [(a.start, a.end) for a in seen.log]
+            # A joint that is not named keeps what is known of it, alert or none.
+            both = np.array([len(m.names) == 2 for m in run])
+            np.testing.assert_array_equal(found[both], np.array(expected)[both])
+        assert len(seen.log) > 2
 
 
 def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
