@@ -68,7 +68,8 @@ def execute(asked: Asked) -> int:
     if len(waiting) < len(chosen):
         console.print(f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
     interrupted = bool(waiting) and _do(asked, config, folder, Steps(console, plan, waiting))
-    result = folder.finish(config, coverage(config, folder))
+    with console.status('what the run has covered'):
+        result = folder.finish(config, coverage(config, folder))
     folder.note('interrupted' if interrupted else 'finished', verdict=result['verdict'])
     print_result(result, folder, console)
     if interrupted:
