@@ -127,12 +127,14 @@ def campaign(recording: Path, folder: Path, times: int, seed: int = 0) -> Outcom
 
     took = _took(*words('whole'))
     expected = contents((folder / 'whole' / 'runs').glob('*.json'))
-    half = 0
+    half = orphans = 0
     for _ in range(times):
         process = run_of(*words('killed'))
         time.sleep(rng.uniform(0.2, 1.0) * took)
+        workers = children(process.pid)
         process.kill()
         process.wait()
+        orphans += not gone(workers)
         found = contents((folder / 'killed' / 'runs').glob('*.json'))
         half += any(expected.get(name) != content for name, content in found.items())
         page = folder / 'killed' / 'campaign.html'
@@ -140,9 +142,33 @@ def campaign(recording: Path, folder: Path, times: int, seed: int = 0) -> Outcom
     _took(*words('killed'))
     same = contents((folder / 'killed' / 'runs').glob('*.json')) == expected
     text = f'campaign of {len(expected)} runs: killed {times} times, {half} times half a result'
-    return Outcome(
-        f'{text}, at last the same results: {same}', same and not half and bool(expected)
-    )
+    text += f', {orphans} times workers that went on; at last the same results: {same}'
+    return Outcome(text, same and not half and not orphans and len(expected) == 2 * times + 4)
+
+
+def children(pid: int) -> list[int]:
+    """Return the children of a process; none where it has ended."""
+    try:
+        return [int(p) for p in Path(f'/proc/{pid}/task/{pid}/children').read_text().split()]
+    except OSError:
+        return []
+
+
+def gone(pids: Iterable[int], patience: float = 10.0) -> bool:
+    """Wait until processes have ended; return whether all have."""
+    end = time.monotonic() + patience
+    while living := [pid for pid in pids if _lives(pid)]:
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.05)
+    return not living
+
+
+def _lives(pid: int) -> bool:
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rsplit(')', 1)[1].split()[0] != 'Z'
+    except OSError:
+        return False
 
 
 def report(recording: Path, folder: Path, times: int, seed: int = 0) -> Outcome:
