@@ -1,10 +1,12 @@
 """The parts of `run`: a robot, a monitor, the runner between them, and the folder of the run."""
 
+import fcntl
 import math
 import os
 import random
 import signal
 import socket
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.markup import escape
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.cli.run_text import Steps, asking, print_result, say_stop
 
 if TYPE_CHECKING:
@@ -141,9 +143,7 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
     named = ['-p', f'config:={config.path}']
     with ExitStack() as stack:
         if asked.mode == 'sim':
-            # Nobody else's robot moves, nobody else's messages are recorded.
-            os.environ['ROS_DOMAIN_ID'] = str(_free_domain())
-            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+            stack.enter_context(_own_domain())
             simulated = [*args, *named, *_simulated(asked, config, folder)]
             stack.enter_context(child('simulator', simulated))
         stack.enter_context(child('monitor', [*args, *named]))
@@ -189,17 +189,27 @@ def _offline(
             signal.signal(number, handler)
 
 
-def _free_domain() -> int:
-    """Return a ROS domain whose discovery port nobody listens on."""
-    domains = random.SystemRandom().sample(DOMAINS, len(DOMAINS))
-    for domain in domains:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+@contextmanager
+def _own_domain() -> Iterator[None]:
+    """Take a ROS domain of this machine for oneself: nobody else's robot is heard or moved.
+
+    A lock keeps out whoever asks the same way; a domain whose discovery port is taken is left.
+    """
+    for domain in random.SystemRandom().sample(DOMAINS, len(DOMAINS)):
+        path = Path(tempfile.gettempdir(), f'ugv_acceptance_domain_{domain}.lock')
+        with ExitStack() as held:
             try:
-                probe.bind(('', 7400 + 250 * domain))
+                lock = held.enter_context(path.open('wb'))
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+                    probe.bind(('', 7400 + 250 * domain))
             except OSError:
                 continue
-            return domain
-    return domains[0]
+            os.environ['ROS_DOMAIN_ID'] = str(domain)
+            os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+            yield
+            return
+    raise AcceptanceError(f'expected a free ROS domain in {DOMAINS}, all are taken')
 
 
 def _home(config: 'Config', folder: 'RunFolder') -> tuple[float, ...]:
