@@ -2,9 +2,9 @@
 
 FOLDER holds recordings, such as make_fleet.py writes; without it one-minute bags with the rates of
 a real robot are written: joint states at 200 Hz, IMU at 400 Hz, zstd. The campaign runs in a fresh
-folder each time. One worker reads ahead in a second thread. Wall times tell something on a quiet
-machine only, CPU times on any. Says what 100,000 one-hour bags would cost, from the time a recorded
-hour takes.
+folder each time, one worker on one core alone. Wall times tell something on a quiet machine only,
+CPU times on any; starting the workers takes about a second. Says what 100,000 one-hour bags would
+cost, from the time a recorded hour takes.
 """
 
 import argparse
@@ -28,7 +28,7 @@ BAGS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a campaign took: wall and CPU seconds (children included), bags, bytes, hours."""
+    """What a campaign took: wall and CPU seconds (of judging alone), bags, bytes, hours."""
 
     wall: float
     cpu: float
@@ -41,18 +41,12 @@ def measure(folder: Path, workers: int) -> Measured:
     """Run a campaign from nothing and return what it took."""
     out = Path(tempfile.mkdtemp(prefix='campaign-'))
     sources, brief = find_sources([str(folder)]), Brief(load())
-    began, busy = time.perf_counter(), cpu()
+    began = time.perf_counter()
     rows, effort = carry_out(sources, brief, Place(out, workers))
-    took, used = time.perf_counter() - began, cpu() - busy
+    took = time.perf_counter() - began
     shutil.rmtree(out)
     hours = sum(row.duration_s * (1 + len(row.also)) for row in rows) / 3600.0
-    return Measured(took, used, effort.judged, effort.size, hours)
-
-
-def cpu() -> float:
-    """Return the CPU seconds of this process and its children that have ended."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system
+    return Measured(took, effort.cpu, effort.judged, effort.size, hours)
 
 
 def write_bags(folder: Path, count: int, seconds: float) -> None:
@@ -85,7 +79,11 @@ def main() -> None:
         folder = arguments.folder or Path(made)
         if arguments.folder is None:
             write_bags(folder, arguments.bags, arguments.seconds)
-        one, several = measure(folder, 1), measure(folder, arguments.workers)
+        every = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {min(every)})
+        one = measure(folder, 1)
+        os.sched_setaffinity(0, every)
+        several = measure(folder, arguments.workers)
     print(f'{"workers":12s} {"wall s":>7} {"CPU s":>7} {"bags/h":>10} {"GB/h":>8} {"h/h":>10}')
     print(line('1', one))
     print(line(str(arguments.workers), several))

@@ -1,12 +1,15 @@
 """Campaigns on real recordings: what is counted, what is resumed, what comes out."""
 
+import json
 from pathlib import Path
+from typing import Any
 
+import jsonschema
 import pytest
 from campaign.fleet import brief, campaign, exit_at_b, said, write_run
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.campaign.pool import in_processes, judge_all
+from ugv_acceptance.campaign.pool import batches, in_processes, judge_all
 from ugv_acceptance.campaign.run import Place, carry_out
 from ugv_acceptance.campaign.sources import Source, find_sources, sorted_out
 
@@ -124,6 +127,40 @@ def test_no_scheduler_is_said() -> None:
     pytest.importorskip('distributed', reason='extra cluster is not installed')
     with pytest.raises(AcceptanceError, match='expected a dask scheduler'):
         list(judge_all([], brief(), 1, 'tcp://127.0.0.1:1'))
+
+
+def schema_of(repository: Path) -> Any:
+    """Return the validator of campaign.json."""
+    schema = json.loads((repository / 'schema' / 'campaign.schema.json').read_text('utf-8'))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_a_statement_follows_its_schema(
+    fleet: Path, single: Path, repository: Path, tmp_path: Path
+) -> None:
+    """With a requirement, and with a comparison; what is missing or unknown there is refused."""
+    validator = schema_of(repository)
+    campaign(tmp_path, fleet, '--compare', 'good=*/good_*', '--compare', 'other=*/tips')
+    for folder in (single, tmp_path):
+        validator.validate(said(folder))
+    found = said(single)
+    for spoilt in ({**found, 'surprise': 1}, {k: v for k, v in found.items() if k != 'hours'}):
+        assert not validator.is_valid(spoilt)
+
+
+def test_short_runs_go_in_batches_that_all_workers_share(tmp_path: Path) -> None:
+    """Every run once, at most 16 of them or 4 MB together, an eighth of a worker's share."""
+    small, large = tmp_path / 'small.mcap', tmp_path / 'large.mcap'
+    small.write_bytes(b'x')
+    large.write_bytes(bytes(5 << 20))
+    sources = [Source(f'{k:04d}', (str(large if k % 50 == 7 else small),)) for k in range(1000)]
+    sources += [Source('url', ('s3://bucket/run',), remote=True)]
+    found = list(batches(sources, 2))
+    assert [source for batch in found for source in batch] == sources
+    assert max(len(batch) for batch in found) == 16
+    assert all(batch[-1].name[2:] in {'07', '57'} for batch in found[:-1] if len(batch) < 16)
+    assert [len(batch) for batch in batches(sources[:40], 2)] == [2] * 20
 
 
 def test_parts_of_a_split_bag_are_one_run() -> None:

@@ -25,10 +25,11 @@ class Place:
 
 @dataclass(slots=True)
 class Effort:
-    """How many runs were judged anew, and how many bytes of recordings they had."""
+    """How many runs were judged anew, the bytes of their recordings, and CPU time (s) for all."""
 
     judged: int = 0
     size: int = 0
+    cpu: float = 0.0
 
 
 def carry_out(
@@ -46,6 +47,7 @@ def carry_out(
     rows, effort = [], Effort()
     for done in judge_all(sources, brief, place.workers, place.scheduler):
         rows.append(_row(done, brief, place.folder))
+        effort.cpu += done.cpu
         if done.row is not None:
             effort.judged += 1
             effort.size += done.size

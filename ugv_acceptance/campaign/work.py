@@ -1,7 +1,8 @@
 """One run of a campaign judged, wherever the work is done: in this process, another, a cluster."""
 
 import hashlib
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ class Done:
     """A run that was looked at: its source, size (bytes), and one of three outcomes.
 
     `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
-    that it could not be read.
+    that it could not be read. `cpu` is the CPU time (s) of its process that it took.
     """
 
     source: Source
@@ -42,6 +43,7 @@ class Done:
     row: Row | None = None
     text: str = ''
     error: str = ''
+    cpu: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +63,11 @@ def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
 
 def judge_source(source: Source, brief: Brief) -> Done:
     """Return what came of one run; whatever is wrong with it is said in `error`, never raised."""
+    began = time.process_time()
+    return replace(_tried(source, brief), cpu=time.process_time() - began)
+
+
+def _tried(source: Source, brief: Brief) -> Done:
     try:
         with local_paths(source) as paths:
             try:
