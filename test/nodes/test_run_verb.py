@@ -8,14 +8,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from nodes.live_case import PATIENCE
 
+from ugv_acceptance import AcceptanceError
 from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.cli import running_plan
 from ugv_acceptance.config import load
 from ugv_acceptance.plan.plan import Plan, write_plan
 from ugv_acceptance.run.verdicts import seen_in
@@ -188,3 +190,18 @@ def test_a_killed_run_loses_nothing_and_is_continued(tmp_path: Path) -> None:
     assert '1 of 2 steps are done already' in text
     assert (out / 'steps' / 'one.json').read_text() == first
     assert open_bag(out / 'steps' / 'two.interrupted-1').topics['/imu/data'].count > 50
+
+
+def test_two_runs_never_share_a_ros_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While one holds its domain, every other asker gets another, and the last gets none."""
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.setenv(name, os.environ.get(name, ''))
+    monkeypatch.setattr(running_plan, 'DOMAINS', range(205, 208))
+    with ExitStack() as held:
+        found = []
+        for _ in range(3):
+            held.enter_context(running_plan.own_domain())
+            found.append(os.environ['ROS_DOMAIN_ID'])
+        assert sorted(found) == ['205', '206', '207']
+        with pytest.raises(AcceptanceError, match='all are taken'):
+            held.enter_context(running_plan.own_domain())

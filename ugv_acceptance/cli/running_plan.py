@@ -143,7 +143,7 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
     named = ['-p', f'config:={config.path}']
     with ExitStack() as stack:
         if asked.mode == 'sim':
-            stack.enter_context(_own_domain())
+            stack.enter_context(own_domain())
             simulated = [*args, *named, *_simulated(asked, config, folder)]
             stack.enter_context(child('simulator', simulated))
         stack.enter_context(child('monitor', [*args, *named]))
@@ -190,7 +190,7 @@ def _offline(
 
 
 @contextmanager
-def _own_domain() -> Iterator[None]:
+def own_domain() -> Iterator[None]:
     """Take a ROS domain of this machine for oneself: nobody else's robot is heard or moved.
 
     A lock keeps out whoever asks the same way; a domain whose discovery port is taken is left.
