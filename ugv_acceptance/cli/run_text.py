@@ -40,21 +40,21 @@ class Steps:
         self._planned = [known[step.id] + BESIDES for step in self.waiting]
         self.bar = Progress(
             TextColumn('{task.description}'),
-            BarColumn(),
+            BarColumn(bar_width=20),
             TimeRemainingColumn(compact=True),
-            TextColumn('left'),
+            TextColumn('left  {task.fields[step]}'),
             console=self.console,
             transient=True,
             disable=not self.console.is_terminal,
         )
-        self._task = self.bar.add_task('starting', total=sum(self._planned))
+        self._task = self.bar.add_task('starting', total=sum(self._planned), step='')
 
     def begin(self, step: 'Step') -> None:
         """Show the step that is done now."""
         self._number += 1
         self._began = self._now
-        text = f'step {self._number} of {len(self.waiting)}: {escape(step.id)}'
-        self.bar.update(self._task, description=text)
+        text = f'step {self._number} of {len(self.waiting)}'
+        self.bar.update(self._task, description=text, step=escape(step.id))
 
     def moved(self, now: float) -> None:
         """Take the time (s) of the run."""
