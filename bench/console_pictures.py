@@ -6,6 +6,7 @@ Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small e
 
 import io
 import sys
+import time
 from pathlib import Path
 
 from PIL import Image
@@ -26,6 +27,8 @@ POSTURES = {
 }
 LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE'}
 COLOURS = 96
+# How a posture is reached: steps, in seconds.
+STEPS, SECONDS = 120, 8.0
 
 
 def main() -> None:
@@ -33,6 +36,9 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     with live_console() as robot, chromium() as browser, browser.page() as page:
         page.open(robot.url)
+        # A sign that flashes would be caught half faded.
+        still = {'name': 'prefers-reduced-motion', 'value': 'reduce'}
+        page.call('Emulation.setEmulatedMedia', features=[still])
         for state, level in LEVELS.items():
             bring(robot, page, state, level)
             for screen, (width, height, touch) in SCREENS.items():
@@ -50,9 +56,18 @@ def bring(robot: Live, page: Page, state: str, level: str) -> None:
         page.wait('!!window.console_page?.frame && console_page.frame.level !== "STALE"')
         page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
         page.wait('console_page.frame.level === "OK"')
-        *q, roll = POSTURES[state]
-        robot.pose(*q, roll=roll)
+        go(robot, POSTURES[state])
     page.wait(f'document.body.dataset.level === "{level}"')
+
+
+def go(robot: Live, posture: tuple[float, ...]) -> None:
+    """Move slowly to a posture and stay, so that nothing is foretold of the motion any more."""
+    for k in range(1, STEPS + 1):
+        pairs = zip(POSTURES['ok'], posture, strict=True)
+        *q, roll = (a + (b - a) * k / STEPS for a, b in pairs)
+        robot.pose(*q, roll=roll)
+        time.sleep(SECONDS / STEPS)
+    time.sleep(3.0)
 
 
 def save(png: bytes, path: Path) -> None:

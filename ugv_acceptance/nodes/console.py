@@ -214,7 +214,8 @@ class ConsoleNode(Node):
         margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
         own = [*evaluator.watch.active, *self.session.faults.active]
         inputs = tuple(self._input(name, own) for name in ('joint_states', 'imu', 'payload'))
-        alerts = tuple(self._newest(r) for r in self.book.also(map(self._row, own)))
+        mine = {row.key: row for row in map(self._row, own)}
+        alerts = tuple(self._newest(r, mine) for r in self.book.also(mine.values()))
         told = () if problem and self.verdict is None else alerts
         moment = self.session.clock.now()
         if margins is None or problem or self.verdict is None:
@@ -239,12 +240,13 @@ class ConsoleNode(Node):
             stamp=margins.stamp,
         )
 
-    def _newest(self, row: AlertRow) -> AlertRow:
-        """Return an alert with the advice of the newest verdict, where it is about this one."""
-        about = (self.said.get('code'), self.said.get('subject'))
-        if row.end is None and about == (row.code, row.subject):
-            return replace(row, advice=self.said.get('do', row.advice))
-        return row
+    def _newest(self, row: AlertRow, mine: dict[str, AlertRow]) -> AlertRow:
+        """Return an active alert with its worst until now, and the newest advice on it."""
+        if row.end is not None:
+            return row
+        about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
+        advice = self.said.get('do', row.advice) if about else row.advice
+        return replace(row, text=mine.get(row.key, row).text, advice=advice)
 
     def _row(self, alert: Alert) -> AlertRow:
         rule = alert.rule

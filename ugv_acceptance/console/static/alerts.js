@@ -32,6 +32,7 @@ export class Alerts {
     text($('alert-count'), frame.alerts.length ? `(${frame.alerts.length}${hidden > 0 ? `, +${hidden} more` : ''})` : '');
     const open = frame.alerts.some((a) => a.unseen);
     $('acknowledge-all').disabled = !open;
+    $('acknowledge-all').hidden = !this.live || !frame.alerts.length;
     $('who').hidden = !this.live || (!frame.alerts.length && !$('who').contains(document.activeElement));
   }
 

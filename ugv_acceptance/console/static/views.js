@@ -112,7 +112,8 @@ export class Views {
 }
 
 function label(c, words, x, y, align) {
-  c.fillStyle = '#111'; c.textAlign = align; c.fillText(words, x, y);
+  c.textAlign = align; c.lineWidth = 4; c.strokeStyle = '#ffffffd0'; c.strokeText(words, x, y);
+  c.fillStyle = '#111'; c.fillText(words, x, y);
 }
 
 // The mark of a centre of gravity.
