@@ -42,7 +42,7 @@ help:
 	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
 	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
 	@echo 'make versions   the tests, but for the browser, on $(VERSIONS), the oldest with NumPy 1.26; ARGS as above'
-	@echo 'make hardening  the faults of docs/threats.md, tried by the thousand: about an hour, by hand; ARGS="--only 1,2"'
+	@echo 'make hardening  the faults of docs/threats.md, tried by the thousand: see ARGS=--help; ARGS="--only 1,2"'
 	@echo 'make clean      removes what was built; make distclean the virtual environments too'
 
 venv: .venv/.installed

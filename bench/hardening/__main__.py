@@ -1,8 +1,9 @@
 """Prints what was tried, what must hold, and what was measured: `python -m bench.hardening`.
 
-`--only 1,2` chooses rows, `--share` takes a part of each (0.01: three minutes); the exit code is 1
-where a row did not hold or broke off. Ten minutes over DDS run beside the other rows and are
-printed last.
+`--only 1,2` chooses rows, `--share` takes a part of each; the exit code is 1 where a row did not
+hold or broke off. Two lines of rows, ten minutes over DDS and what is done to whole processes, run
+beside the others and are printed last. All takes 35 to 50 minutes on two cores, those two lines
+alone (`--only 6,9,11`) about 25, `--share 0.1` about 7.
 """
 
 import argparse
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from traceback import extract_tb
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / 'test'), str(ROOT)]
@@ -29,27 +31,30 @@ def main() -> None:
     parser.add_argument('--only', default='', help='rows, such as 1,2')
     parser.add_argument('--share', type=float, default=1.0, help='part of each row')
     parser.add_argument('--quick', action='store_true', help='a hundredth of each')
-    parser.add_argument('--aside', action='store_true', help='only what runs beside the others')
+    parser.add_argument('--beside', type=int, help='only this line of rows')
     asked = parser.parse_args()
     share = 0.01 if asked.quick else asked.share
     chosen = {int(text) for text in asked.only.split(',') if text}
     rows = [row for row in ROWS if not chosen or row.number in chosen]
-    if asked.aside:
-        raise SystemExit(int(not all(tried(row, share) for row in rows if row.aside)))
-    print('| # | trial | must hold | measured | held | s |\n|---|---|---|---|---|---|', flush=True)
-    beside = started(sys.argv[1:]) if any(row.aside for row in rows) else None
-    held = [tried(row, share) for row in rows if not row.aside]
-    if beside is not None:
-        print(beside.communicate()[0], end='', flush=True)
-        held.append(beside.returncode == 0)
+    line = asked.beside or 0
+    others = {row.beside for row in rows} - {0} if asked.beside is None else set()
+    children = [started([*sys.argv[1:], '--beside', str(other)]) for other in sorted(others)]
+    if asked.beside is None:
+        print(
+            '| # | trial | must hold | measured | held | s |\n|---|---|---|---|---|---|', flush=True
+        )
+    held = [tried(row, share) for row in rows if row.beside == line]
+    for child in children:
+        print(child.communicate()[0], end='', flush=True)
+        held.append(child.returncode == 0)
     raise SystemExit(int(not all(held)))
 
 
 def started(words: list[str]) -> 'subprocess.Popen[str]':
-    """Start what runs beside the rows, in a ROS domain of its own."""
+    """Start a line of rows beside this one, in a ROS domain of its own."""
     drop = ('_ROS_WHEELS_BOOTSTRAP_COMPLETE', 'ROS_DOMAIN_ID')
     env = {k: v for k, v in os.environ.items() if k not in drop}
-    command = [sys.executable, '-m', 'bench.hardening', *words, '--aside']
+    command = [sys.executable, '-m', 'bench.hardening', *words]
     return subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True)
 
 
@@ -69,7 +74,8 @@ def outcomes(row: Row, share: float) -> Iterable[Outcome]:
     try:
         yield from row.run(share)
     except Exception as error:  # noqa: BLE001 - whatever it is, it is a trial that failed
-        yield Outcome(f'broke off: {error!r}', held=False)
+        where = ' < '.join(frame.name for frame in reversed(extract_tb(error.__traceback__)[-4:]))
+        yield Outcome(f'broke off: {error!r} in {where}', held=False)
 
 
 if __name__ == '__main__':

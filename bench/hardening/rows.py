@@ -7,19 +7,23 @@ from hardening.outcome import Outcome
 
 from bench.hardening import deaths, messages, processes, recordings, suite, wire
 
+# Lines beside that of the rows that need a processor for themselves.
+SOAK, WIRE = 1, 2
+
 
 @dataclass(frozen=True, slots=True)
 class Row:
     """A trial: `run(share)` makes that share of its long form and yields what was measured.
 
-    `aside`: it takes minutes but little of the processor, and is made beside the others.
+    Rows of a line of their own (`beside`, not 0) take minutes but little of the processor: each
+    line is made beside the others, in a process and a ROS domain of its own.
     """
 
     number: int
     trial: str
     must_hold: str
     run: Callable[[float], Iterable[Outcome]]
-    aside: bool = False
+    beside: int = 0
 
 
 ROWS = (
@@ -58,13 +62,14 @@ ROWS = (
         '10 min of real time over DDS at 200 + 400 Hz, a fault every 5 s',
         'no critical alert missed or false, drift under 5 MB, 0 messages lost',
         wire.real_time,
-        aside=True,
+        beside=SOAK,
     ),
     Row(
         6,
         'publisher killed, stopped, mismatched QoS, never started, half the joints gone, over DDS',
         'STALE in max(3 periods, 0.1 s) + a tick, never OK',
         wire.silences,
+        beside=WIRE,
     ),
     Row(
         7,
@@ -83,6 +88,7 @@ ROWS = (
         'a second publisher on an input',
         'warned within 2 s, naming the node',
         wire.strangers,
+        beside=WIRE,
     ),
     Row(
         9,
@@ -101,12 +107,14 @@ ROWS = (
         'recordings played through a lossy relay over DDS, monitored and recorded',
         'the same verdict or INCONCLUSIVE, short coverage marked, live as recorded',
         wire.lossy,
+        beside=WIRE,
     ),
     Row(
         11,
         'kill -9 of recorder, monitor, campaign and report, 20 times each',
         'all readable, at most 1 s lost, nothing told lost, resumed, no half result',
         deaths.kills,
+        beside=WIRE,
     ),
     Row(
         11,
@@ -119,6 +127,7 @@ ROWS = (
         'a disk that is full, a folder that is read-only',
         'exit code 2 and one line, older results whole, the watch goes on',
         deaths.disks,
+        beside=WIRE,
     ),
     Row(
         12,
