@@ -22,7 +22,7 @@ from ugv_acceptance.simulation.vehicle import gravity_on_slope
 # Margins that a quiet shift keeps: tilt left (rad), share of the torque limit, grip height (m).
 CALM_TILT, CALM_TORQUE, LOWEST = radians(18.0), 0.62, 0.08
 # Postures of a motion that are looked at.
-_PATH = 17
+_PATH = 49
 # Share of quiet shifts with a low obstacle ahead, and how high (m) it is at most.
 _UNEVEN, _TOP = 0.3, 0.1
 
@@ -65,7 +65,7 @@ class Poses:
         """Return a posture to which the way from `start` keeps large margins; None: none found."""
         for _ in range(40):
             end = self.anywhere()
-            path = start + np.linspace(0.0, 1.0, _PATH)[:, None] * (end - start)
+            path = _way(start, end)
             if (gripper_point(self.robot, path)[:, 2] < self.lowest).any():
                 continue
             if self.keeps(path, load, tilt):
@@ -79,6 +79,15 @@ class Poses:
         found = margins(self.robot, path[:, None, :], heads, load)
         share = (np.abs(found.torque) / limit).max()
         return bool(found.angle.min() > CALM_TILT and share < CALM_TORQUE)
+
+
+def _way(start: Floats, end: Floats) -> Floats:
+    """Return postures (n, j) of the motion: no straight line, each joint takes its own time."""
+    change = end - start
+    took = np.maximum(np.abs(change), 1e-9)
+    phase = np.pi * np.minimum(np.linspace(0.0, took.max(), _PATH)[:, None] / took, 1.0)
+    path: Floats = start + change * (1.0 - np.cos(phase)) / 2.0
+    return path
 
 
 def _headings() -> Floats:
