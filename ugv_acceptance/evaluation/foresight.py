@@ -40,6 +40,8 @@ EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
 LOW, HIGH = 0.3, 0.97
 # What changes by more than this share of the whole between two looks has jumped.
 JUMP = 0.6
+# So few looks, as live, are taken one at a time.
+FEW = 3
 # Looks that wait at most for `judge`: who never lets time pass needs no memory for them.
 MOST = 1024
 
@@ -118,8 +120,7 @@ class Foresight:
                 (self.frozen, self._frozen(old, tau, effort, q) / limit),
             )
         for signals, values in found:
-            for signal, column in zip(signals, values.T, strict=True):
-                feed(signal, time[old:], column[old:])
+            _feed(signals, time[old:], values[old:])
         self._time, self._looks = time[-KEPT:], looks[-KEPT:]
 
     def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
@@ -142,6 +143,19 @@ class Foresight:
         self._since = np.array([looks[-1], effort_then[-1], tau_then[-1]])
         change = np.abs((effort - effort_then) - (tau - tau_then))
         return np.where(looks >= STUCK, change, 0.0)
+
+
+def _feed(signals: list[Signal], time: Times, values: Floats) -> None:
+    """Feed each signal with its column of the values (n, m)."""
+    if len(time) > FEW:
+        for signal, column in zip(signals, values.T, strict=True):
+            feed(signal, time, column)
+        return
+    for now, row in zip(time.tolist(), values.tolist(), strict=True):
+        for signal, value in zip(signals, row, strict=True):
+            # A quiet signal has nothing to do with a small value.
+            if value >= signal.on or not signal.quiet:
+                signal.step(now, value)
 
 
 def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 - float or (m,)
