@@ -212,14 +212,38 @@ def rosbags(path: Path) -> Callable[[], int]:
 
 
 def rerun(path: Path) -> Callable[[], int]:
-    """The native reader of rerun-sdk (Rust), which decodes by the definitions in the file."""
+    """The native reader of rerun-sdk (Rust): its lists of numbers as arrays, without a copy."""
     from rerun.chunk import McapReader  # type: ignore[import-not-found]  # noqa: PLC0415 (optional)
 
     def run() -> int:
         wanted = ['^/joint_states$', '^/imu/data$']
         reader = McapReader(path, decoders=['ros2msg'], include_topic_regex=wanted)
-        chunks = reader.stream()
-        return sum(chunk.num_rows for chunk in chunks)
+        count = 0
+        for chunk in reader.stream():
+            table = chunk.to_record_batch()
+            for name, column in zip(table.schema.names, table.columns, strict=True):
+                if name.endswith((':scalars', ':orientation')):
+                    count += len(column.flatten().to_numpy(zero_copy_only=False))
+        return count
+
+    return run
+
+
+def baglab(path: Path) -> Callable[[], int]:
+    """The native reader of baglab-mcap-backend (C++): the wanted fields, an array or list each."""
+    from baglab_mcap_backend import (  # type: ignore[import-not-found]  # noqa: PLC0415 (optional)
+        BagReader,
+    )
+
+    vectors = {'orientation': 'xyzw', 'angular_velocity': 'xyz', 'linear_acceleration': 'xyz'}
+    fields = {
+        '/joint_states': ['position', 'velocity', 'effort'],
+        '/imu/data': [f'{name}.{axis}' for name, axes in vectors.items() for axis in axes],
+    }
+
+    def run() -> int:
+        found = BagReader(str(path)).read_topics(list(fields), fields)
+        return sum(len(topic['__timestamps__']) for topic in found.values())
 
     return run
 
@@ -230,7 +254,9 @@ JOBS: dict[str, Callable[[Path], Callable[[], int]]] = {
     'columns, 2 workers': columns(2),
     'rosbags': rosbags,
     'rerun-sdk': rerun,
+    'baglab': baglab,
 }
+OPTIONAL = {'rerun-sdk': 'rerun', 'baglab': 'baglab_mcap_backend'}
 
 
 def job(name: str, path: Path) -> None:
@@ -252,7 +278,7 @@ def measure(path: Path, rounds: int, names: list[str]) -> dict[str, list[dict[st
     out: dict[str, list[dict[str, float]]] = {name: [] for name in names}
     for turn in range(rounds):
         for name in names:
-            if turn and name == 'rosbags':
+            if turn and name in {'rosbags', 'baglab'}:
                 continue
             command = [sys.executable, __file__, '--job', name, '--bag', str(path)]
             # One thread for linear algebra: its idle threads would be counted as CPU time.
@@ -297,10 +323,11 @@ def main() -> None:
     if given.job:
         job(given.job, given.bag)
         return
-    names = [n for n in JOBS if not (given.only_ours and n in {'rosbags', 'rerun-sdk'})]
-    if importlib.util.find_spec('rerun') is None and 'rerun-sdk' in names:
-        names.remove('rerun-sdk')
-        print('rerun-sdk is not installed: left out')
+    names = [n for n in JOBS if not (given.only_ours and n in {'rosbags', *OPTIONAL})]
+    for name, module in OPTIONAL.items():
+        if importlib.util.find_spec(module) is None and name in names:
+            names.remove(name)
+            print(f'{name} is not installed: left out')
     with tempfile.TemporaryDirectory() as folder:
         compression: Compression = '' if given.compression == 'none' else given.compression
         bag = Path(folder) / 'bag'
