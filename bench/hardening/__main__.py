@@ -2,7 +2,7 @@
 
 `--only 1,2` chooses rows, `--share` takes a part of each; the exit code is 1 where a row did not
 hold or broke off. Two lines of rows, ten minutes over DDS and what is done to whole processes, run
-beside the others and are printed last. All takes 35 to 50 minutes on two cores, those two lines
+beside the others and print between them. All takes 35 to 50 minutes on two cores, those two lines
 alone (`--only 6,9,11`) about 25, `--share 0.1` about 7.
 """
 
@@ -44,18 +44,16 @@ def main() -> None:
             '| # | trial | must hold | measured | held | s |\n|---|---|---|---|---|---|', flush=True
         )
     held = [tried(row, share) for row in rows if row.beside == line]
-    for child in children:
-        print(child.communicate()[0], end='', flush=True)
-        held.append(child.returncode == 0)
+    held += [child.wait() == 0 for child in children]
     raise SystemExit(int(not all(held)))
 
 
-def started(words: list[str]) -> 'subprocess.Popen[str]':
+def started(words: list[str]) -> 'subprocess.Popen[bytes]':
     """Start a line of rows beside this one, in a ROS domain of its own."""
     drop = ('_ROS_WHEELS_BOOTSTRAP_COMPLETE', 'ROS_DOMAIN_ID')
     env = {k: v for k, v in os.environ.items() if k not in drop}
     command = [sys.executable, '-m', 'bench.hardening', *words]
-    return subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True)
+    return subprocess.Popen(command, cwd=ROOT, env=env)
 
 
 def tried(row: Row, share: float) -> bool:

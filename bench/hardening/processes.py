@@ -16,13 +16,8 @@ def kills(share: float) -> Iterable[Outcome]:
     count = max(1, int(20 * share))
     command = [sys.executable, 'bench/bench_kill.py', '--kills', str(count)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    rows = [line.split() for line in done.stdout.splitlines()[1:]]
-    # ran, steps, readable, 'of', recordings, messages, lost, whether the others ended
-    whole = sum(row[2] == row[4] for row in rows)
-    lost = [float(row[6]) for row in rows if row[6] != '-']
-    most = max(lost, default=0.0)
-    text = f'run: {whole} of {count} left all recordings readable, at most {most:.2f} s lost'
-    yield Outcome(text, whole == count == len(rows) and most <= 1.0)
+    said = (done.stdout or done.stderr).strip().splitlines()
+    yield Outcome(f'run: {said[-1] if said else "nothing said"}', done.returncode == 0)
 
 
 def mutation(share: float) -> Iterable[Outcome]:

@@ -118,9 +118,10 @@ ROWS = (
     ),
     Row(
         11,
-        'kill -9 of run',
-        'all files readable, at most 1 s lost',
+        'kill -9 of run, at 20 random moments',
+        'all files readable, at most 1 s lost, nothing runs on, it can be resumed',
         processes.kills,
+        beside=WIRE,
     ),
     Row(
         11,

@@ -148,11 +148,13 @@ def campaign(recording: Path, folder: Path, times: int, seed: int = 0) -> Outcom
 
 
 def children(pid: int) -> list[int]:
-    """Return the children of a process; none where it has ended."""
+    """Return the children of a process, and theirs; none where it has ended."""
     try:
-        return [int(p) for p in Path(f'/proc/{pid}/task/{pid}/children').read_text().split()]
+        tasks = [path.read_text() for path in Path(f'/proc/{pid}/task').glob('*/children')]
     except OSError:
         return []
+    below = [int(child) for text in tasks for child in text.split()]
+    return [*below, *(grandchild for child in below for grandchild in children(child))]
 
 
 def gone(pids: Iterable[int], patience: float = 10.0) -> bool:

@@ -12,6 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from ugv_acceptance import AcceptanceError
@@ -82,6 +83,17 @@ def _each(work: Work, batch: Runs) -> list[Done]:
     return [work(source) for source in batch]
 
 
+def _end_with_parent() -> None:
+    """Ask this worker to end when the campaign does, even one that was killed."""
+
+    def watch() -> None:
+        if parent := multiprocessing.parent_process():
+            parent.join()
+            os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
 def _round(work: Work, waiting: deque[Runs], workers: int, suspects: Runs) -> Iterator[Done]:
     """Work until nothing waits or a process dies; then those given out are the suspects."""
     # Forked by a server that has all imported: a fork of this process, which has threads, may hang,
@@ -89,7 +101,7 @@ def _round(work: Work, waiting: deque[Runs], workers: int, suspects: Runs) -> It
     context = multiprocessing.get_context('forkserver')
     context.set_forkserver_preload([judge_source.__module__])
     given: dict[Future[list[Done]], Runs] = {}
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
         try:
             while waiting or given:
                 while waiting and len(given) < _AHEAD * workers:
