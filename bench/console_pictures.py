@@ -44,6 +44,7 @@ def main() -> None:
             for screen, (width, height, touch) in SCREENS.items():
                 page.resize(width, height, touch=touch)
                 page.run('scrollTo(0, 0); new Promise(done => setTimeout(done, 700))')
+                page.wait(f'document.body.dataset.level === "{level}"')
                 save(page.picture(), OUT / f'console_{state}_{screen}.png')
 
 

@@ -78,6 +78,11 @@ def test_what_is_not_known_is_no_data(level: int) -> None:
     assert (found['word'], found['left']) == ('NO DATA', '')
 
 
+def test_without_data_nothing_is_said_to_be_left() -> None:
+    """A monitor that says NO DATA is believed, though the numbers seem to be known here."""
+    assert frame(replace(FINE, level=STALE))['left'] == ''
+
+
 def test_a_fine_robot_is_ok() -> None:
     """Nothing wrong: OK, and what is left in words."""
     found = frame(FINE)

@@ -59,7 +59,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'word': WORDS[level],
         'cause': cause,
         'advice': advice,
-        'left': what_is_left(snapshot, settings),
+        'left': '' if level == STALE else what_is_left(snapshot, settings),
         'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
         'q': numbers(snapshot.q),
         'posture': None if skeleton is None else _posture(skeleton),
