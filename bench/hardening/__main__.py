@@ -2,8 +2,8 @@
 
 `--only 1,2` chooses rows, `--share` takes a part of each; the exit code is 1 where a row did not
 hold or broke off. Two lines of rows, ten minutes over DDS and what is done to whole processes, run
-beside the others and print between them. All takes 35 to 50 minutes on two cores, those two lines
-alone (`--only 6,9,11`) about 25, `--share 0.1` about 7.
+beside the others and print between them. All takes about an hour on two free cores, the two lines
+alone about 25 minutes (`--only 6,9,11`, without the soak 15), `--share 0.5` half of it.
 """
 
 import argparse
