@@ -120,6 +120,8 @@ class Corruption:
 
     def arrivals(self, source: str, time: float, rng: np.random.Generator) -> list[float]:
         """Return when (s) a message of an input sent at `time` comes: never, once or twice."""
+        if not self.faults:
+            return [time + DELAY + JITTER * rng.random()]
         if self._of('dead', source, time):
             return []
         if any(rng.random() < f.amount for f in self._of('dropped', source, time)):
