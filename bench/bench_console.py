@@ -49,6 +49,16 @@ console_page.socket.addEventListener('message', count);
 """
 
 
+# When the page first says NO DATA: ms since the last frame.
+WATCHER = """
+window.lost = null;
+(function look() {
+  if (document.body.dataset.level === 'STALE') lost ??= performance.now() - console_page.last;
+  requestAnimationFrame(look);
+})();
+"""
+
+
 def main() -> None:
     """Measure and print."""
     size = sum(file.stat().st_size for file in (ROOT / 'ugv_acceptance/console/static').iterdir())
@@ -59,6 +69,7 @@ def main() -> None:
         page.wait('document.body.dataset.level === "OK"')
         robot_moves(robot)
         painted(page)
+        frozen(robot, page)
         share('console, one page', [robot.console])
         compare(robot)
         crowd(robot)
@@ -98,6 +109,16 @@ def painted(page: Page) -> None:
         f'{"refreshes of the screen":44} {quantile(refreshes, 0.5):6.1f} ms apart,'
         f' {quantile(refreshes, 0.99):.1f} p99, {max(refreshes):.0f} at most'
     )
+
+
+def frozen(robot: Live, page: Page) -> None:
+    """Print how long after the last frame the page says that a stopped server is silent."""
+    page.run(WATCHER)
+    robot.console.send_signal(signal.SIGSTOP)
+    time.sleep(2.0)
+    robot.console.send_signal(signal.SIGCONT)
+    print(f'{"stopped server seen after":44} {page.run("lost"):6.0f} ms (bar 500)')
+    page.wait('document.body.dataset.level === "OK"')
 
 
 def quantile(values: list[float], share: float) -> float:

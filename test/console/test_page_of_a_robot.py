@@ -37,9 +37,9 @@ def calm(page: Page, robot: Live) -> None:
 
 
 def states(page: Page) -> list[str]:
-    """Return the states of the alerts in the list."""
+    """Return the states of the dangers in the list; lesser alerts come and go with the motion."""
     found: list[str] = page.run(
-        '[...document.querySelectorAll("#alerts li")].map(x => x.dataset.state)'
+        '[...document.querySelectorAll("#alerts li.ERROR")].map(x => x.dataset.state)'
     )
     return found
 
@@ -65,13 +65,29 @@ def test_an_alert_appears_sounds_and_is_acknowledged(shown: Page, robot: Live) -
     shown.run('operator.value = "Ada"')
     shown.click('#acknowledge-all')
     shown.wait(
-        '[...document.querySelectorAll("#alerts li")]'
+        '[...document.querySelectorAll("#alerts li.ERROR")]'
         '.every(x => x.dataset.state === "active, acknowledged")'
     )
     shown.wait('document.body.dataset.sound === "armed"')
     assert shown.run(LEVEL) == 'ERROR'
     assert not shown.run('verdict.classList.contains("flash")')
     assert 'Ada' in shown.text('#alerts li small')
+
+
+def test_one_voice_at_a_time(shown: Page, robot: Live) -> None:
+    """With two dangers and what goes with them no tone begins before the one before has ended."""
+    shown.run(
+        'window.voices = []; for (const name of ["start", "stop"]) {'
+        ' const was = OscillatorNode.prototype[name];'
+        ' OscillatorNode.prototype[name] = function (when) {'
+        ' voices.push(when); was.call(this, when); }; } 0'
+    )
+    shown.click('#arm')
+    robot.pose(*STRETCHED)
+    shown.wait('document.querySelectorAll("#alerts li.ERROR").length === 2')
+    shown.wait('voices.length >= 24')
+    moments = shown.run('voices')
+    assert moments == sorted(moments)
 
 
 def test_the_sound_button_is_red_until_pressed(shown: Page) -> None:
