@@ -19,11 +19,23 @@ from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.regression import independent_samples, least_squares
 from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.evaluation.watch import Watch
-from ugv_acceptance.model.stability import margins
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.stability import stability_of, stance_of
+from ugv_acceptance.model.statics import torque_of
 
 Floats = NDArray[np.float64]
-EXACT = margins(settings().robot, np.zeros(2), np.array((0.0, 0.0, -9.81)))
-TORQUE, FRONT = abs(float(EXACT.torque[0])), float(EXACT.angle[0])
+DOWN = (0.0, 0.0, -9.81)
+
+
+def level() -> tuple[float, float]:
+    """Return torque of the lift and tilt left to the front, as one sample gives them."""
+    mechanics = mechanics_of(settings().robot)
+    posture = posture_of(mechanics, (0.0, 0.0), 1.0, (0.1, 0.0, 0.0))
+    angle = stability_of(stance_of(mechanics, posture), DOWN).angle[0]
+    return abs(float(torque_of(posture, DOWN)[0])), float(angle)
+
+
+TORQUE, FRONT = level()
 
 
 def alerts_of(limits: Limits) -> set[tuple[str, str]]:
