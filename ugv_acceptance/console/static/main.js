@@ -8,7 +8,7 @@ import { Strips } from './strips.js';
 import { Playback } from './playback.js';
 import { Sound } from './sound.js';
 
-const SILENCE = 500; // ms without a frame: what is shown may no longer be true
+const SILENCE = 450; // ms without a frame: what is shown may no longer be true; seen within 500
 const RETRY = 1000;
 
 const page = { hello: null, frame: null, fresh: false, last: -Infinity, socket: null, asked: 0, waiting: new Map() };
