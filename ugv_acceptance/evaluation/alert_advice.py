@@ -12,8 +12,8 @@ from ugv_acceptance.evaluation.rows import Floats, MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
-# Advice is computed for so many alerts of a run, the most severe first: a second's work.
-MOST = 200
+# Advice is computed for so many alerts of a run, the most severe first: a sixth of a second.
+MOST = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
