@@ -80,7 +80,9 @@ def test_shapes_are_a_marker_array(
         assert marker.action == (Marker.ADD if shape.points or shape.text else Marker.DELETE)
         assert tuple((p.x, p.y, p.z) for p in marker.points) == shape.points
         assert tuple((c.r, c.g, c.b, c.a) for c in marker.colors) == shape.colours
-        assert marker.lifetime.sec + marker.lifetime.nanosec / 1e9 == pytest.approx(lifetime, abs=1e-9)
+        assert marker.lifetime.sec + marker.lifetime.nanosec / 1e9 == pytest.approx(
+            lifetime, abs=1e-9
+        )
         at, turn = marker.pose.position, marker.pose.orientation
         assert (at.x, at.y, at.z) == shape.position
         assert (turn.x, turn.y, turn.z, turn.w) == (0.0, 0.0, 0.0, 1.0)
