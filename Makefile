@@ -32,6 +32,8 @@ endif
 PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
+# Files of tests that `make colcon` leaves to `make pytest`.
+ONCE := $(foreach name,page_of_ kills operator run_verb soak,'--ignore-glob=*test_$(name)*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:
@@ -98,7 +100,7 @@ pytest: venv
 
 colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
 
-# Tests that need a browser run once, in `make pytest`. Unless it is asked, colcon takes failing tests for a success; no test at all is one to it in any case.
+# Tests that need a browser, and the long ones of whole processes over DDS, run once, in `make pytest`. Unless it is asked, colcon takes failing tests for a success; no test at all is one to it in any case.
 colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log build \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --event-handlers console_direct+
@@ -109,7 +111,7 @@ colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure \
-	    --pytest-args -n $(JOBS) '--ignore-glob=*test_page_of_*' $(ARGS)
+	    --pytest-args -n $(JOBS) $(ONCE) $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 

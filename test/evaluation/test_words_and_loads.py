@@ -121,9 +121,9 @@ def weighed(effort: float, *, declared: float = 1.0, rate: float = 0.0, q: float
     )  # fmt: skip
 
 
-def need(mass: float) -> float:
-    """Return the effort (N m) of the level lift with a load."""
-    return float(static_torque(TOLD.robot, (0.0, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)))[0])
+def need(mass: float, q: float = 0.0) -> float:
+    """Return the effort (N m) of the lift with a load."""
+    return float(static_torque(TOLD.robot, (q, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)))[0])
 
 
 @pytest.mark.parametrize(
@@ -139,8 +139,9 @@ def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa:
 
 
 def test_less_than_nothing_is_told_as_nothing() -> None:
-    """A motor that is helped does not carry a negative load."""
-    assert 'as if 0.0 kg' in weighed(need(0.0) - 2.0 * LIFT).sentence
+    """A motor that is helped a little carries no negative load; helped much, the arm leans."""
+    assert 'as if 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
+    assert weighed(need(0.0) - 0.6 * LIFT) is None
 
 
 def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
@@ -149,9 +150,9 @@ def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
     assert weighed(need(2.0), rate=0.021) is None
     assert weighed(math.nan) is None
     assert weighed(5.0, q=math.pi / 2) is None
-    steep = math.acos(1.05 / LIFT)
-    assert weighed(0.0, q=steep) is not None
-    assert weighed(0.0, q=math.acos(0.95 / LIFT)) is None
+    steep, steeper = math.acos(1.05 / LIFT), math.acos(0.95 / LIFT)
+    assert weighed(need(2.0, steep), q=steep) is not None
+    assert weighed(need(2.0, steeper), q=steeper) is None
 
 
 @pytest.mark.parametrize(('off', 'known'), [(5.0, True), (15.0, False)])

@@ -38,11 +38,11 @@ class Way:
         """Be the bag in all but its batches."""
         return getattr(self.bag, name)
 
-    def batches(self, topics: Topics) -> Any:
-        """Return what `Bag.batches` returns."""
+    def batches(self, topics: Topics, workers: int | None = None) -> Any:
+        """Return what `Bag.batches` returns, read this way unless that is asked for."""
         if self.single:
             return Singly(self.bag, topics)
-        return self.bag.batches(topics, workers=self.workers)
+        return self.bag.batches(topics, workers=workers or self.workers)
 
 
 class Singly(Iterator[Batch]):

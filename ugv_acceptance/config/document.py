@@ -42,7 +42,7 @@ class Document:
             known = here
         line = self.lines.get(known, 1)
         written = (*known, *path[len(known) :])
-        field = '.'.join(str(part) for part in written)
+        field = _dotted(written)
         return f'{self.source}:{line}: {field}' if field else f'{self.source}:{line}'
 
     def _key(self, parent: Path, part: str | int) -> Path | None:
@@ -84,9 +84,15 @@ def _walk(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> N
             here = (*path, str(key.value))
             if here in lines:
                 line = key.start_mark.line + 1
-                raise BadConfig(f'{source}:{line}: {".".join(map(str, here))}: key given twice')
+                raise BadConfig(f'{source}:{line}: {_dotted(here)}: key given twice')
             lines[here] = key.start_mark.line + 1
             _walk(value, here, lines, source)
+
+
+def _dotted(path: Path) -> str:
+    """Return 'a.b.c', on one line whatever the keys are."""
+    words = (str(part) for part in path)
+    return '.'.join(word if word.isprintable() else repr(word) for word in words)
 
 
 def _place(error: Exception) -> str:

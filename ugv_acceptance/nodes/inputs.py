@@ -86,7 +86,9 @@ class Inputs:
             session.faults.set(session.clock.now(), 'MESSAGES_LOST', name, count)
 
         def matched(_: object) -> None:
-            self._look_soon()
+            # The event may come after the end of what it is of.
+            if self.subscriptions:
+                self._look_soon()
 
         return SubscriptionEventCallbacks(
             incompatible_qos=mismatch, message_lost=lost, matched=matched
@@ -168,6 +170,7 @@ class Inputs:
         self._node.destroy_timer(self._soon)
         for subscription in self.subscriptions.values():
             self._node.destroy_subscription(subscription)
+        self.subscriptions = {}
 
 
 def _node_name(namespace: str, name: str) -> str:
