@@ -62,7 +62,7 @@ def test_it_holds_the_time_before_and_after(tmp_path: Path) -> None:
     """Thirty seconds before the alert and ten after it, and the file is finished by itself."""
     box, now = box_in(tmp_path), START + 60 * SECOND
     feed(box, START, now)
-    box.alert(now, TIP, NOTHING)
+    box.alerts(now, [TIP], NOTHING)
     feed(box, now, now + 20 * SECOND)
     (path,) = saved(box)
     assert (path / 'metadata.yaml').is_file()
@@ -76,13 +76,27 @@ def test_a_second_alert_prolongs_the_recording(tmp_path: Path) -> None:
     """What follows within ten seconds belongs to the same recording; the alerts are in it."""
     box, now = box_in(tmp_path), START + 5 * SECOND
     feed(box, START, now)
-    box.alert(now, TIP, NOTHING)
+    box.alerts(now, [TIP], NOTHING)
     feed(box, now, now + 8 * SECOND)
-    box.alert(now + 8 * SECOND, TIP, NOTHING)
+    box.alerts(now + 8 * SECOND, [TIP], NOTHING)
     feed(box, now + 8 * SECOND, now + 30 * SECOND)
     (path,) = saved(box)
     assert times(path)[-1] == now + 8 * SECOND + AFTER
     assert times(path, '/acceptance_monitor/alerts').tolist() == [now, now + 8 * SECOND]
+
+
+def test_who_saw_the_alert_is_in_its_recording(tmp_path: Path) -> None:
+    """Changes that raise nothing, as an acknowledgement is, start no recording but are kept."""
+    box, now = box_in(tmp_path), START + 5 * SECOND
+    feed(box, START, now)
+    box.alerts(now - SECOND, [], NOTHING)
+    assert not box.saved
+    box.alerts(now, [TIP], NOTHING)
+    feed(box, now, now + 2 * SECOND)
+    box.alerts(now + 2 * SECOND, [], NOTHING)
+    (path,) = saved(box)
+    kept = times(path, '/acceptance_monitor/alerts').tolist()
+    assert kept == [now - SECOND, now, now + 2 * SECOND]
 
 
 def test_each_later_alert_has_its_own_past(tmp_path: Path) -> None:
@@ -91,7 +105,7 @@ def test_each_later_alert_has_its_own_past(tmp_path: Path) -> None:
     for _ in range(2):
         feed(box, now, now + 12 * SECOND)
         now += 12 * SECOND
-        box.alert(now, TIP, NOTHING)
+        box.alerts(now, [TIP], NOTHING)
     feed(box, now, now + 12 * SECOND)
     first, second = saved(box)
     assert times(first)[0] == times(second)[0] == START
@@ -102,7 +116,7 @@ def test_the_payload_in_force_is_in_the_recording(tmp_path: Path) -> None:
     box = box_in(tmp_path)
     box.keep(START, 'payload', inertia_cdr(START, 'gripper_link', 3.0, (0.0, 0.0, 0.0)))
     feed(box, START + SECOND, START + 50 * SECOND)
-    box.alert(START + 50 * SECOND, TIP, NOTHING)
+    box.alerts(START + 50 * SECOND, [TIP], NOTHING)
     (path,) = saved(box)
     assert times(path, '/payload').tolist() == [times(path)[0]]
 
@@ -111,7 +125,7 @@ def test_rosbags_reads_it(tmp_path: Path) -> None:
     """A reader that is not ours decodes every message."""
     box = box_in(tmp_path)
     feed(box, START, START + 3 * SECOND)
-    box.alert(START + 3 * SECOND, TIP, NOTHING)
+    box.alerts(START + 3 * SECOND, [TIP], NOTHING)
     with AnyReader(saved(box)) as reader:
         kinds = [type(reader.deserialize(d, c.msgtype)).__name__ for c, _, d in reader.messages()]
     assert len(kinds) == 61
@@ -129,7 +143,7 @@ def test_only_critical_alerts_are_recorded(tmp_path: Path, rule: Rule) -> None:
     """Neither a warning nor a fault of an input makes a recording."""
     box = box_in(tmp_path)
     feed(box, START, START + SECOND)
-    box.alert(START + SECOND, Alert(rule, 0, 0.0), NOTHING)
+    box.alerts(START + SECOND, [Alert(rule, 0, 0.0)], NOTHING)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -139,7 +153,7 @@ def test_a_folder_that_cannot_be_written_is_said_and_survived(tmp_path: Path) ->
     problems: list[str] = []
     box = BlackBox(tmp_path / 'file', TOPICS, 0, problems.append)
     feed(box, START, START + SECOND)
-    box.alert(START + SECOND, TIP, NOTHING)
+    box.alerts(START + SECOND, [TIP], NOTHING)
     feed(box, START + SECOND, START + 2 * SECOND)
     box.close()
     assert len(problems) == 1
@@ -153,7 +167,7 @@ def test_an_alert_that_comes_and_goes_does_not_fill_the_disk(tmp_path: Path) -> 
     for k in range(box.most + 2):
         now = START + k * 2 * AFTER
         feed(box, now, now + 1)
-        box.alert(now, TIP, NOTHING)
+        box.alerts(now, [TIP], NOTHING)
         box.advance(now + AFTER + 1)
     assert len(saved(box)) == len(list(tmp_path.iterdir())) == 3
 
@@ -164,7 +178,7 @@ from pathlib import Path
 from nodes.test_black_box import *
 box, now = box_in(Path(sys.argv[1])), START + 40 * SECOND
 feed(box, START, now)
-box.alert(now, TIP, NOTHING)
+box.alerts(now, [TIP], NOTHING)
 while not box.saved:
     time.sleep(0.01)
 print('raised', flush=True)

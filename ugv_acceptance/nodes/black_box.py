@@ -6,7 +6,7 @@ once, what follows is written as it comes: a process that is killed later loses 
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
@@ -94,17 +94,19 @@ class BlackBox:
         if self._queue is not None and now <= self._until:
             self._queue.put((now, name, data))
 
-    def alert(self, now: int, alert: Alert, summary: bytes) -> None:
-        """Take an alert that was raised: a critical one starts a recording, or prolongs it.
+    def alerts(self, now: int, raised: Sequence[Alert], summary: bytes) -> None:
+        """Take a message of the channel `alerts`, and the alerts that were raised in it.
 
-        `summary` is the alert list, a message of the channel `alerts`.
+        A critical one starts a recording, or prolongs it. Who acknowledged what is kept as well.
         """
-        if self.folder is None or not is_critical(alert):
+        if self.folder is None:
             return
-        self._until = now + AFTER
+        critical = [alert for alert in raised if is_critical(alert)]
+        if critical:
+            self._until = now + AFTER
         self.keep(now, 'alerts', summary)
-        if self._queue is None and len(self._threads) < self.most:
-            self._begin(self.folder, now, alert)
+        if critical and self._queue is None and len(self._threads) < self.most:
+            self._begin(self.folder, now, critical[0])
 
     def advance(self, now: int) -> None:
         """Let time pass: end a recording that is long enough, tell what went wrong."""

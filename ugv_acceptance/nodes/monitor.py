@@ -223,10 +223,11 @@ class Monitor(LifecycleNode):
             return
         statuses = [alert_status(change, session) for change in changes]
         message = self.output.alerts(statuses)
-        for change, status in zip(changes, statuses, strict=True):
+        for status in statuses:
             self.listener('alert', status)
-            if self._box is not None and change.how == 'raised':
-                self._box.alert(session.clock.now(), change.alert, serialize_message(message))
+        if self._box is not None:
+            raised = [change.alert for change in changes if change.how == 'raised']
+            self._box.alerts(session.clock.now(), raised, serialize_message(message))
 
     # Services and parameters
 
