@@ -81,6 +81,26 @@ def test_failure_terminated_bounds_are_those_of_the_gamma_time(
     assert stats.gamma.cdf(100.0, failures, scale=found.high) == pytest.approx(tail)
 
 
+@pytest.mark.parametrize(
+    ('by_failure', 'low'), [(False, 9.512001136498702), (True, 10.924760161528141)]
+)
+def test_bounds_are_those_of_the_package_reliability(by_failure: bool, low: float) -> None:  # noqa: FBT001
+    """5 failures in 100 h at 90 %, both sides, by its `reliability_test_planner` (0.9.0).
+
+    Its numbers, not itself: it needs NumPy 2.2, and Jazzy has 1.26.
+    """
+    found = mtbf(100.0, 5, 0.9, failure_terminated=by_failure)
+    assert found.low == pytest.approx(low, rel=1e-12)
+
+
+def test_hours_with_failures_are_those_of_the_package_reliability() -> None:
+    """96 h at 80 % with 3 failures, and 29 of 30 at 80 %, by reliability 0.9.0."""
+    assert hours_to_demonstrate(96.0, 3, 0.8) == pytest.approx(529.4443886545492, rel=1e-12)
+    found = proportion(29, 30, 0.8)
+    expected = (0.8764300093247439, 0.9964941427304151)
+    assert (found.low, found.high) == pytest.approx(expected, rel=1e-12)
+
+
 def test_without_failure_nothing_bounds_the_mtbf_from_above() -> None:
     """No failure: no point value, an infinite upper bound."""
     found = mtbf(10.0, 0, 0.8)

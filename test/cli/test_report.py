@@ -316,6 +316,31 @@ def test_a_proposed_file_is_met_by_its_own_run(tmp_path: Path) -> None:
     assert run(EVALUATE, bad, '--criteria', proposed).exit_code == 1
 
 
+def test_the_documented_criteria_judge_the_bad_run(tmp_path: Path, repository: Path) -> None:
+    """The example of docs/criteria.md, every kind in it, from the file to the verdicts."""
+    text = (repository / 'docs' / 'criteria.md').read_text('utf-8')
+    site, out, page = (tmp_path / name for name in ('site.yaml', 'r.json', 'r.html'))
+    site.write_text(text.split('```yaml\n')[1].split('```')[0], 'utf-8')
+    bag = SHIPPED / 'packbot_fail'
+    done = run(EVALUATE, bag, '--criteria', site, '--json', out, '--report', page)
+    assert done.exit_code == 1
+    result = json.loads(out.read_text('utf-8'))
+    results = result['criteria']['results']
+    assert {c['name']: c['verdict'] for c in results} == {
+        'shoulder torque': 'FAIL',
+        'tilt left while the arm reaches out': 'PASS',
+        'arm was out': 'PASS',
+        'nothing went wrong': 'FAIL',
+        'joint states came': 'PASS',
+        'enough of the map': 'PASS',
+    }
+    words = ' '.join(' '.join(page_of(page).text).split())
+    assert 'SPEC-12 3.2.1' in words
+    # The arm starts beyond its 75 degrees and stays within them from then on.
+    [[_, out_at]] = results[2]['measured']['first_violations_s']
+    assert f'kept for {result["coverage"]["duration_s"] - out_at:.2f} s' in words
+
+
 def test_nothing_is_proposed_from_a_bad_run(tmp_path: Path) -> None:
     """The verdict stands, no file is written, and one line says why."""
     proposed = tmp_path / 'site.yaml'

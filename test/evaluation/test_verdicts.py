@@ -1,6 +1,7 @@
 """What becomes of a criterion: PASS, FAIL and INCONCLUSIVE, each for its reason."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -76,9 +77,10 @@ def outcome(
     end: int = T0 + 2 * S,
     window: Window | None = None,
     method: str = 'rss',
+    own: str | None = None,
 ) -> Any:
     """Return what becomes of one criterion."""
-    criterion = Criterion('it', demand, window=window)
+    criterion = Criterion('it', demand, window=window, uncertainty=own)
     criteria = CriteriaSet('set', 1, (criterion,), '', 'a.yaml', uncertainty=method)
     return judged(criteria, messages, end, sources)['criteria']['results'][0]
 
@@ -147,20 +149,73 @@ def test_a_violation_fails_also_where_data_are_missing() -> None:
     assert outcome(TORQUE, moving(), window=(1.0, 4.0))['verdict'] == 'FAIL'
 
 
+def test_how_much_has_to_be_evaluated_is_for_the_criteria_to_say() -> None:
+    """A third of the window is enough for who asks for no more."""
+    criterion = Criterion('it', replace(TORQUE, limit=44.0), window=(1.0, 4.0))
+    criteria = CriteriaSet('set', 1, (criterion,), '', 'a.yaml', coverage=0.3)
+    assert judged(criteria, moving(), T0 + 2 * S)['verdict'] == 'PASS'
+
+
+def test_a_failure_shows_the_worst_moment_the_first_and_the_alerts_about_it() -> None:
+    """Reaching out from 0.5 s is too much from 0.5 s on, and a warning from 0.6 s on."""
+    found = outcome(replace(TORQUE, limit=42.0), loaded())
+    measured = found['measured']
+    assert measured['worst_of'] == 'lift'
+    assert 0.5 <= measured['at_s'] < 1.5
+    assert measured['moment']['joints']['slide']['position'] == pytest.approx(0.2)
+    assert measured['first_violations_s'][0] == pytest.approx([0.5, 1.5], abs=0.03)
+    assert [line.split(' from')[0] for line in found['evidence']] == ['WARN TORQUE_LIMIT']
+
+
+def test_a_dwell_that_was_too_short_says_how_long_it_was() -> None:
+    """Up from 0.8 s to 1.2 s where 1.2 s were asked for."""
+    found = outcome(replace(TORQUE, dwell=1.2), moving((0.8, 1.2, UP)))
+    assert found['measured']['longest_kept_s'] == pytest.approx(0.4, abs=0.03)
+    assert re.match(r'it: kept for 0\.\d+ s; needed: ', found['reason'])
+
+
+def test_a_run_is_the_worst_of_its_criteria() -> None:
+    """FAIL before INCONCLUSIVE before PASS, with the reasons of that verdict."""
+    met = Criterion('met', replace(TORQUE, limit=44.0))
+    unknown = Criterion('unknown', DataDemand('rate', 'imu', least=1.0))
+    broken = Criterion('broken', AlertDemand(raised=True, code='TIP_OVER'))
+    for several, verdict, name in (
+        ((met, unknown), 'INCONCLUSIVE', 'unknown'),
+        ((met, unknown, broken), 'FAIL', 'broken'),
+    ):
+        found = judged(CriteriaSet('set', 1, several, '', 'a.yaml'), moving(), T0 + 2 * S)
+        assert found['verdict'] == verdict
+        assert [reason.split(':')[0] for reason in found['reasons']] == [name]
+
+
 MASS = Source('arm.mass_kg', 'arm', 'mass', 0.4)
 
 
 @pytest.mark.parametrize(
     ('limit', 'method', 'verdict'),
-    [(42.0, 'rss', 'INCONCLUSIVE'), (42.0, 'ignored', 'PASS'), (43.0, 'rss', 'PASS')],
+    [
+        (40.0, 'rss', 'FAIL'),
+        (42.0, 'rss', 'INCONCLUSIVE'),
+        (42.0, 'ignored', 'PASS'),
+        (43.0, 'rss', 'PASS'),
+    ],
 )
 def test_a_pass_within_its_uncertainty_is_inconclusive(
     limit: float, method: str, verdict: str
 ) -> None:
-    """0.4 kg at half a metre are 1.96 N m: 40.7 of 42 is within, of 43 beyond; unless ignored."""
+    """0.4 kg at half a metre are 1.96 N m: 40.7 of 42 is within, of 43 beyond; unless ignored.
+
+    A violation stays one within its uncertainty.
+    """
     found = outcome(replace(TORQUE, limit=limit), moving(), [MASS], method=method)
     assert found['measured']['uncertainty']['bound'] == pytest.approx(0.4 * 9.81 * 0.5, rel=1e-6)
     assert found['verdict'] == verdict
+
+
+def test_a_criterion_may_ignore_the_uncertainty_for_itself() -> None:
+    """Its own word comes before the file's."""
+    found = outcome(replace(TORQUE, limit=42.0), moving(), [MASS], own='ignored')
+    assert found['verdict'] == 'PASS'
 
 
 @pytest.mark.parametrize(('method', 'verdict'), [('rss', 'PASS'), ('worst_case', 'INCONCLUSIVE')])
@@ -212,6 +267,7 @@ def test_alerts_are_expected_and_forbidden_in_windows(
         (DataDemand('rate', 'joint_states', least=45.0), 'PASS'),
         (DataDemand('rate', least=45.0), 'INCONCLUSIVE'),
         (DataDemand('longest_gap', most=0.1), 'PASS'),
+        (DataDemand('rate', 'joint_states', least=40.0, most=45.0), 'INCONCLUSIVE'),
     ],
     ids=str,
 )

@@ -76,7 +76,10 @@ def acceptance_page(
 
 def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = run_chart(strips, result, settings)
-    caption = 'The whole run: the worst of each stretch of time.'
+    caption = (
+        'The whole run: the worst of each stretch of time. Solid line: limit; dotted line: warning '
+        'limit; dotted grey: no input. Bars are alerts: plain WARN, hatched ERROR, dotted STALE.'
+    )
     return Picture(svg_of(made, 'run'), caption) if made else None
 
 

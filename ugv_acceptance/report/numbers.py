@@ -4,11 +4,16 @@ from typing import Any
 
 Json = dict[str, Any]
 DASH = '\N{EN DASH}'
+# Numbers of the data that are shares of a whole.
+SHARES = ('coverage', 'protected')
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
     """Return a number with its unit; a dash where there is none."""
-    return DASH if value is None else f'{value:.{digits}f} {unit}'.strip()
+    if value is None:
+        return DASH
+    # Adding 0.0 takes the sign off a rounded zero.
+    return f'{round(value, digits) + 0.0:.{digits}f} {unit}'.strip()
 
 
 def seconds_text(value: float | None) -> str:
@@ -30,7 +35,8 @@ def worst_text(measured: Json) -> str:
         return _in_unit(measured['worst'], measured)
     if 'values' in measured:
         pairs = measured['values'].items()
-        texts = (DASH if x is None else f'{x:.4g}' for _, x in pairs)
+        share = measured['quantity'] in SHARES
+        texts = (DASH if x is None else f'{x:.1%}' if share else f'{x:.4g}' for _, x in pairs)
         named = zip(measured['values'], texts, strict=True)
         several = len(measured['values']) > 1
         joined = ', '.join(f'{name} {text}' if several else text for name, text in named)
@@ -42,9 +48,9 @@ def worst_text(measured: Json) -> str:
 
 
 def limit_text(measured: Json) -> str:
-    """Return the limit of a value; empty for other criteria."""
+    """Return the limit of a value; a dash for other criteria, whose demand is a sentence."""
     if 'signal' not in measured:
-        return ''
+        return DASH
     return f'{measured["must_be"]} {_in_unit(measured["limit"], measured)}'
 
 

@@ -18,7 +18,7 @@ Json = dict[str, Any]
 # Colour-blind safe, and told apart by dashes as well.
 LINES = (('#0072b2', '-'), ('#d55e00', '--'), ('#009e73', '-.'), ('#cc79a7', ':'), ('#56b4e9', '-'))
 ALERT_COLOURS = {'WARN': '#e69f00', 'ERROR': '#d55e00', 'STALE': '#7f7f7f'}
-ALERT_HATCHES = {'WARN': '', 'ERROR': '////', 'STALE': '....'}
+ALERT_HATCHES = {'WARN': '', 'ERROR': '////', 'STALE': '..'}
 # Points drawn; more are thinned to the worst of each stretch.
 MOST_POINTS = 1500
 
@@ -101,7 +101,7 @@ def _shade_unknown(axes: Axes, result: Json, end: float) -> None:
         for first, last in result['inputs'][key]['first_gaps_s']:
             if first <= end:
                 axes.axvspan(
-                    first, last, facecolor='#dddddd', edgecolor='#999999', hatch='....', lw=0.0
+                    first, last, facecolor='#dddddd', edgecolor='#999999', hatch='..', lw=0.0
                 )
 
 
