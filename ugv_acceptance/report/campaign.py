@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ugv_acceptance.report.numbers import number_text
 from ugv_acceptance.report.regions import figure, svg_of
@@ -68,6 +69,7 @@ def trend_figure(said: Json) -> Figure | None:
         axes.plot(grid, law['scale'] * grid ** law['beta'], '--', color='#0b57a4', label=text)
     axes.set(xlabel='judged operating time (h)', ylabel='failures so far', xlim=(0.0, hours))
     axes.set_ylim(bottom=0.0)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(visible=True, linewidth=0.3)
     axes.legend(loc='upper left')
     return made
