@@ -164,7 +164,7 @@ def test_a_report_ends_on_the_criteria_and_never_says_safe(
 
 @each_run
 def test_a_report_says_what_the_result_says(papers: Path, name: str) -> None:
-    """Verdict, hashes, reasons and every criterion; what was not entered is marked."""
+    """Verdict, hashes and every criterion; what was not entered is marked; no zero is negative."""
     result = result_of(papers, name)
     page = (papers / f'{name}.html').read_text('utf-8')
     for sha in (result['bag']['sha256'], result['robot']['sha256'], result['criteria']['sha256']):
@@ -174,6 +174,7 @@ def test_a_report_says_what_the_result_says(papers: Path, name: str) -> None:
     assert page.count('not entered') >= 8
     for criterion in result['criteria']['results']:
         assert criterion['name'] in page
+    assert not re.search(r'-0\.0+\b(?![.\d])', ' '.join(page_of(papers / f'{name}.html').text))
 
 
 def hostile_run(folder: Path) -> tuple[Path, Path]:

@@ -70,4 +70,4 @@ def interval_text(found: Json | None, unit: str = '') -> str:
 
 def _short(value: float) -> str:
     """Return a number of two places after the point, or three digits of a large one."""
-    return f'{value:.2f}' if abs(value) < 100.0 else f'{value:.3g}'
+    return number_text(value, 2) if abs(value) < 100.0 else f'{value:.3g}'
