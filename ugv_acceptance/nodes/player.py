@@ -29,6 +29,8 @@ DISCOVERY = 3.0
 # Seconds until a subscriber that we know of knows of us too, and until it has what was on its way.
 SETTLING = 0.7
 _NS = 1_000_000_000
+# The last moment (ns) that a stamp can tell.
+_LAST = 2**31 * _NS - 1
 # Seconds between two messages on /clock.
 _CLOCK_STEP = 0.01
 
@@ -129,10 +131,13 @@ class Player:
 
 
 def restamped(data: bytes, shift: int) -> bytes:
-    """Return a serialised message that begins with a Header, its stamp moved by `shift` (ns)."""
+    """Return a serialised message that begins with a Header, its stamp moved by `shift` (ns).
+
+    A stamp cannot be before 1970 or after 2038.
+    """
     order = '<' if data[1] & 1 else '>'
     sec, nanosec = struct.unpack_from(f'{order}iI', data, 4)
-    moved = max(sec * _NS + nanosec + shift, 0)
+    moved = min(max(sec * _NS + nanosec + shift, 0), _LAST)
     return data[:4] + struct.pack(f'{order}iI', moved // _NS, moved % _NS) + data[12:]
 
 
