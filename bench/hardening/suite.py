@@ -45,7 +45,7 @@ def branches(_share: float) -> Iterable[Outcome]:
     if find_spec('pytest_cov') is None:
         yield Outcome('needs pytest-cov, which is not installed', None)
         return
-    yield passed(['.'], '', '--cov', '--cov-report=', '-n', '2', '--ignore-glob=*test_page_of_*')
+    yield passed(['.'], '', '--cov', '--cov-report=', '-n', '3', '--ignore-glob=*test_page_of_*')
     for room in sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py')):
         yield _covered(room)
 
