@@ -120,11 +120,7 @@ class Page:
     def click(self, selector: str) -> None:
         """Press the middle of an element with the mouse, as a person does."""
         where = json.dumps(selector)
-        self.run(f'document.querySelector({where}).scrollIntoView({{block: "center"}})')
-        box = self.run(
-            f'(() => {{ const b = document.querySelector({where}).getBoundingClientRect();'
-            ' return [b.x + b.width / 2, b.y + b.height / 2]; })()'
-        )
+        box = self._middle(where)
         for kind in ('mousePressed', 'mouseReleased'):
             self.call(
                 'Input.dispatchMouseEvent',
@@ -134,6 +130,19 @@ class Page:
                 button='left',
                 clickCount=1,
             )
+
+    def _middle(self, where: str) -> list[float]:
+        """Return the middle of an element once it stands still: a list above it may just grow."""
+        look = (
+            f'(() => {{ const e = document.querySelector({where});'
+            ' e.scrollIntoView({block: "center"}); const b = e.getBoundingClientRect();'
+            ' return [b.x + b.width / 2, b.y + b.height / 2]; })()'
+        )
+        before: list[float] = []
+        while before != (box := self.run(look)):
+            before = box
+            time.sleep(0.1)
+        return before
 
     def key(self, name: str) -> None:
         """Press a key."""

@@ -187,7 +187,7 @@ def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
     middle = [sum(p[k] for p in points) / len(points) for k in range(2)]
     way = [place[k] - middle[k] for k in range(2)]
     furthest: Any = 0.0
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         for a, b in combinations(points, 2):
             edge, start = ([b[k] - a[k] for k in range(2)], [a[k] - middle[k] for k in range(2)])
             across = np.float64(1.0) * (way[0] * edge[1] - way[1] * edge[0])

@@ -175,8 +175,7 @@ class Monitor(LifecycleNode):
     # Time
 
     def _on_tick(self) -> None:
-        session = self.session
-        if session is None:
+        if (session := self.session) is None:
             return
         if session.clock.simulated:
             session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
@@ -225,8 +224,8 @@ class Monitor(LifecycleNode):
         message = self.output.alerts(statuses)
         for status in statuses:
             self.listener('alert', status)
+        raised = [change.alert for change in changes if change.how == 'raised']
         if self._box is not None:
-            raised = [change.alert for change in changes if change.how == 'raised']
             self._box.alerts(session.clock.now(), raised, serialize_message(message))
 
     # Services and parameters
