@@ -96,7 +96,7 @@ lint: venv
 endif
 
 pytest: venv
-	.venv/bin/python -m pytest -n $(JOBS) $(ARGS)
+	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal $(ARGS)
 
 colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
 
@@ -111,13 +111,13 @@ colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure \
-	    --pytest-args -n $(JOBS) $(ONCE) $(ARGS)
+	    --pytest-args -n $(JOBS) --dist worksteal $(ONCE) $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
 versions: $(foreach version,$(VERSIONS),.venv$(subst .,,$(version))/.installed)
 	failed=0; for version in $(VERSIONS); do \
-	    ".venv$${version/./}/bin/python" -m pytest -n $(JOBS) '--ignore-glob=*test_page_of_*' $(ARGS) || failed=1; \
+	    ".venv$${version/./}/bin/python" -m pytest -n $(JOBS) --dist worksteal '--ignore-glob=*test_page_of_*' $(ARGS) || failed=1; \
 	done; exit $$failed
 
 hardening: venv
