@@ -7,7 +7,7 @@ stream are judged by the same columns: the live one whenever time passes (`judge
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts import Signal, feed
 from ugv_acceptance.evaluation.prediction import time_to
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
-
-if TYPE_CHECKING:
-    from ugv_acceptance.evaluation.rows import MarginRows
 
 SignalOf = Callable[[str, str, tuple[float, float], float], Signal]
 Floats = NDArray[np.float64]
@@ -94,7 +92,7 @@ class Foresight:
             self._waiting.clear()
             self._judge(np.array(time, np.int64), np.array(rows, np.float64), np.array(limit))
 
-    def rows(self, rows: 'MarginRows', limit: Sequence[float]) -> None:
+    def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
         """Take the next stretch of a recording."""
         at = np.flatnonzero(rows.known)
         cell = rows.time[at] // SPACING

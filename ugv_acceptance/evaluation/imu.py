@@ -10,7 +10,6 @@ property test holds that both give the same rows.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +25,6 @@ from ugv_acceptance.model.attitude import (
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
 from ugv_acceptance.model.rows import Values
-
-if TYPE_CHECKING:
-    from ugv_acceptance.evaluation.watch import AttitudeSignals
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -57,6 +53,16 @@ class ImuRows:
     unusable: NDArray[np.bool_]
 
 
+@dataclass(frozen=True, slots=True)
+class AttitudeSignals:
+    """What is watched of the way to gravity: where the IMU sits, what it says, what contradicts."""
+
+    frame: Signal
+    orientation: Signal
+    strange: Signal
+    disagreement: Signal
+
+
 @dataclass(slots=True)
 class ImuTracker:
     """The smooth acceleration, and the faults of what messages say about the attitude.
@@ -66,7 +72,7 @@ class ImuTracker:
     """
 
     settings: Settings
-    faults: 'AttitudeSignals'
+    faults: AttitudeSignals
     low_pass: LowPass = field(init=False)
     taken: list[int] = field(default_factory=lambda: [0, 0, 0])
     _frame: str | None = None

@@ -1,15 +1,13 @@
 """The rules of an evaluation and their signals: what is watched, live and in a recording alike."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from ugv_acceptance.evaluation.alerts import ERROR, STALE, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.foresight import Foresight, foresight_of
+from ugv_acceptance.evaluation.imu import AttitudeSignals
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
-
-if TYPE_CHECKING:
-    from ugv_acceptance.evaluation.rows import MarginRows
 
 # Alerts of level ERROR with these codes are failures of the robot; all others are of the input.
 FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
@@ -37,7 +35,7 @@ class Watch:
     payload: Signal = field(init=False)
     missing: Signal = field(init=False)
     leaps: list[Signal] = field(init=False)
-    attitude: 'AttitudeSignals' = field(init=False)
+    attitude: AttitudeSignals = field(init=False)
     foresight: Foresight = field(init=False)
     slide: Signal = field(init=False)
 
@@ -73,7 +71,7 @@ class Watch:
         """Judge what live samples gave the foresight; before time passes."""
         self.foresight.judge(self.settings.limits.torque)
 
-    def foresee_rows(self, rows: 'MarginRows') -> None:
+    def foresee_rows(self, rows: MarginRows) -> None:
         """Judge what a stretch of a recording gives the foresight."""
         self.foresight.rows(rows, self.settings.limits.torque)
 
@@ -113,7 +111,7 @@ class Watch:
         delay = self.settings.delays.fault_on
         return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
 
-    def _attitude(self) -> 'AttitudeSignals':
+    def _attitude(self) -> AttitudeSignals:
         imu = self.settings.imu
         delay = imu.agreement_delay
         apart = (imu.agreement, imu.agreement / 2)
@@ -164,13 +162,3 @@ class InputSignals:
     stale: Signal
     invalid: Signal
     clock: Signal
-
-
-@dataclass(frozen=True, slots=True)
-class AttitudeSignals:
-    """What is watched of the way to gravity: where the IMU sits, what it says, what contradicts."""
-
-    frame: Signal
-    orientation: Signal
-    strange: Signal
-    disagreement: Signal
