@@ -102,13 +102,11 @@ def test_what_is_over_stays_until_it_is_seen(shown: Page, robot: Live) -> None:
     robot.pose(*STRETCHED)
     shown.wait(f'{LEVEL} === "ERROR"')
     robot.pose(*FOLDED)
-    shown.wait(f'{LEVEL} === "WARN"')
-    assert shown.text('#cause').startswith('over, not acknowledged')
+    shown.wait(f'{CAUSE}.startsWith("over, not acknowledged")')
+    assert shown.run(LEVEL) == 'WARN'
     shown.wait('!document.getElementById("acknowledge-all").disabled')
     shown.click('#acknowledge-all')
-    shown.wait(
-        'document.getElementById("cause").textContent.startsWith("over, latched until reset")'
-    )
+    shown.wait(f'{CAUSE}.startsWith("over, latched until reset")')
     shown.click('#alerts button[data-deed="reset"]')
     shown.wait(f'{LEVEL} === "OK"')
 
