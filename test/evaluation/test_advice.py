@@ -38,7 +38,7 @@ def test_an_arm_stretched_forward_is_raised() -> None:
     assert first.subject == 'elbow_joint'
     assert first.margin == 'front'
     assert first.sentence.startswith('raise the elbow by ')
-    assert 'deg of tilt to the front in ' in first.sentence
+    assert 'deg further from tipping to the front, in ' in first.sentence
 
 
 def test_a_load_too_heavy_for_a_joint_is_told_in_kg() -> None:

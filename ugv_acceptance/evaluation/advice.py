@@ -213,7 +213,7 @@ def _moves(case: _Case) -> Iterator[Advice]:
             kind, words = 'turn', turn_words(amount, path.gravity[k])
         else:
             kind, words = 'joint', joint_words(case.settings.robot, path, k, case.payload)
-        sentence = f'{words}: {_gain_words(case, gain)} in {seconds:.1f} s'
+        sentence = f'{words}: {_gain_words(case, gain)}, in {seconds:.1f} s'
         yield Advice(kind, path.subject, amount, seconds, case.subject, gain, enough, sentence)
 
 
@@ -243,6 +243,6 @@ def _holds(case: _Case) -> float:
 
 def _gain_words(case: _Case, gain: float) -> str:
     if case.tips:
-        return f'+{math.degrees(gain):.0f} deg of tilt to the {case.subject}'
+        return f'{math.degrees(gain):.0f} deg further from tipping to the {case.subject}'
     unit = 'N' if case.settings.robot.joint(case.subject).kind == 'prismatic' else 'N m'
     return f'{gain:.0f} {unit} less on the {case.subject.removesuffix("_joint")}'
