@@ -1,4 +1,4 @@
-"""What a person has seen of an alert, held to a model of plain flags; and the rates of EEMUA 191.
+"""What a person has seen of an alert, held to a model of plain flags.
 
 UGV_ACCEPTANCE_ALARM_STEPS makes the run of random events longer.
 """
@@ -8,13 +8,20 @@ import random
 from dataclasses import dataclass, field
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.evaluation.alarm_rates import WINDOW, alarm_rates
-from ugv_acceptance.evaluation.alarms import LONGEST_SHELVING, Alarms, Change, Key, State, key_of
+from ugv_acceptance.evaluation.alarms import (
+    LONGEST_SHELVING,
+    Alarms,
+    Change,
+    Key,
+    State,
+    key_of,
+    latches,
+)
 from ugv_acceptance.evaluation.alerts import ERROR, STALE, WARN, Alert, Rule
 
 SECOND = 1_000_000_000
@@ -241,25 +248,93 @@ def test_the_shelf_ends_by_itself_at_its_time() -> None:
     assert (change.how, change.time) == ('unshelved', 60 * SECOND)
 
 
-@given(st.lists(st.integers(0, 6 * WINDOW), max_size=80))
-def test_the_peak_is_that_of_all_windows(starts: list[int]) -> None:
-    """No ten minutes that end with an alert hold more than the peak, and one holds as many."""
-    counts = [sum(t - WINDOW < s <= t for s in starts) for t in starts]
-    assert alarm_rates(starts, 0, 6 * WINDOW).peak == max(counts, default=0)
+@pytest.mark.parametrize('length', [1, 600 * SECOND])
+def test_a_warning_is_shelved_for_at_most_ten_minutes(length: int) -> None:
+    """The longest time itself is allowed, and it ends just then."""
+    alarms = Alarms()
+    raised(alarms, 4)
+    (change,) = alarms.shelve(7, CLOCK, length, 'Ada', 'known')
+    assert (change.how, change.time, change.who, change.note) == ('shelved', 7, 'Ada', 'known')
+    assert change.state is State.ACTIVE_UNACKNOWLEDGED
+    assert alarms.advance(6 + length) == []
+    assert alarms.shelved(CLOCK)
+    assert len(alarms.advance(7 + length)) == 1
+    assert not alarms.shelved(CLOCK)
 
 
-@given(st.lists(st.integers(0, 3 * WINDOW), max_size=80))
-def test_there_is_a_flood_just_where_more_than_ten_come_in_ten_minutes(starts: list[int]) -> None:
-    """A flood begins above ten in ten minutes, lasts while five are left, and never overlaps."""
-    rates = alarm_rates(starts, 0, 10 * WINDOW)
-    assert bool(rates.floods) is (rates.peak > 10)
-    for begin, end in rates.floods:
-        assert sum(begin - WINDOW < s <= begin for s in starts) > 10
-        assert sum(end - WINDOW < s <= end for s in starts) < 5
+@pytest.mark.parametrize(
+    ('length', 'got'), [(0, '0 s'), (-SECOND, '-1 s'), (601 * SECOND, '601 s')]
+)
+def test_shelving_for_no_time_or_too_long_is_refused(length: int, got: str) -> None:
+    """The message says what is allowed and what came, in seconds."""
+    alarms = Alarms()
+    raised(alarms, 4)
+    expected = f'^shelve: expected above 0 and at most 600 s, got {got}$'
+    with pytest.raises(AcceptanceError, match=expected):
+        alarms.shelve(0, CLOCK, length, 'Ada')
+    assert not alarms.shelved(CLOCK)
 
 
-def test_an_hour_with_six_alerts_is_manageable() -> None:
-    """One in ten minutes on average; the seventh is one too many."""
-    starts = [k * WINDOW for k in range(6)]
-    assert alarm_rates(starts, 0, 6 * WINDOW).manageable
-    assert not alarm_rates([*starts, 5], 0, 6 * WINDOW).manageable
+def test_what_is_not_known_cannot_be_shelved() -> None:
+    """The message names the code and the subject."""
+    with pytest.raises(
+        AcceptanceError, match=r"^shelve: expected a known alarm, got 'CLOCK' of 'imu'$"
+    ):
+        Alarms().shelve(0, CLOCK, SECOND, 'Ada')
+    assert Alarms().unshelve(0, CLOCK) == []
+
+
+def test_shelves_end_in_the_order_of_their_times() -> None:
+    """Whatever the order in which they were put there."""
+    alarms = Alarms()
+    raised(alarms, 1)
+    raised(alarms, 4)
+    alarms.shelve(0, TIP_WARN, 9 * SECOND, 'Ada')
+    alarms.shelve(0, CLOCK, 5 * SECOND, 'Ada')
+    over = [(key_of(c.alert.rule), c.time) for c in alarms.advance(20 * SECOND)]
+    assert over == [(CLOCK, 5 * SECOND), (TIP_WARN, 9 * SECOND)]
+
+
+@pytest.mark.parametrize(
+    ('state', 'active', 'unseen'),
+    [
+        (State.NORMAL, False, False),
+        (State.ACTIVE_UNACKNOWLEDGED, True, True),
+        (State.ACTIVE_ACKNOWLEDGED, True, False),
+        (State.RETURNED_UNACKNOWLEDGED, False, True),
+        (State.LATCHED, False, False),
+    ],
+)
+def test_a_state_says_what_is_active_and_what_was_seen(
+    state: State, *, active: bool, unseen: bool
+) -> None:
+    """The five states of ISA-18.2 that are known here."""
+    assert (state.active, state.unseen) == (active, unseen)
+
+
+@pytest.mark.parametrize(
+    ('code', 'level', 'latched'),
+    [
+        ('TIP_OVER', ERROR, True), ('NO_SUPPORT', ERROR, True), ('TIP_OVER', WARN, False),
+        ('TORQUE_LIMIT', ERROR, False), ('NO_SUPPORT', STALE, False),
+    ],
+)  # fmt: skip
+def test_only_a_robot_that_may_lie_on_its_side_latches(
+    code: str, level: int, *, latched: bool
+) -> None:
+    """Tip-over and no support, where they are critical."""
+    assert latches(Rule(code, 'front', level, 1.0, 0.5, 0, 0)) is latched
+
+
+def test_an_alarm_that_is_over_and_seen_is_forgotten_unless_it_is_shelved() -> None:
+    """The table holds no alarm that is normal, except on the shelf."""
+    alarms = Alarms()
+    alert = raised(alarms, 4)
+    alarms.shelve(0, CLOCK, 60 * SECOND, 'Ada')
+    alarms.acknowledge(1, 'Ada')
+    alarms.cleared(2, alert)
+    assert alarms.state(CLOCK) is State.NORMAL
+    assert CLOCK in alarms.table
+    (change,) = alarms.unshelve(3, CLOCK, 'Eve')
+    assert (change.how, change.who, change.time) == ('unshelved', 'Eve', 3)
+    assert CLOCK not in alarms.table
