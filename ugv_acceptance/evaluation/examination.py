@@ -89,7 +89,7 @@ class ValueMeasure:
         if self._last is None:
             return
         time, until, value = self._last
-        one = np.array([time]), np.array([max(time, min(until, now))]), np.array([value])
+        one = np.array([time]), np.array([min(until, now)]), np.array([value])
         self._spend(*one)
         self._last = None
 
