@@ -95,6 +95,17 @@ def test_metadata_is_of_version_9(tmp_path: Path) -> None:
     assert topic['topic_metadata']['offered_qos_profiles'][0]['reliability'] == 'best_effort'
 
 
+def test_metadata_is_written_beside_and_renamed(tmp_path: Path) -> None:
+    """What was there under another name stays as it was: no moment has half a metadata.yaml."""
+    with BagWriter(tmp_path / 'bag'):
+        old = tmp_path / 'bag' / 'metadata.yaml'
+        old.write_text('old')
+        (tmp_path / 'kept').hardlink_to(old)
+    assert (tmp_path / 'kept').read_text() == 'old'
+    assert yaml.safe_load(old.read_text())['rosbag2_bagfile_information']['version'] == 9
+    assert sorted(p.name for p in old.parent.iterdir()) == ['bag_0.mcap', 'metadata.yaml']
+
+
 def test_half_a_second_ends_a_chunk(tmp_path: Path) -> None:
     """Messages are handed to the system at least every half second of log time."""
     with BagWriter(tmp_path / 'bag') as writer:

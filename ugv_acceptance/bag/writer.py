@@ -13,6 +13,7 @@ from rosbags.typesys.store import Typestore
 from ugv_acceptance import BadBag, BadSample, __version__
 from ugv_acceptance.bag.mcap_writer import Compression, McapWriter
 from ugv_acceptance.bag.metadata import NAME
+from ugv_acceptance.bag.result import write_text
 
 _NS = 1_000_000_000
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
@@ -107,7 +108,7 @@ class BagWriter:
         self._mcap.end_chunk()
 
     def close(self) -> None:
-        """Finish the file and write metadata.yaml; more calls do nothing."""
+        """Finish the file and write metadata.yaml, whole or not at all; more calls do nothing."""
         if self._file.closed:
             return
         try:
@@ -115,7 +116,7 @@ class BagWriter:
         finally:
             self._file.close()
         text = yaml.safe_dump({'rosbag2_bagfile_information': self._metadata()}, sort_keys=False)
-        (self.directory / NAME).write_text(text)
+        write_text(self.directory / NAME, text)
 
     def _metadata(self) -> dict[str, Any]:
         first, last = self._mcap.span()
