@@ -152,3 +152,136 @@ def test_a_load_that_is_light_is_not_spoken_of() -> None:
         assert 'payload' not in kinds
     heavier = advise(TOLD, (0.0, 0.0), DOWN, Payload(0.5, (0.1, 0.0, 0.0)), of='lift')
     assert 'payload' in [a.kind for a in heavier]
+
+
+@pytest.mark.parametrize(
+    ('of', 'worst', 'enough'),
+    [
+        ('front', 0, 1.0 + 0.02 / 0.2),  # the deadband of tilt beside 0.2 rad of span
+        ('right', 3, 1.0 + 0.02 / 0.2),
+        ('lift', 4, 1.0 + 2.0 / 40.0 / 0.2),  # 2 N m beside a fifth of 40
+    ],
+)
+def test_enough_is_beyond_the_deadband_of_the_warning(of: str, worst: int, enough: float) -> None:
+    """Else the alert would stay."""
+    found = advice._case_of(TOLD, (0.0, 0.0), DOWN, Payload(), of)
+    assert found is not None
+    assert (found.worst, found.subject, found.tips) == (worst, of, worst < 4)
+    assert found.enough == pytest.approx(enough + SLACK, abs=1e-9)
+    assert found.enough > enough
+
+
+def test_a_robot_that_stands_on_nothing_gets_no_advice() -> None:
+    """Without contact points no margin is known, whatever the torque."""
+    floating = replace(TOLD, robot=replace(TOLD.robot, contacts=()))
+    assert advise(floating, (0.0, 0.0), DOWN, Payload(9.0), of='lift') == ()
+    assert advise(TOLD, (0.0, 0.0), DOWN, Payload(9.0), of='lift') != ()
+
+
+def at_level(mass: float) -> tuple[float, float]:
+    """Return the lift's share of 40 N m, and the tilt left to the front, of the level arm."""
+    found = margins(TOLD.robot, np.zeros(2), DOWN, Payload(mass, (0.1, 0.0, 0.0)))
+    return float(np.abs(found.torque[0]) / 40.0), float(found.angle[0])
+
+
+def test_a_margin_at_its_warning_limit_needs_no_advice() -> None:
+    """WARN begins below it; one digit more of load, and there is some."""
+    use, _ = at_level(1.0)
+    load = Payload(1.0, (0.1, 0.0, 0.0))
+    for warn, quiet in ((use, True), (math.nextafter(use, 0.0), False)):
+        limits = replace(LIMITS, torque_warn=warn, torque_error=2.0)
+        found = advise(replace(TOLD, limits=limits), (0.0, 0.0), DOWN, load, of='lift')
+        assert (found == ()) is quiet
+
+
+def test_a_load_whose_absence_reaches_the_limit_is_enough() -> None:
+    """Exactly: the empty hand is at the warning limit, or one digit past it."""
+    empty, _ = at_level(0.0)
+    for warn, enough in ((empty, True), (math.nextafter(empty, 0.0), False)):
+        limits = replace(LIMITS, torque_warn=warn, torque_error=2.0)
+        told = advise(
+            replace(TOLD, limits=limits), (0.0, 0.0), DOWN, Payload(3.0, (0.1, 0.0, 0.0)), of='lift'
+        )
+        (load,) = [a for a in told if a.kind == 'payload']
+        assert load.enough is enough
+        assert load.seconds == 10.0  # later than what moves by itself
+
+
+SLOPE = (2.0, 0.0, -9.6)
+
+
+def kinds(limits: Limits, of: str, down: tuple[float, float, float] = SLOPE) -> set[str]:
+    """Return the kinds of advice for a robot whose level arm leans over downhill."""
+    told = advise(replace(TOLD, limits=limits), (0.2, 0.0), down, Payload(1.0), of)
+    return {a.kind for a in told}
+
+
+def test_turning_is_for_a_tilt_that_only_warns() -> None:
+    """Not for one that is at its ERROR limit or past it, nor for a motor."""
+    found = margins(TOLD.robot, np.array((0.2, 0.0)), SLOPE, Payload(1.0))
+    front = float(found.angle[0])
+    warns = Limits((99.0, 99.0), tip_warn=front + 0.1, tip_error=math.nextafter(front, 0.0))
+    assert 'turn' in kinds(warns, 'front')
+    assert 'turn' not in kinds(replace(warns, tip_error=front), 'front')
+    assert 'turn' not in kinds(replace(warns, tip_error=front + 0.05), 'front')
+    weak = Limits((45.0, 99.0), tip_warn=0.1, tip_error=0.05)
+    assert 'joint' in kinds(weak, 'lift')
+    assert 'turn' not in kinds(weak, 'lift')
+
+
+@pytest.mark.parametrize(('worst', 'gain'), [(1, 0.5 * 0.2), (4, 0.5 * 0.2 * 40.0)])
+def test_a_gain_is_told_in_the_unit_of_its_margin(worst: int, gain: float) -> None:
+    """Half the way from ERROR to WARN: of 0.2 rad, or of a fifth of 40 N m."""
+    told = case((0.25,) * 6, worst)
+    assert advice._gain(told, 0.75) == pytest.approx(gain)
+    assert told.tips is (worst == 1)
+
+
+def test_the_edges_of_where_to_stop() -> None:
+    """Just enough, just nearly all, just too little gained, just within the slack."""
+    enough = 1.1 + SLACK
+    assert end(0.5, enough, 1.5) == (1, enough, True)
+    assert end(0.5, 0.95, 1.0, start=0.0) == (1, 0.95, False)
+    assert end(0.25 + 0.1, start=0.25) is None
+    assert end(math.nextafter(0.25 + 0.1, 1.0), start=0.25) is not None
+    scores = np.full((2, 6), GOOD)
+    scores[:, 0], scores[:, 4] = (0.5, 1.5), (GOOD, 1.0 - SLACK)
+    start = case((0.2, *[GOOD] * 5), 0)
+    assert advice._end(start, scores, np.zeros(2, np.bool_)) == (1, 1.5, True)
+    scores[1, 4] = 1.0 - 2.0 * SLACK
+    assert advice._end(start, scores, np.zeros(2, np.bool_)) == (0, 0.5, False)
+
+
+def test_a_slide_gains_newtons_and_a_turning_joint_newton_metres() -> None:
+    """On a slope of 0.5 rad the slide holds 2 kg by the sine; the words name the joint."""
+    told = replace(TOLD, limits=Limits((60.0, 10.0), torque_error=1.1))
+    down = (9.81 * math.sin(-0.5), 0.0, -9.81 * math.cos(0.5))
+    load = Payload(1.0, (0.1, 0.0, 0.0))
+    found = advise(told, (0.0, 0.0), down, load, of='slide')
+    set_down = next(a for a in found if a.kind == 'payload')
+    assert set_down.gain == pytest.approx(9.81 * math.sin(0.5))
+    assert set_down.sentence.endswith(': 5 N less on the slide')
+    heavy = advise(told, (0.0, 0.0), DOWN, Payload(3.0, (0.1, 0.0, 0.0)), of='lift')
+    assert all(' N m less on the lift' in a.sentence for a in heavy)
+
+
+def test_a_tilt_is_told_in_degrees() -> None:
+    """Setting 5 kg down gains what the model says of the empty hand."""
+    told = replace(TOLD, limits=Limits((99.0, 99.0), tip_warn=0.9, tip_error=0.1))
+    gain = at_level(0.0)[1] - at_level(5.0)[1]
+    found = advise(told, (0.0, 0.0), DOWN, Payload(5.0, (0.1, 0.0, 0.0)), of='front')
+    set_down = next(a for a in found if a.kind == 'payload')
+    assert set_down.gain == pytest.approx(gain)
+    words = f': {math.degrees(gain):.0f} deg further from tipping to the front'
+    assert set_down.sentence == f'set the load of 5.0 kg down{words}'
+    moved = next(a for a in found if a.kind == 'joint')
+    assert moved.sentence.endswith(f'to the front, in {moved.seconds:.1f} s')
+    assert moved.gain > 0.0
+
+
+def test_an_arm_that_is_too_heavy_itself_can_hold_nothing() -> None:
+    """All of the load is too heavy then, not more."""
+    told = replace(TOLD, limits=Limits((25.0, 99.0)))
+    found = advise(told, (0.0, 0.0), DOWN, Payload(3.0, (0.1, 0.0, 0.0)), of='lift')
+    (load,) = [a for a in found if a.kind == 'payload']
+    assert '3.0 kg is 3.0 kg too heavy' in load.sentence

@@ -86,8 +86,7 @@ def scores_of(settings: Settings, torque: Floats, angle: Floats) -> Floats:
     tilt = (angle - limits.tip_error) / tip
     use = np.abs(torque) / np.array(limits.torque)
     found: Floats = np.concatenate((tilt, (limits.torque_error - use) / torque_span), axis=-1)
-    judged = np.isfinite(np.array((0.0,) * len(SIDES) + limits.torque))
-    found[..., ~judged] = np.inf
+    found[..., len(SIDES) :][..., ~np.isfinite(limits.torque)] = np.inf
     return found
 
 
@@ -183,7 +182,7 @@ def _end(
     """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
     floor = np.minimum(case.scores, 1.0)
     floor[case.worst] = case.scores[case.worst]
-    bad = ~(scores >= floor - SLACK).all(axis=-1) | forbidden
+    bad = ~(scores >= floor - SLACK).all(axis=1) | forbidden
     last = int(np.argmax(bad)) if bad.any() else len(bad)
     mine = scores[:last, case.worst]
     reached = np.flatnonzero(mine >= case.enough)
