@@ -60,7 +60,7 @@ def write_with(writer: Ros2Writer, path: Path, messages: list[Message]) -> Path:
     return path
 
 
-def chunk_starts(data: bytes) -> list[int]:
+def chunk_starts(data: bytes | bytearray) -> list[int]:
     """Where the Chunk records of an MCAP begin."""
     starts, pos = [], 8
     while pos < len(data) - 8:

@@ -2,7 +2,7 @@
 
 import sqlite3
 import struct
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -23,6 +23,7 @@ from mcap.writer import CompressionType
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.mcap_index import MAGIC
+from ugv_acceptance.bag.raw import messages as messages_of
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 
 
@@ -110,6 +111,7 @@ def test_no_damage_crashes_or_hangs(tmp_path: Path, place: int, content: bytes, 
         return
     assert len(rows(reading)) <= 80
     assert reading.facts.complete
+    assert sum(1 for _ in messages_of(bag, bag.topics)) <= 80
 
 
 def test_wrong_message_index_is_not_believed(tmp_path: Path) -> None:
@@ -231,6 +233,8 @@ def test_no_damage_of_other_formats_crashes(
         return
     assert len(rows(reading)) <= 40
     assert reading.facts.complete
+    with suppress(BadBag):
+        assert sum(1 for _ in messages_of(bag, bag.topics)) <= 40
 
 
 def test_sqlite_message_that_is_a_number(tmp_path: Path) -> None:
@@ -244,3 +248,5 @@ def test_sqlite_message_that_is_a_number(tmp_path: Path) -> None:
     reading = bag.batches(BOTH)
     assert rows(reading) == expected(run(20))[:29]
     assert 'expected a blob' in reading.facts.findings[0]
+    with pytest.raises(BadBag, match=r'run\.db3: reading ended early .*expected a blob'):
+        list(messages_of(bag, bag.topics))

@@ -9,17 +9,22 @@ from bag.bag_cases import (
     IMU,
     JOINT_STATE,
     STORE,
+    cdr,
     expected,
+    imu,
+    joint_state,
     rows,
     run,
+    write_mcap,
 )
-from bag.recordings import read, write_folder, write_with
+from bag.recordings import read, write_folder, write_other, write_with
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
+from ugv_acceptance import BadBag
 from ugv_acceptance.bag.reader import open_bag
 
 
@@ -161,3 +166,70 @@ def test_other_channels_do_not_matter(tmp_path: Path) -> None:
     assert rows(batches) == expected(messages)
     assert bag.findings == facts.findings == ()
     assert bag.topics['/none'].type == ''
+
+
+def test_files_that_metadata_does_not_list_are_told(tmp_path: Path) -> None:
+    """A second file in the folder, which metadata.yaml does not name, is no part of it."""
+    messages = run(20)
+    folder = write_folder(tmp_path / 'bag', messages, StoragePlugin.MCAP)
+    write_mcap(folder / 'other.mcap', run(3))
+    bag, batches, _ = read(folder)
+    assert rows(batches) == expected(messages)
+    assert bag.findings == ('metadata.yaml does not list other.mcap: not read',)
+
+
+def test_the_total_of_metadata_is_compared(tmp_path: Path) -> None:
+    """A total that is not what the file holds is a finding, although its topics are right."""
+    folder = write_folder(tmp_path / 'bag', run(20), StoragePlugin.MCAP)
+    path = folder / 'metadata.yaml'
+    path.write_text(path.read_text().replace('message_count: 40', 'message_count: 41'))
+    bag, _, _ = read(folder)
+    assert bag.findings == ('metadata.yaml says 41 messages, found 40',)
+
+
+def test_files_of_several_formats_are_no_recording(tmp_path: Path) -> None:
+    """The parts of a recording are of one format."""
+    write_other(tmp_path / 'a.db3', run(2))
+    parts = [tmp_path / 'a.db3', write_mcap(tmp_path / 'b.mcap', run(2))]
+    with pytest.raises(BadBag, match='expected files of one format, got mcap and sqlite3'):
+        open_bag(parts)
+
+
+def test_no_file_at_all_is_no_recording() -> None:
+    """An empty list of parts says so."""
+    with pytest.raises(BadBag, match='expected at least one bag, got none'):
+        open_bag([])
+
+
+def test_a_path_the_system_refuses_is_named() -> None:
+    """A name longer than any file's is an error like another, not a trace."""
+    with pytest.raises(BadBag, match='cannot be read'):
+        open_bag('x' * 5000)
+
+
+def test_a_broken_compressed_file_is_refused(tmp_path: Path) -> None:
+    """A compressed file with another content behind its head says what is broken."""
+    path = write_mcap(tmp_path / 'run.mcap', run(20))
+    packed = zstandard.ZstdCompressor().compress(path.read_bytes())
+    path.write_bytes(packed[:4] + b'\xff' * 40 + packed[44:])
+    with pytest.raises(BadBag, match=r'run\.mcap: its zstd data is broken'):
+        open_bag(path)
+
+
+def test_a_file_that_unpacks_without_end_is_refused(tmp_path: Path) -> None:
+    """A few kilobytes that unpack to more than any recording would do not fill the disk."""
+    path = tmp_path / 'run.mcap.zstd'
+    packer = zstandard.ZstdCompressor().compressobj()
+    path.write_bytes(b''.join([packer.compress(bytes(65 << 20)), packer.flush()]))
+    with pytest.raises(BadBag, match='expected at most 64 MiB unpacked, got more'):
+        open_bag(path)
+
+
+def test_a_topic_of_two_types_is_told(tmp_path: Path) -> None:
+    """Channels of one name but of several types are a finding that lists them."""
+    first = write_mcap(tmp_path / 'a.mcap', [('/a', IMU, 1, cdr(imu()))])
+    second = write_mcap(tmp_path / 'b.mcap', [('/a', JOINT_STATE, 2, cdr(joint_state()))])
+    (finding,) = open_bag([first, second]).findings
+    assert finding.startswith('/a has channels of several types: ')
+    assert f'{IMU} (cdr, 1 messages)' in finding
+    assert f'{JOINT_STATE} (cdr, 1 messages)' in finding

@@ -4,8 +4,13 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from bag.bag_cases import run, write_mcap
+import zstandard
+from bag.bag_cases import JOINT_STATE, STORE, cdr, joint_state, run, write_mcap
+from bag.recordings import write_with
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from ugv_acceptance.bag.cdr import imu_decoder
@@ -76,6 +81,39 @@ def test_only_the_topics_asked_for_are_read(tmp_path: Path) -> None:
     assert {message.topic for message in messages(open_bag(path), [one])} == {one}
 
 
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_message_compression_is_undone(tmp_path: Path, storage: StoragePlugin) -> None:
+    """Messages compressed one by one come as they were published; a broken one is left out."""
+    written = run(20)
+    writer = Ros2Writer(tmp_path / 'run', version=9, storage_plugin=storage)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    path = write_with(writer, tmp_path / 'run', written)
+    found = list(messages(open_bag(path), {topic for topic, *_ in written}))
+    assert [m[:3] for m in found] == [(time, topic, data) for topic, _, time, data in written]
+
+
+def test_a_broken_compressed_message_is_left_out(tmp_path: Path) -> None:
+    """One message that cannot be unpacked loses no other."""
+    written = run(5)
+    topic, kind, time, data = written[4]
+    written[4] = topic, kind, time, zstandard.ZstdCompressor().compress(data)[:-3]
+    path = write_mcap(tmp_path / 'run.mcap', written)
+    found = [m.log_time for m in messages(open_bag(path), [topic, '/imu/data'])]
+    assert found == [t for _, _, t, _ in written if t != time]
+
+
+def test_a_garbled_ros_1_message_is_left_out(tmp_path: Path) -> None:
+    """One message that is not what its type says loses no other."""
+    store, path = get_typestore(Stores.ROS1_NOETIC), tmp_path / 'run.bag'
+    with Ros1Writer(path) as writer:
+        joints = writer.add_connection('/joint_states', JOINT_STATE, typestore=store)
+        for time in (1, 2, 3):
+            data = bytes(STORE.cdr_to_ros1(cdr(joint_state()), JOINT_STATE))
+            writer.write(joints, time, data[:9] if time == 2 else data)
+    found = list(messages(open_bag(path), ['/joint_states']))
+    assert [(m.log_time, m.data) for m in found] == [(t, cdr(joint_state())) for t in (1, 3)]
+
+
 def test_the_quality_of_service_is_that_of_the_recorder(tmp_path: Path) -> None:
     """Reliability and durability come from metadata.yaml."""
     path = tmp_path / 'run'
@@ -92,6 +130,6 @@ def test_metadata_of_any_kind_is_survived(tmp_path: Path) -> None:
     with BagWriter(path) as writer:
         writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos())
     bag = open_bag(path)
-    for text in ('', '[]', 'rosbag2_bagfile_information: 3', '{', 'a: &a [*a]'):
+    for text in ('', '[]', 'rosbag2_bagfile_information: 3', '{', 'a: &a [*a]', '[' * 800):
         (path / 'metadata.yaml').write_text(text)
         assert offered(bag) == {}

@@ -190,7 +190,7 @@ class ColumnDecoder:
         groups: dict[Key, list[_Row]] = {}
         for place, log_time, packed in messages:
             try:
-                layout, stamp, blocks = self._one.raw(_plain(packed))
+                layout, stamp, blocks = self._one.raw(plain(packed))
             except BadSample as error:
                 malformed += 1
                 reason = reason or str(error)
@@ -268,8 +268,8 @@ class _Job:
         return int(self.buffer[start : start + 8].view('<i8')[0])
 
 
-def _plain(data: bytes) -> bytes:
-    """The message itself where rosbag2 compressed it (compression_mode: message)."""
+def plain(data: bytes) -> bytes:
+    """The message itself where rosbag2 compressed it (mode: message); BadSample if broken."""
     if data[:4] != zstandard.FRAME_HEADER:
         return data
     try:

@@ -5,7 +5,7 @@ so works without metadata.yaml; ROS 1 bags are read by rosbags.
 """
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -61,7 +61,7 @@ class _sqlite_errors:  # noqa: N801 (used like a function)
             raise BadBag(f'{self.name}: not a readable SQLite bag ({error})') from error
 
 
-def _sqlite_messages(path: Path, wanted: Wanted) -> Iterator[_Message]:
+def _sqlite_messages(path: Path, wanted: Collection[int]) -> Iterator[_Message]:
     marks = ','.join('?' * len(wanted))
     query = (
         'SELECT topic_id, timestamp, data FROM messages '  # noqa: S608 (only question marks)
@@ -87,7 +87,7 @@ def open_ros1(path: Path, name: str) -> ForeignIndex:
         raise BadBag(f'{name}: not a readable ROS 1 bag ({error})') from error
 
 
-def _ros1_messages(path: Path, wanted: Wanted) -> Iterator[_Message]:
+def _ros1_messages(path: Path, wanted: Collection[int]) -> Iterator[_Message]:
     with Ros1Reader(path) as reader:
         connections = [c for c in reader.connections if c.id in wanted]
         for connection, log_time, data in reader.messages(connections):
@@ -95,6 +95,21 @@ def _ros1_messages(path: Path, wanted: Wanted) -> Iterator[_Message]:
 
 
 _MESSAGES = {'sqlite3': _sqlite_messages, 'ros1': _ros1_messages}
+
+
+def foreign_messages(
+    storage: str, path: Path, name: str, wanted: Collection[int]
+) -> Iterator[_Message]:
+    """Messages of the channels wanted, in log time order; BadBag where reading breaks off."""
+    messages = _MESSAGES[storage](path, wanted) if wanted else iter(())
+    while True:
+        try:
+            message = next(messages)
+        except StopIteration:
+            return
+        except Exception as error:  # rosbags lets whatever a broken file causes through
+            raise BadBag(f'{name}: reading ended early ({error})') from error
+        yield message
 
 
 def foreign_blocks(
@@ -106,17 +121,14 @@ def foreign_blocks(
     """
     block: list[_Message] = []
     broken = ''
-    messages = _MESSAGES[storage](path, wanted) if wanted else iter(())
-    while not broken:
-        try:
-            block.append(next(messages))
-        except StopIteration:
-            break
-        except Exception as error:  # noqa: BLE001 (rosbags lets what a broken file causes through)
-            broken = f'{name}: reading ended early ({error})'
-        if len(block) >= _BLOCK:
-            yield _decode(block, wanted), block[-1][1]
-            block = []
+    try:
+        for message in foreign_messages(storage, path, name, wanted):
+            block.append(message)
+            if len(block) >= _BLOCK:
+                yield _decode(block, wanted), block[-1][1]
+                block = []
+    except BadBag as error:
+        broken = str(error)
     work = _decode(block, wanted)
     if broken:
         work.findings.append(broken)

@@ -2,19 +2,19 @@
 
 import heapq
 import os
-import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
 
-from ugv_acceptance import BadBag
+from ugv_acceptance import BadBag, BadSample
 from ugv_acceptance.bag.chunks import Buffers, log_times, walk
+from ugv_acceptance.bag.columns import plain
+from ugv_acceptance.bag.foreign import foreign_messages
 from ugv_acceptance.bag.gather import LEAD, SLACK
 from ugv_acceptance.bag.mcap_index import Piece
 from ugv_acceptance.bag.metadata import NAME
@@ -45,7 +45,8 @@ class Offered:
 def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
     """Yield the messages of `topics` in order of log time; ROS 1 messages are turned into CDR.
 
-    What cannot be read is left out, as in `Bag.batches`.
+    What cannot be read is left out, as in `Bag.batches`, and message compression is undone; BadBag
+    where an SQLite or ROS 1 file breaks off.
     """
     wanted = set(topics)
     streams = [messages_of(member, wanted) for member in bag.members]
@@ -54,8 +55,12 @@ def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
 
 def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:
     """Yield the messages of one file, as `messages` does."""
-    read = {'mcap': _mcap, 'sqlite3': _sqlite, 'ros1': _ros1}[member.storage]
-    yield from read(member, wanted)
+    for message in (_mcap if member.storage == 'mcap' else _foreign)(member, wanted):
+        try:
+            content = plain(message.data)
+        except BadSample:
+            continue
+        yield message if content is message.data else message._replace(data=content)
 
 
 def _mcap(member: Member, wanted: set[str]) -> Iterator[Logged]:
@@ -105,32 +110,27 @@ def _piece(
     return found
 
 
-def _sqlite(member: Member, wanted: set[str]) -> Iterator[Logged]:
-    query = (
-        'SELECT messages.timestamp, topics.name, messages.data, topics.id FROM messages '
-        'JOIN topics ON topics.id = messages.topic_id ORDER BY messages.timestamp, messages.id'
-    )
-    try:
-        with closing(
-            sqlite3.connect(f'{member.content.resolve().as_uri()}?mode=ro', uri=True)
-        ) as db:
-            for log_time, topic, data, channel in db.execute(query):
-                if topic in wanted:
-                    now = int(log_time)
-                    yield Logged(now, str(topic), bytes(data), now, int(channel))
-    except sqlite3.Error as error:
-        raise BadBag(f'{member.path}: reading ended early ({error})') from error
-
-
-def _ros1(member: Member, wanted: set[str]) -> Iterator[Logged]:
+def _foreign(member: Member, wanted: set[str]) -> Iterator[Logged]:
+    channels = {c.id: c for c in member.index.channels.values() if c.topic in wanted}
     # ROS 2's types: their headers have no sequence number, and ROS 1's is left out.
-    store = get_typestore(Stores.ROS2_JAZZY)
-    with Ros1Reader(member.content) as reader:
-        known = [c for c in reader.connections if normal_type(c.msgtype) in store.types]
-        connections = [c for c in known if c.topic in wanted]
-        for connection, log_time, data in reader.messages(connections):
-            content = bytes(store.ros1_to_cdr(data, normal_type(connection.msgtype)))
-            yield Logged(log_time, connection.topic, content, log_time, connection.id)
+    store = get_typestore(Stores.ROS2_JAZZY) if member.storage == 'ros1' else None
+    if store is not None:
+        channels = {k: c for k, c in channels.items() if normal_type(c.type) in store.types}
+    found = foreign_messages(member.storage, member.content, str(member.path), channels)
+    for channel, now, data in found:
+        content: bytes | None = data
+        if store is not None:
+            content = _cdr(store, data, normal_type(channels[channel].type))
+        if content is not None:
+            yield Logged(now, channels[channel].topic, content, now, channel)
+
+
+def _cdr(store: Typestore, data: bytes, kind: str) -> bytes | None:
+    """A ROS 1 message as CDR; None where it is not what its type says."""
+    try:
+        return bytes(store.ros1_to_cdr(data, kind))
+    except Exception:  # noqa: BLE001 (rosbags lets whatever garbled bytes cause through)
+        return None
 
 
 def offered(bag: Bag) -> dict[str, Offered]:
@@ -153,7 +153,7 @@ def _profiles(text: str) -> dict[str, Offered]:
             profiles = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
             if profiles:
                 found[str(metadata['name'])] = _offered(profiles[0])
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, IndexError):
+    except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, RecursionError):
         return found  # the reader has said what is wrong with it
     return found
 

@@ -104,8 +104,8 @@ def open_bag(
     members: list[Member] = []
     findings: list[str] = []
     for path in given:
-        files, metadata, found = files_of(Path(path))
         try:
+            files, metadata, found = files_of(Path(path))
             part = [_member(file, max_chunk_bytes) for file in files]
         except OSError as error:
             raise BadBag(f'{path}: cannot be read ({error})') from error

@@ -133,8 +133,10 @@ class Player:
 def restamped(data: bytes, shift: int) -> bytes:
     """Return a serialised message that begins with a Header, its stamp moved by `shift` (ns).
 
-    A stamp cannot be before 1970 or after 2038.
+    A stamp cannot be before 1970 or after 2038. A message too short for one stays as it is.
     """
+    if len(data) < 12:
+        return data
     order = '<' if data[1] & 1 else '>'
     sec, nanosec = struct.unpack_from(f'{order}iI', data, 4)
     moved = min(max(sec * _NS + nanosec + shift, 0), _LAST)
