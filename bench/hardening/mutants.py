@@ -2,8 +2,9 @@
 
 A comparison, an operator, a constant, a sign or a choice is turned into another; a number over 1000
 is doubled, for one more would be lost in it. Decorators are left as they are: `slots` and `frozen`
-forbid what no code does, and a cache's size changes no value. Those in EQUIVALENT change nothing
-that anybody could see; they are left out and printed with the reason.
+forbid what no code does, and a cache's size changes no value. So is `strict` of zip: it guards what
+is of one length already. Those in EQUIVALENT change nothing that anybody could see; they are left
+out and printed with the reason.
 """
 
 import ast
@@ -31,6 +32,13 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'one segment is in order already',
     ('evaluation/alerts.py', 'Signal', '-np.inf -> +np.inf'):
         'a peak is set before it is read',
+    ('evaluation/alerts.py', 'Signal.step', 'value > self.peak -> value >= self.peak'):
+        'a value as bad as the peak leaves everything as it is',
+    ('evaluation/alerts.py', 'Signal.set', 'peak > self.peak -> peak >= self.peak'): 'the same',
+    ('evaluation/foresight.py', '', '3 -> 4'): 'FEW only chooses between two ways to one result',
+    ('evaluation/foresight.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
+    ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
+        'the size of a sign changes no order',
 }  # fmt: skip
 
 
@@ -63,7 +71,9 @@ def mutants(file: str, source: str) -> list[Mutant]:
         around.update(dict.fromkeys(ast.iter_child_nodes(node), (name, line)))
         around[node] = name, line
     decorators = (d for n in ast.walk(tree) for d in getattr(n, 'decorator_list', ()))
-    left = {node for decorator in decorators for node in ast.walk(decorator)}
+    keywords = (k for k in ast.walk(tree) if isinstance(k, ast.keyword))
+    guards = (k.value for k in keywords if ast.unparse(k) == 'strict=True')
+    left = {node for kept in (*decorators, *guards) for node in ast.walk(kept)}
     found = []
     for k, node in enumerate(ast.walk(tree)):
         before = ast.unparse(node) if isinstance(node, ast.expr) else ''
