@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import hypothesis
 import numpy as np
+from evaluation.hand_made import made
 from evaluation.streams import (
     MS,
     T0,
@@ -21,7 +22,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
-from ugv_acceptance.evaluation.strips import MOST, WIDTH, StripRecorder
+from ugv_acceptance.evaluation.rows import MarginRows
+from ugv_acceptance.evaluation.strips import MOST, WIDTH, StripRecorder, Strips
 
 TOLD = settings()
 
@@ -70,3 +72,57 @@ def test_a_long_run_has_wider_columns_and_the_same_worst() -> None:
     assert MOST / 2 < len(strips.time) <= MOST
     assert np.diff(strips.time).max() < 2.1 * 2 * WIDTH / 1e9
     np.testing.assert_array_equal(np.nanmax(strips.torque, axis=0), worst.astype(np.float32))
+
+
+def recorded_strips(parts: list[MarginRows], start: int = 0) -> Strips:
+    """Return the strips of stretches of rows."""
+    recorder = StripRecorder(TOLD, start)
+    for part in parts:
+        recorder.add(part)
+    return recorder.strips()
+
+
+def test_a_column_is_the_worst_of_fifty_milliseconds() -> None:
+    """Largest torque of each joint, least tilt of all sides, last posture, time of its first row.
+
+    A tilt counts only where a row of the column is known.
+    """
+    rows = made(
+        [60 * MS, 80 * MS, 99 * MS, 100 * MS, 260 * MS],
+        torque=[(1.0, 2.0), (-5.0, 0.5), (2.0, np.nan), (3.0, -4.0), (7.0, 8.0)],
+        angle=[(0.5, 0.6, 0.7, 0.8), (0.9, 0.9, 0.3, 0.9), (0.4,) * 4, (0.2,) * 4, (0.1,) * 4],
+        q=[(0.1, 0.2), (0.3, 0.4), (0.5, 0.6), (0.7, 0.8), (0.9, 1.0)],
+        known=[False, True, False, True, False],
+    )
+    found = recorded_strips([rows, made([])], start=-S)
+    np.testing.assert_allclose(found.time, [1.06, 1.1, 1.26], rtol=1e-12)
+    np.testing.assert_allclose(found.torque, [(5.0, 2.0), (3.0, 4.0), (7.0, 8.0)])
+    np.testing.assert_allclose(found.angle, [0.3, 0.2, np.nan], rtol=1e-6)
+    np.testing.assert_allclose(found.q, [(0.5, 0.6), (0.7, 0.8), (0.9, 1.0)], rtol=1e-6)
+
+
+def test_a_recording_from_zero_on_has_its_first_column() -> None:
+    """As simulated time begins; nothing recorded gives no column."""
+    assert recorded_strips([made([0, 10 * MS])]).time.tolist() == [0.0]
+    assert recorded_strips([]).torque.shape == (0, 2)
+
+
+def test_columns_double_in_width_from_150001_on() -> None:
+    """Two become one: larger torque, smaller tilt, later posture; and once more when full again."""
+    time = 50 * MS * np.arange(150_001)
+    torque = np.column_stack((np.arange(150_001) % 7, -np.ones(150_001)))
+    angle = np.repeat(np.arange(150_001.0)[:, None] % 5, 4, axis=1)
+    q = np.column_stack((np.arange(150_001), np.zeros(150_001)))
+    full = recorded_strips([made(time[:-1])])
+    assert len(full.time) == 150_000
+    np.testing.assert_allclose(np.diff(full.time), 0.05)
+    wide = recorded_strips([made(time, torque=torque, angle=angle, q=q)])
+    assert len(wide.time) == 75_001
+    np.testing.assert_allclose(np.diff(wide.time), 0.1)
+    assert wide.torque[:4].tolist() == [[1.0, 1.0], [3.0, 1.0], [5.0, 1.0], [6.0, 1.0]]
+    assert wide.angle[:4].tolist() == [0.0, 2.0, 0.0, 1.0]
+    assert wide.q[:3, 0].tolist() == [1.0, 3.0, 5.0]
+    later = time[-1] + 100 * MS * np.arange(1, 75_001)
+    wider = recorded_strips([made(time), made(later)])
+    assert len(wider.time) == 75_001
+    np.testing.assert_allclose(np.diff(wider.time), 0.2)
