@@ -35,8 +35,8 @@ def in_blocks(
 
     def run(start: int) -> None:
         rows = slice(start, start + BLOCK)
-        for k, value in enumerate(function(*(c[rows] for c in columns))):
-            out[k, rows] = value
+        for line, value in zip(out, function(*(c[rows] for c in columns)), strict=True):
+            line[rows] = value
 
     starts = range(0, count, BLOCK)
     if workers > 1 and len(starts) > 1:

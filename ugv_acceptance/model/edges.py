@@ -5,6 +5,7 @@ about the edge. Energy margin after Messuri and Klein (1985), for a robot that r
 edge's line. What an edge between two points of the base contributes is folded to a few constants.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
@@ -27,6 +28,7 @@ from ugv_acceptance.model.expressions import (
 from ugv_acceptance.model.hull import Cycle, pairs
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics
+from ugv_acceptance.model.robot import ZERO
 from ugv_acceptance.model.rows import Values
 from ugv_acceptance.model.tree import in_body
 
@@ -76,7 +78,7 @@ def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
 
     names = [f'x{k}' for k in range(3 + 3 * len(moving))]
     outward = compile_kernel(formula, names)
-    sides = None if moving else tuple(side_of(x, y) for x, y in outward.one(0.0, 0.0, 0.0))
+    sides = None if moving else tuple(side_of(x, y) for x, y in outward.one(*ZERO))
     return Corners(polygon, moving, sides, outward)
 
 
@@ -104,7 +106,7 @@ def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> 
 
     def margins(*inputs: Scalar) -> tuple[Any, ...]:
         edges, mass = table(inputs)
-        angle, moment, energy, zmp = (list(column) for column in zip(*edges, strict=True))
+        angle, moment, energy, zmp = ([edge[k] for edge in edges] for k in range(4))
         held = by_side([x * mass for x in moment]), by_side([x * mass for x in energy])
         return by_side(angle), *held, reduce(minimum, zmp)
 
@@ -146,7 +148,7 @@ def side_of(x: Values, y: Values) -> Values:
     """Return the number in SIDES towards which a normal points most: floats or arrays."""
     if isinstance(x, float) and isinstance(y, float):
         if abs(x) >= abs(y):
-            return 0 if x > 0 else 2
-        return 1 if y > 0 else 3
-    lengthwise = np.abs(x) >= np.abs(y)
-    return np.where(lengthwise, np.where(x > 0, 0, 2), np.where(y > 0, 1, 3))
+            return int(1.0 - math.copysign(1.0, x))
+        return int(2.0 - math.copysign(1.0, y))
+    side = np.where(np.abs(x) >= np.abs(y), 1.0 - np.copysign(1.0, x), 2.0 - np.copysign(1.0, y))
+    return side.astype(np.int64)

@@ -148,7 +148,7 @@ def copysign(x: Scalar, y: Scalar) -> Scalar:
 def minimum(x: Scalar, y: Scalar) -> Scalar:
     """Return the smaller of two; NaN where either is NaN."""
     if isinstance(x, float) and isinstance(y, float):
-        return x if x < y or math.isnan(x) else y
+        return x if math.isnan(x) else min(y, x)
     return _node('minimum', x, y)
 
 

@@ -7,7 +7,7 @@ one sample is taken by all others it fits.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, reduce
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ _TRIES = 50
 
 def pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
     """Return the edges of a polygon, counter-clockwise."""
-    return zip(cycle, cycle[1:] + cycle[:1], strict=True)
+    return pairwise((*cycle, *cycle[:1]))
 
 
 def _turn(a: Sequence[Any], b: Sequence[Any], c: Sequence[Any]) -> Values:
@@ -131,7 +131,7 @@ def _turns_kernel(count: int) -> Kernel:
 def _turns(points: Values, place: Values) -> dict[tuple[int, int], Values]:
     flat = [x for point in points for x in point[:2]]
     turns = _turns_kernel(len(points)).run(*flat, place[0], place[1])
-    return dict(zip(combinations(range(len(points)), 2), turns, strict=True))
+    return {pair: turns[k] for k, pair in enumerate(combinations(range(len(points)), 2))}
 
 
 @lru_cache(maxsize=16)
@@ -160,12 +160,8 @@ def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64
     turn = _turns(points, place)
     left = {pair: np.asarray(t) >= 0.0 for pair, t in turn.items()}
     right = {pair: np.asarray(t) <= 0.0 for pair, t in turn.items()}
-    # A level triple with a point below it is on the upper side of the hull.
-    level = np.max(reduce(np.minimum, [z for _, _, z in points], np.inf))
     for number, (i, j, k) in enumerate(triples(len(points))):
         z = [points[n][2] for n in (i, j, k)]
-        if all(isinstance(x, float) and x == z[0] for x in z) and z[0] > level:
-            continue
         inside = left[j, k] & right[i, k] & left[i, j]
         inside = inside | (right[j, k] & left[i, k] & right[i, j])
         rows = np.flatnonzero(np.broadcast_to(inside, count))
@@ -193,8 +189,8 @@ def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
             across = np.float64(1.0) * (way[0] * edge[1] - way[1] * edge[0])
             part = (start[0] * way[1] - start[1] * way[0]) / across
             reach = (start[0] * edge[1] - start[1] * edge[0]) / across
-            hit = (part > -_INWARD) & (part < 1.0 + _INWARD) & (reach > furthest)
-            furthest = np.where(hit, reach, furthest)
+            hit = abs(part - 0.5) < 0.5 + _INWARD
+            furthest = np.maximum(furthest, np.where(hit, reach, 0.0))
     x, y = (middle[k] + (1.0 - _INWARD) * furthest * way[k] for k in range(2))
     return x, y
 

@@ -9,6 +9,7 @@ docs/decisions/0002-formulas-compiled-per-robot.md.
 
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -87,14 +88,12 @@ def _flat(outputs: Outputs) -> Iterator[Scalar]:
             yield from _flat(x)
 
 
-def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], dict[int, int]]:
+def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], Counter[int]]:
     """Return the operations the outputs need, arguments first, and how often each is used."""
     order: list[Expr] = []
-    uses: dict[int, int] = {}
+    uses = Counter(map(id, outputs))
     seen: set[int] = set()
     stack: list[tuple[Scalar, bool]] = [(x, False) for x in reversed(outputs)]
-    for x in outputs:
-        uses[id(x)] = uses.get(id(x), 0) + 1
     while stack:
         x, done = stack.pop()
         if isinstance(x, float) or (not done and id(x) in seen):
@@ -104,9 +103,8 @@ def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], dict[int, int]]:
             continue
         seen.add(id(x))
         stack.append((x, True))
-        for arg in x.args:
-            uses[id(arg)] = uses.get(id(arg), 0) + 1
-            stack.append((arg, False))
+        uses.update(map(id, x.args))
+        stack += [(arg, False) for arg in x.args]
     return order, uses
 
 
@@ -114,11 +112,10 @@ def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], dict[int, int]]:
 class _Emitter:
     """Writes straight-line code; a name is used again as soon as its last value is dead."""
 
-    uses: dict[int, int]
+    uses: Counter[int]
     lines: list[str] = field(default_factory=list)
     names: dict[int, str] = field(default_factory=dict)
     free: list[str] = field(default_factory=list)
-    count: int = 0
 
     def text(self, x: Scalar) -> str:
         if isinstance(x, float):
@@ -131,8 +128,7 @@ class _Emitter:
 
     def name(self, x: Expr) -> str:
         if not self.free:
-            self.free.append(f't{self.count}')
-            self.count += 1
+            self.free.append(f't{len(self.names)}')
         self.names[id(x)] = self.free.pop()
         return self.names[id(x)]
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ugv_acceptance.model.expressions import Mat, Scalar, Vec, add, cross, rotate, scale
-from ugv_acceptance.model.robot import IDENTITY
+from ugv_acceptance.model.robot import IDENTITY, ZERO
 from ugv_acceptance.model.tree import Body, Tree, rotation_about
 
 
@@ -43,7 +43,7 @@ class Carried:
 def steps_of(tree: Tree, q: Sequence[Scalar]) -> list[Step]:
     """Return every body's step to its parent; the base's leads nowhere."""
     moving = zip(tree.bodies[1:], q, strict=True)
-    return [Step(IDENTITY, (0.0, 0.0, 0.0)), *(_step(body, x) for body, x in moving)]
+    return [Step(IDENTITY, ZERO), *(_step(body, x) for body, x in moving)]
 
 
 def _step(body: Body, position: Scalar) -> Step:
@@ -67,7 +67,7 @@ def carried_by(tree: Tree, steps: Sequence[Step], loads: Sequence[PointLoad]) ->
     for load in loads:
         masses[load.body] = masses[load.body] + load.mass
         moments[load.body] = add(moments[load.body], scale(load.point, load.mass))
-    levers: list[Vec] = [(0.0, 0.0, 0.0)] * len(tree.bodies)
+    levers: list[Vec] = [ZERO] * len(tree.bodies)
     above: list[list[int]] = [[] for _ in tree.bodies]
     for k in range(len(tree.bodies) - 1, 0, -1):
         body, step = tree.bodies[k], steps[k]

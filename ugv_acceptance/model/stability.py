@@ -148,14 +148,14 @@ def _standing(support: Support) -> int:
 def stability_of(stance: Stance, gravity: Triple) -> Stability:
     """Return the margins of a stance under the effective `gravity` (m/s2): floats or arrays."""
     state = _state(stance.state, gravity)
-    if stance.edges is None or (isinstance(state, int) and state >= NO_CONTACT):
+    if stance.edges is None or (isinstance(state, int) and state >= FREE_FALL):
         return Stability(_NONE, _NONE, _NONE, math.nan, state)
     run = stance.edges.margins.run
     angle, moment, energy, zmp = run(*stance.terms, stance.mass, *gravity)
     if isinstance(state, int):
         return Stability(angle, moment, energy, math.nan if state == INVERTED else zmp, state)
     zmp = np.where(state == INVERTED, math.nan, zmp)
-    none = state >= NO_CONTACT
+    none = state >= FREE_FALL
     if none.any():
         angle, moment, energy = (_without(none, part) for part in (angle, moment, energy))
         zmp = np.where(none, math.nan, zmp)
@@ -165,11 +165,11 @@ def stability_of(stance: Stance, gravity: Triple) -> Stability:
 def tip_angles_of(stance: Stance, gravity: Triple) -> tuple[tuple[Number, ...], State]:
     """Return only the tip angles (rad) to each of SIDES, and the state, as `stability_of` does."""
     state = _state(stance.state, gravity)
-    if stance.edges is None or (isinstance(state, int) and state >= NO_CONTACT):
+    if stance.edges is None or (isinstance(state, int) and state >= FREE_FALL):
         return _NONE, state
     angle = stance.edges.angles.run(*stance.terms, stance.mass, *gravity)
-    if not isinstance(state, int) and (state >= NO_CONTACT).any():
-        angle = _without(state >= NO_CONTACT, angle)
+    if not isinstance(state, int) and (state >= FREE_FALL).any():
+        angle = _without(state >= FREE_FALL, angle)
     return angle, state
 
 
@@ -185,11 +185,11 @@ def _state(standing: int, gravity: Triple) -> State:
             return UNKNOWN
         if square < WEIGHTLESS**2:
             return FREE_FALL
-        return INVERTED if gz >= 0.0 and standing < INVERTED else standing
+        return INVERTED if gz >= 0.0 and standing < NO_CONTACT else standing
     state = np.full(len(square), standing, dtype=np.int8)
     if standing == UNKNOWN:
         return state
-    if standing < INVERTED:
+    if standing < NO_CONTACT:
         state[np.greater_equal(gz, 0.0)] = INVERTED
     state[square < WEIGHTLESS**2] = FREE_FALL
     state[~(square < math.inf)] = UNKNOWN
@@ -254,9 +254,10 @@ def _table(
     width: int,
 ) -> list[Floats]:
     """Return the values of every sample's stance, one array a value."""
-    table = np.empty((width, len(gravity[0])))
-    for rows, stance in stances_of(mechanics, posture, len(gravity[0])):
+    gx, *_ = gravity
+    table = np.empty((width, len(gx)))
+    for rows, stance in stances_of(mechanics, posture, len(gx)):
         found = values(stance, pick(gravity, rows))
-        for line, value in zip(table, found, strict=True):
-            line[rows] = value
+        for k, value in enumerate(found):
+            table[k, rows] = value
     return list(table)

@@ -107,10 +107,8 @@ def payload_capacity(
 
 def gripper_point(robot: Robot, q: ArrayLike) -> Floats:
     """Return where the payload's centre of gravity is (m, `base_link`), shape (..., 3)."""
-    q = np.asarray(q, dtype=np.float64)
     cog = robot.payload.cog
-    mechanics = mechanics_of(robot)
-    whole = float(posture_of(mechanics, [0.0] * len(robot.joint_names), 0.0, cog).mass)
+    whole = sum(body.mass for body in mechanics_of(robot).tree.bodies)
     # The robot with a load as heavy as itself: its centre of gravity lies half way to the load.
     with_load = centre_of_gravity(robot, q, Payload(whole, cog))
     point: Floats = 2.0 * with_load - centre_of_gravity(robot, q, Payload(0.0, cog))

@@ -76,7 +76,7 @@ def supports_of(
     Each coordinate is a float or an array of `count`; every row appears once.
     """
     points, centre, tolerance = tuple(map(tuple, contacts)), tuple(cog), robot.contact_tolerance
-    finite = np.isfinite(sum(_distinct([*chain.from_iterable(points), *centre]), 0.0))
+    finite = np.isfinite(sum(_distinct([*chain.from_iterable(points), *centre])))
     lowest = reduce(np.minimum, _distinct([z for _, _, z in points]), np.inf)
     raised = lowest - robot.ground < -tolerance
     regimes = np.broadcast_to(np.where(finite, raised, 2), count)
@@ -116,10 +116,10 @@ def _faces(tolerance: float, points: Values, cog: Values, count: int) -> NDArray
     """
     chosen = triples_under(points, cog, count)
     outside = np.flatnonzero(chosen < 0)
-    if outside.size and len(points) >= 3:
+    if outside.size:
         some, centre = pick((points, cog), outside)
         chosen[outside] = triples_under(some, drawn_in(some, centre), outside.size)
-    patterns = np.full(count, -1)
+    patterns = chosen.copy()
     for number, rows, _ in groups(chosen):
         if number >= 0:
             triple = triples(len(points))[number]

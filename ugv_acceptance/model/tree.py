@@ -47,7 +47,10 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """The bodies, parents first; body 0 is the base. `frames` places each link in its body."""
+    """The bodies, parents first; body 0 is the base, its own parent.
+
+    `frames` places each link in its body.
+    """
 
     bodies: tuple[Body, ...]
     frames: dict[str, tuple[int, Matrix, Vector]]
@@ -87,27 +90,14 @@ def rotation_about(axis: Vec, angle: Scalar) -> Mat:
 def tree_of(robot: Robot) -> Tree:
     """Return the moving bodies of `robot`. Raises BadConfig where the joints are not a tree."""
     frames, moving = _place_links(robot)
-    names = ['', *(joint.name for joint, _ in moving)]
-    members: list[list[tuple[float, Vector, Matrix]]] = [[] for _ in names]
+    members: list[list[tuple[float, Vector, Matrix]]] = [[] for _ in moving]
     for link in robot.links:
         frame = frames[link.name]
         cog = _plain(add(frame.xyz, rotate(frame.rotation, link.cog)))
         inertia = matmul(matmul(frame.rotation, link.inertia), transpose(frame.rotation))
         members[frame.body].append((link.mass, cog, _plain_matrix(inertia)))
-    base, up = _lump(members[0]), (0.0, 0.0, 1.0)
-    bodies = [
-        Body(
-            names[0],
-            -1,
-            prismatic=False,
-            axis=up,
-            offset=ZERO,
-            mass=base[0],
-            cog=base[1],
-            inertia=base[2],
-        )
-    ]
-    for k, (joint, parent) in enumerate(moving, start=1):
+    bodies = []
+    for k, (joint, parent) in enumerate(moving):
         at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
         axis = _plain(rotate(frames[joint.child].rotation, joint.axis))
         bodies.append(
@@ -117,12 +107,15 @@ def tree_of(robot: Robot) -> Tree:
 
 
 def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Frame]]]:
-    """Return each link's frame and the moving joints with their parents' frames, parents first."""
+    """Return each link's frame and the moving joints with their parents' frames, parents first.
+
+    The first is the base's, which moves nothing: one joint for each body.
+    """
     children: dict[str, list[Joint]] = {}
     for joint in robot.joints:
         children.setdefault(joint.parent, []).append(joint)
     frames = {robot.root: _Frame(0, IDENTITY, ZERO)}
-    moving: list[tuple[Joint, _Frame]] = []
+    moving = [(Joint('', 'fixed', '', robot.root), frames[robot.root])]
     held = dict(robot.held)
     waiting = list(children.get(robot.root, ()))
     while waiting:
@@ -147,8 +140,9 @@ def _child_frame(
     parent = frames[joint.parent]
     turned = _plain_matrix(matmul(parent.rotation, joint.rotation))
     if joint.name in robot.joint_names:
+        number = len(moving)
         moving.append((joint, parent))
-        return _Frame(len(moving), turned, ZERO)
+        return _Frame(number, turned, ZERO)
     at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
     if joint.kind == 'prismatic':
         at = _plain(add(at, scale(rotate(turned, joint.axis), held)))
@@ -173,15 +167,16 @@ def _lump(parts: list[tuple[float, Vector, Matrix]]) -> tuple[float, Vector, Mat
     if mass == 0.0:
         return 0.0, ZERO, NO_INERTIA
     cog = _plain([math.fsum(m * c[k] for m, c, _ in parts) / mass for k in range(3)])
-    total = [[0.0] * 3 for _ in range(3)]
-    for m, c, inertia in parts:
-        d = _plain(subtract(c, cog))
-        square = d[0] ** 2 + d[1] ** 2 + d[2] ** 2
-        for i in range(3):
-            for j in range(3):
-                steiner = (square if i == j else 0.0) - d[i] * d[j]
-                total[i][j] += inertia[i][j] + m * steiner
-    return mass, cog, _plain_matrix([(r[0], r[1], r[2]) for r in total])
+    placed = [(m, _plain(subtract(c, cog)), own) for m, c, own in parts]
+
+    def entry(i: int, j: int) -> float:
+        return math.fsum(
+            own[i][j] + m * (IDENTITY[i][j] * math.fsum(x * x for x in d) - d[i] * d[j])
+            for m, d, own in placed
+        )
+
+    inertia = [_plain([entry(i, j) for j in range(3)]) for i in range(3)]
+    return mass, cog, _plain_matrix(inertia)
 
 
 def pose_of(tree: Tree, q: Sequence[Scalar]) -> Pose:

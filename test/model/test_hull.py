@@ -1,0 +1,269 @@
+"""Hulls of a few points, to the last digit: one sample against many, and both against geometry."""
+
+from itertools import combinations, permutations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from ugv_acceptance.model.hull import (
+    THIN,
+    Cycle,
+    Point,
+    drawn_in,
+    heights_above,
+    hull,
+    hulls,
+    pairs,
+    triple_under,
+    triples,
+    triples_under,
+)
+
+Floats = NDArray[np.float64]
+SQUARE: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
+SLACK = 1e-12  # twice the area (m2) of a triangle that counts as a line
+
+
+def columns(samples: list[list[Point]]) -> list[tuple[Floats, Floats, Floats]]:
+    """Return each point's coordinates over the samples."""
+    return [(p[:, 0], p[:, 1], p[:, 2]) for p in np.swapaxes(np.array(samples), 0, 1)]
+
+
+def of_many(samples: list[list[Point]]) -> list[tuple[Cycle, list[int]]]:
+    """Return every hull of the samples with its rows."""
+    active = tuple(range(len(samples[0])))
+    found = hulls(columns(samples), active, len(samples))
+    return [(cycle, np.arange(len(samples))[rows].tolist()) for cycle, rows in found]
+
+
+def alone(points: list[Point]) -> Cycle:
+    """Return the hull of one sample."""
+    return hull(tuple(points), tuple(range(len(points))))
+
+
+@pytest.mark.parametrize(
+    ('cycle', 'edges'),
+    [
+        ((), []),
+        ((4, 7, 2), [(4, 7), (7, 2), (2, 4)]),
+        ((0, 1, 2, 3), [(0, 1), (1, 2), (2, 3), (3, 0)]),
+    ],
+)
+def test_a_polygon_has_an_edge_from_each_corner_to_the_next(
+    cycle: Cycle, edges: list[tuple[int, int]]
+) -> None:
+    """And from the last to the first."""
+    assert list(pairs(cycle)) == edges
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+def test_a_hull_goes_counter_clockwise_from_its_least_number(order: tuple[int, ...]) -> None:
+    """Whatever the points' order; numbers are the caller's."""
+    corners = [(0.2, 0.1), (0.7, 0.2), (0.3, 0.9)]
+    points = tuple((*corners[k], 0.0) for k in order)
+    numbers = tuple(10 + k for k in order)
+    assert hull(points, numbers) == (10, 11, 12)
+
+
+def test_heights_do_not_count_from_above() -> None:
+    """Of points that stand twice in one place the same are taken, however high each is."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        flat = rng.integers(0, 3, (7, 2)).astype(float)
+        level = [(x, y, 0.0) for x, y in flat.tolist()]
+        hilly = [(x, y, float(rng.normal())) for x, y in flat.tolist()]
+        assert alone(hilly) == alone(level)
+
+
+@pytest.mark.parametrize(('out', 'corner'), [(0.0, False), (SLACK, False), (2.0 * SLACK, True)])
+@pytest.mark.parametrize('before', [-1e-3, 1e-3])
+def test_a_point_that_hardly_stands_out_is_no_corner(
+    out: float,
+    corner: bool,  # noqa: FBT001
+    before: float,
+) -> None:
+    """Not by the slack itself, alone or after a sample where it does or does not stand out."""
+    points: list[Point] = [*SQUARE, (0.5, -out, 0.0)]
+    cycle = (0, 4, 1, 2, 3) if corner else (0, 1, 2, 3)
+    assert alone(points) == cycle
+    first: list[Point] = [*SQUARE, (0.5, before, 0.0)]
+    same = alone(first) == cycle
+    expected = [(cycle, [0, 1, 2])] if same else [(alone(first), [0]), (cycle, [1, 2])]
+    assert of_many([first, points, points]) == expected
+
+
+@pytest.mark.parametrize(('width', 'corners'), [(0.5 * THIN, 0), (2.0 * THIN, 3)])
+@pytest.mark.parametrize('place', [(0.0, 0.0), (5.0, -7.0), (-6.0, 3.0)])
+@pytest.mark.parametrize('size', [0.1, 3.0])
+def test_what_is_thin_is_thin_wherever_it_lies(
+    width: float, corners: int, place: tuple[float, float], size: float
+) -> None:
+    """Along x or along y, for one sample as for many."""
+    x, y = place
+    along_x = [(x, y, 0.0), (x + size, y, 0.0), (x + 0.4 * size, y + width, 0.0)]
+    along_y = [(x, y, 0.0), (x + width, y + 0.4 * size, 0.0), (x, y + size, 0.0)]
+    for points in (along_x, along_y):
+        cycle = alone(points)
+        assert len(cycle) == corners
+        assert of_many([points] * 3) == [(cycle, [0, 1, 2])]
+
+
+@pytest.mark.parametrize(
+    'points', [[(1.0, 2.0, 0.0)] * 4, [(0.1 * k, 0.2 * k, 0.0) for k in range(4)], SQUARE[:2]]
+)
+def test_points_without_a_hull_are_told_at_once(points: list[Point]) -> None:
+    """All in one place, in one line, or too few: one answer for all samples."""
+    assert of_many([points] * 3) == [((), [0, 1, 2])]
+
+
+def test_samples_that_share_a_hull_share_an_answer() -> None:
+    """Whichever way round their points lie, each hull comes once and each sample with its own."""
+    left, right = SQUARE[:3], [SQUARE[0], SQUARE[2], SQUARE[1]]
+    assert of_many([left, right, left, right]) == [((0, 1, 2), [0, 2]), ((0, 2, 1), [1, 3])]
+
+
+def test_what_no_sample_moves_has_one_hull() -> None:
+    """Points of floats belong to all samples."""
+    assert [cycle for cycle, _ in hulls(SQUARE, (0, 1, 2, 3), 5)] == [(0, 1, 2, 3)]
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_every_sample_has_the_hull_it_has_alone(seed: int) -> None:
+    """More hulls than are tried on all samples, with points in line and in one place."""
+    rng = np.random.default_rng(seed)
+    samples = [
+        [(x, y, 0.0) for x, y in points]
+        for points in (rng.integers(0, 4, (150, 5, 2)) / 4.0).tolist()
+    ]
+    found = of_many(samples)
+    assert sorted(row for _, rows in found for row in rows) == list(range(150))
+    assert all(rows for _, rows in found)
+    for cycle, rows in found:
+        for row in rows:
+            points = [samples[row][k] for k in cycle]
+            expected = [samples[row][k] for k in alone(samples[row])]
+            assert set(points) == set(expected)
+
+
+def under(points: list[Point], place: Point) -> tuple[int, int, int] | None:
+    """Return the triple under a place, found alone and, the same, among many."""
+    one = triple_under(points, place)
+    number = triples_under(columns([points] * 2), tuple(np.array([x, x]) for x in place), 2)
+    assert number.tolist() == [-1 if one is None else triples(len(points)).index(one)] * 2
+    return one
+
+
+# Weights of the three corners: inside, on edges and corners, beyond each edge and each corner.
+INSIDE = [(0.2, 0.3, 0.5), (0.5, 0.5, 0.0), (0.5, 0.0, 0.5), (0.0, 0.5, 0.5), (1.0, 0.0, 0.0),
+          (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]  # fmt: skip
+OUTSIDE = [(-0.25, 0.5, 0.75), (0.5, -0.25, 0.75), (0.5, 0.75, -0.25), (2.0, -0.5, -0.5),
+           (-0.5, 2.0, -0.5), (-0.5, -0.5, 2.0)]  # fmt: skip
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+@pytest.mark.parametrize('weights', [*INSIDE, *OUTSIDE])
+@pytest.mark.parametrize('size', [0.5, 4.0])
+def test_a_triple_carries_what_lies_above_it(
+    order: tuple[int, ...], weights: tuple[float, ...], size: float
+) -> None:
+    """Its edges and corners too, whichever way round it is counted."""
+    corners = size * np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
+    x, y = np.array(weights) @ corners
+    points: list[Point] = [(*corners[k].tolist(), 0.1 * k) for k in order]
+    assert under(points, (x, y, 3.0)) == ((0, 1, 2) if weights in INSIDE else None)
+
+
+@pytest.mark.parametrize(
+    ('area', 'found'), [(THIN**2, None), (2.0 * THIN**2, (0, 1, 2)), (0.5 * THIN**2, None)]
+)
+def test_a_triple_in_one_line_carries_nothing(area: float, found: Cycle | None) -> None:
+    """Neither one of no more than a square micrometre."""
+    points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.5, area, 0.0)]
+    assert under(points, (0.0, 0.0, 1.0)) == found
+
+
+def lowest(points: Floats, x: float, y: float) -> float | None:
+    """Return the height of the lower hull at a place: the least mean height of weights there."""
+    count = len(points)
+    equal = np.vstack((points[:, :2].T, np.ones(count)))
+    found = linprog(points[:, 2], A_eq=equal, b_eq=(x, y, 1.0), bounds=[(0.0, None)] * count)
+    return None if found.fun is None else float(found.fun)
+
+
+@pytest.mark.parametrize('seed', range(30))
+def test_the_triple_under_a_place_is_on_the_lower_hull(seed: int) -> None:
+    """Its height there is the least a linear program finds; none where there is no such weight."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-0.7, 0.7, (6, 3)) + np.array((0.5, -0.3, -0.4))
+    place = rng.uniform(-0.7, 0.7, 2) + np.array((0.5, -0.3))
+    given: list[Point] = [(x, y, z) for x, y, z in points.tolist()]
+    found = under(given, (*place.tolist(), 0.0))
+    expected = lowest(points, *place.tolist())
+    assert (found is None) == (expected is None)
+    if found is not None and expected is not None:
+        ground = [*given, (*place.tolist(), expected)]
+        assert heights_above(ground, *found)[-1] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_of_triples_equally_low_the_first_is_taken() -> None:
+    """Live and in a recording alike: four points of one plane, seen from where two cross."""
+    assert under(SQUARE, (0.5, 0.5, 1.0)) == (0, 1, 2)
+    assert under(SQUARE, (0.75, 0.25, 1.0)) == (0, 1, 2)
+    assert under(SQUARE, (0.25, 0.75, 1.0)) == (0, 1, 3)
+    assert under(SQUARE, (0.4, 0.8, 1.0)) == (0, 2, 3)
+
+
+def test_each_sample_has_a_triple_of_its_own() -> None:
+    """Places all about, with some points that move and some that do not."""
+    rng = np.random.default_rng(3)
+    base = [(x, y, 0.0) for x, y in rng.uniform(-0.5, 0.5, (4, 2)).tolist()]
+    moving = rng.uniform(-0.6, 0.6, (2, 3, 80))
+    place = rng.uniform(-0.6, 0.6, (3, 80))
+    found = triples_under([*base, *moving], place, 80)
+    for k in range(80):
+        x, y, z = place[:, k].tolist()
+        tips = [(a, b, c) for a, b, c in moving[:, :, k].tolist()]
+        expected = triple_under([*base, *tips], (x, y, z))
+        assert found[k] == (-1 if expected is None else triples(6).index(expected))
+    assert len(set(found.tolist())) > 5
+
+
+@pytest.mark.parametrize('first', range(5))
+@pytest.mark.parametrize('shift', [(0.0, 0.0), (3.0, -2.0)])
+def test_a_place_outside_is_drawn_towards_the_middle(
+    first: int, shift: tuple[float, float]
+) -> None:
+    """To the hull's edge or corner, and a billionth of the way inside, whatever the order."""
+    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.5, 0.0), (1.0, 1.0), (-1.0, 1.0)]) + shift
+    points: list[Point] = [(x, y, 0.0) for x, y in np.roll(corners, first, axis=0).tolist()]
+    middle = corners.mean(axis=0)
+    edge = [(0.5 * (a + b), a, b) for a, b in zip(corners, np.roll(corners, 1, 0), strict=True)]
+    for target in (*corners, *(at for at, _, _ in edge)):
+        for beyond in (1.001, 1.5, 8.0):
+            x, y = (middle + beyond * (target - middle)).tolist()
+            found = np.array(drawn_in(points, (x, y, 0.3)))
+            np.testing.assert_allclose(found, target, atol=1e-8)
+            assert np.linalg.norm(found - middle) < np.linalg.norm(target - middle)
+            assert under(points, (*found.tolist(), 0.3)) is not None
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+def test_heights_are_above_the_plane_of_the_three(order: tuple[int, int, int]) -> None:
+    """Along z, over z = 0.7 x - 0.4 y + 0.3, wherever the three stand."""
+    rng = np.random.default_rng(5)
+    place = rng.uniform(-2.0, 2.0, (6, 2))
+    up = np.array((0.0, 0.0, 0.0, 0.4, -0.2, 1.5))
+    height = 0.7 * place[:, 0] - 0.4 * place[:, 1] + 0.3 + up
+    points = [(x, y, z) for (x, y), z in zip(place.tolist(), height.tolist(), strict=True)]
+    assert heights_above(points, *order) == pytest.approx(up.tolist(), abs=1e-12)
+    moved = columns([points] * 2)
+    for found, expected in zip(heights_above(moved, *order), up, strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_triples_are_all_and_each_once() -> None:
+    """In order of their numbers."""
+    assert triples(4) == ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
+    assert len(set(triples(7))) == len(list(combinations(range(7), 3)))
