@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from evaluation.margin_rows import rows
 from evaluation.streams import (
     T0,
     Carry,
@@ -23,7 +24,7 @@ from evaluation.streams import (
 from ugv_acceptance.evaluation import alert_advice
 from ugv_acceptance.evaluation.advice import COMPUTED, advise
 from ugv_acceptance.evaluation.alert_advice import AlertAdvice
-from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.payload_log import PayloadLog
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Limits
@@ -83,3 +84,78 @@ def test_of_many_alerts_the_most_severe_are_advised(monkeypatch: pytest.MonkeyPa
     assert 1 <= len(advised) <= 3
     assert len(others) >= 3
     assert min(advised) >= max(others)
+
+
+# Postures whose best advice differs in its words, and where the robot stands.
+LOW, HIGH, SLOPE = (0.0, 0.0), (0.6, 0.2), (2.5, 0.5, -9.4)
+TORQUE = Rule('TORQUE_LIMIT', 'lift', WARN, 36.0, 34.0, 0, 0)
+
+
+def sentence(q: tuple[float, float], subject: str = 'lift', load: Payload = LOAD) -> str:
+    """Return the first sentence of advice for a posture."""
+    return advise(SETTINGS, q, SLOPE, load, subject)[0].sentence
+
+
+def adviser(log: list[Alert], load: Payload = LOAD) -> AlertAdvice:
+    """Return what gathers the cases of a log."""
+    return AlertAdvice(SETTINGS, log, lambda _: load)
+
+
+def test_the_row_of_the_very_moment_counts() -> None:
+    """The first one too; else the one before, if need be the last of the stretch before."""
+    log = [Alert(TORQUE, 1 * S, 40.0), Alert(TORQUE, 5 * S // 2, 40.0)]
+    gathered = adviser(log)
+    gathered.add(rows((1, 2, 3), q=(LOW, HIGH, LOW), gravity=(SLOPE,) * 3))
+    log += [Alert(TORQUE, 7 * S // 2, 40.0), Alert(TORQUE, 4 * S, 40.0)]
+    gathered.add(rows((), q=()))
+    log.append(Alert(TORQUE, 5 * S - 1, 40.0))
+    gathered.add(rows((5, 6), q=(HIGH, HIGH), gravity=(SLOPE,) * 2))
+    log.append(Alert(TORQUE, 5 * S, 40.0))
+    found = gathered.sentences()
+    assert sentence(LOW) != sentence(HIGH)
+    assert [found[id(alert)] for alert in log] == [
+        sentence(q) for q in (LOW, HIGH, LOW, LOW, LOW, HIGH)
+    ]
+
+
+def test_what_is_raised_before_any_row_or_after_the_last_is_no_failure() -> None:
+    """Before it nothing is known; after it the last row counts."""
+    log = [Alert(TORQUE, S // 2, 40.0)]
+    gathered = adviser(log)
+    assert gathered.sentences() == {}
+    gathered = adviser(log)
+    gathered.add(rows((1, 2), q=(LOW, HIGH), gravity=(SLOPE,) * 2))
+    log.append(Alert(TORQUE, 9 * S, 40.0))
+    assert gathered.sentences() == {id(log[1]): sentence(HIGH)}
+
+
+def test_the_payload_is_that_of_the_time_the_joints_were_heard() -> None:
+    """Half a second before the row."""
+    log, asked = [Alert(TORQUE, 2 * S, 40.0)], []
+
+    def payload_at(time: int) -> Payload:
+        asked.append(time)
+        return Payload(2.5, LOAD.cog)
+
+    gathered = AlertAdvice(SETTINGS, log, payload_at)
+    gathered.add(rows((1, 2), q=(LOW, HIGH), gravity=(SLOPE,) * 2))
+    assert gathered.sentences() == {id(log[0]): sentence(HIGH, load=Payload(2.5, LOAD.cog))}
+    assert asked == [3 * S // 2]
+
+
+def test_fifty_alerts_are_advised_the_most_severe_and_then_the_first() -> None:
+    """Of sixty, each of which has advice."""
+    warnings = [Alert(TORQUE, k * S, 40.0) for k in range(40)]
+    errors = [Alert(replace(TORQUE, level=ERROR), (40 + k) * S, 50.0) for k in range(20)]
+    log = [*warnings, *errors]
+    gathered = adviser(log)
+    gathered.add(rows(range(60), q=(LOW,) * 60, gravity=(SLOPE,) * 60))
+    assert set(gathered.sentences()) == set(map(id, [*errors, *warnings[:30]]))
+
+
+def test_other_alerts_are_left_alone() -> None:
+    """What to do about lost data is no matter of margins."""
+    log = [Alert(replace(TORQUE, code='INPUT_STALE'), S, 1.0)]
+    gathered = adviser(log)
+    gathered.add(rows((1, 2), q=(LOW, LOW), gravity=(SLOPE,) * 2))
+    assert gathered.sentences() == {}

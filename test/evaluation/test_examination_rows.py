@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from evaluation.margin_rows import S, rows
 from evaluation.streams import settings
 
 from ugv_acceptance.evaluation.criteria import (
@@ -20,49 +21,12 @@ from ugv_acceptance.evaluation.criteria import (
     Window,
 )
 from ugv_acceptance.evaluation.examination import Examination, KnownTime, MapMeasure, ValueMeasure
-from ugv_acceptance.evaluation.imu import ImuRows
-from ugv_acceptance.evaluation.joints import JointRows
-from ugv_acceptance.evaluation.rows import MarginRows, Pairs
+from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.model.robot import Payload
 
-S = 1_000_000_000
 TOLD = settings()
 BELOW = Value('torque', 'lift', below=True, limit=5.0)
 ABOVE = Value('position', 'lift', below=False, limit=0.5)
-
-
-def rows(
-    time: Sequence[float],
-    torque: Sequence[float | tuple[float, float]] = (),
-    q: Sequence[tuple[float, float]] = (),
-    until: Sequence[float] = (),
-    known: Sequence[bool] = (),
-) -> MarginRows:
-    """Return rows at times (s); torque is of the lift, or of both joints.
-
-    The message of the joints comes half a second before the row; gravity counts the rows down.
-    """
-    n = len(time)
-    at = (np.array(time) * S).astype(np.int64)
-    ends = (np.array(until or [*time[1:], time[-1] + 1.0] if n else []) * S).astype(np.int64)
-    both = [t if isinstance(t, tuple) else (t, 0.0) for t in torque or [0.0] * n]
-    position = np.array(q or [(0.0, 0.0)] * n, np.float64).reshape(n, 2)
-    nan, no = np.full((n, 2), np.nan), np.zeros(n, np.bool_)
-    gravity = np.column_stack((np.zeros(n), np.zeros(n), -np.arange(1.0, n + 1)))
-    order = np.arange(n, dtype=np.intp)
-    # Messages of the joints stand in turned order, so that a row number is no message number.
-    pairs = Pairs(
-        JointRows((at - S // 2)[::-1], at, position[::-1], nan, nan, at, no),
-        ImuRows(at, at, gravity, no),
-        order[::-1],
-        order,
-    )
-    empty = np.empty((n, 0))
-    return MarginRows(
-        at, at, ends, np.array(known or [True] * n, np.bool_),
-        np.array(both, np.float64).reshape(n, 2), np.ones((n, 4)), np.zeros(n, np.int8),
-        empty, empty, np.empty(0), pairs,
-    )  # fmt: skip
 
 
 def measured(
