@@ -10,13 +10,23 @@ import pytest
 from hypothesis import assume, given
 
 from ugv_acceptance.model.expressions import (
+    Mat,
     Scalar,
+    Vec,
+    add,
     atan2,
     copysign,
     cos,
+    cross,
+    dot,
+    matmul,
     minimum,
+    rotate,
+    scale,
     sin,
     sqrt,
+    subtract,
+    transpose,
 )
 from ugv_acceptance.model.kernels import compile_kernel
 
@@ -182,3 +192,109 @@ def test_the_smaller_of_nan_and_a_number_is_nan(x: float, y: float) -> None:
     kernel = compile_kernel(lambda x, y: [minimum(x, y)], ['x', 'y'])
     assert math.isnan(kernel.run(x, y)[0])
     assert np.isnan(kernel.run(np.array([x]), np.array([y]))[0]).all()
+
+
+# A formula of x and y, and how many operations are left of it.
+FOLDED: list[tuple[Callable[[Any, Any], Any], int]] = [
+    (lambda x, _: x + 0.0, 0),
+    (lambda x, _: 0.0 + x, 0),
+    (lambda x, _: x - 0.0, 0),
+    (lambda x, _: x - x, 0),
+    (lambda x, _: x * 1.0, 0),
+    (lambda x, _: x * 0.0, 0),
+    (lambda x, _: 0.0 / x, 0),
+    (lambda x, _: -(0.0 - x), 0),
+    (lambda x, _: -1.0 * (-1.0 * x), 0),
+    (lambda x, _: 0.0 - (0.0 - x), 0),
+    (lambda x, _: (0.25 * x) * 4.0, 0),
+    (lambda x, _: x + 1.0, 1),
+    (lambda x, _: x - 1.0, 1),
+    (lambda x, _: 1.0 - x, 1),
+    (lambda x, _: 1.0 / x, 1),
+    (lambda x, _: x / 1.0, 1),
+    (lambda x, _: -x * 3.0, 1),
+    (lambda x, _: 3.0 * (2.0 * x), 1),
+    (lambda x, _: -(3.0 * x), 1),
+    (lambda x, _: -3.0 * (-2.0 * x), 1),
+    (lambda x, y: x + (-y), 1),
+    (lambda x, y: (-x) + y, 1),
+    (lambda x, y: x - (-y), 1),
+    (lambda x, y: -(x - y), 1),
+    (lambda x, y: (-x) * (-y), 1),
+    (lambda x, y: (-x) * (-1.0 * y), 1),
+    (lambda x, y: -((-x) * y), 1),
+    (lambda x, y: -(x * (-y)), 1),
+    (lambda x, y: (x + y) - (y + x), 0),
+    (lambda x, y: -(x * y), 2),
+    (lambda x, y: -(x + y), 2),
+    (lambda x, y: (x * y) * 2.0, 2),
+    (lambda x, y: (x - y) * (x - y), 2),
+    (lambda x, y: (x - y) * (y - x), 3),
+]
+
+
+@pytest.mark.parametrize('case', range(len(FOLDED)))
+def test_no_operation_is_left_that_could_be_spared(case: int) -> None:
+    """Neutral constants, double signs and constants of one product cost nothing."""
+    formula, operations = FOLDED[case]
+    kernel = compile_kernel(lambda x, y: [formula(x, y)], ['x', 'y'])
+    assert kernel.source.count(' = ') == operations
+    for x, y in ((1.5, -0.25), (-0.75, 2.0), (3.0, 1.25)):
+        assert kernel.one(x, y)[0] == pytest.approx(formula(x, y), rel=1e-15)
+
+
+def test_constants_equal_by_their_digits_are_one() -> None:
+    """Two numbers written apart: one product."""
+    halves = [float(text) for text in ('0.5', '5e-1')]
+    kernel = compile_kernel(lambda x: [x * halves[0], halves[1] * x], ['x'])
+    assert kernel.source.count('*') == 1
+
+
+@pytest.mark.parametrize('x', [-0.5, 0.5, 2.0])
+def test_a_function_of_a_number_and_a_symbol_is_not_folded(x: float) -> None:
+    """Whichever of the two comes first."""
+
+    def formula(x: Scalar) -> list[Scalar]:
+        return [
+            atan2(1.0, x), atan2(x, 1.0), copysign(2.0, x), copysign(x, -1.0),
+            minimum(0.75, x), minimum(x, 0.75),
+        ]  # fmt: skip
+
+    expected = [
+        math.atan2(1.0, x), math.atan2(x, 1.0), math.copysign(2.0, x), math.copysign(x, -1.0),
+        min(0.75, x), min(x, 0.75),
+    ]  # fmt: skip
+    assert compile_kernel(formula, ['x']).one(x) == tuple(expected)
+    assert formula(x) == expected
+
+
+@pytest.mark.parametrize(('x', 'y'), [(math.nan, 1.0), (1.0, math.nan), (math.nan, math.nan)])
+def test_minimum_of_numbers_is_nan_with_nan(x: float, y: float) -> None:
+    """As numpy's."""
+    assert math.isnan(float(minimum(x, y)))  # type: ignore[arg-type]
+
+
+def test_vectors_and_matrices_are_numpy_s() -> None:
+    """Sums, products, rotations and transposes of numbers."""
+    rng = np.random.default_rng(0)
+    (a, b), (m, n) = rng.normal(size=(2, 3)), rng.normal(size=(2, 3, 3))
+    u, v = vector(a), vector(b)
+    p, q = matrix(m), matrix(n)
+    assert dot(u, v) == pytest.approx(a @ b)
+    for ours, theirs in (
+        (cross(u, v), np.cross(a, b)), (add(u, v), a + b), (subtract(u, v), a - b),
+        (scale(u, 3.0), 3.0 * a), (rotate(p, v), m @ b), (transpose(p), m.T), (matmul(p, q), m @ n),
+    ):  # fmt: skip
+        np.testing.assert_allclose(np.array(ours), theirs, rtol=1e-13)
+
+
+def vector(values: Any) -> Vec:
+    """Return three numbers as a tuple."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def matrix(rows: Any) -> Mat:
+    """Return three rows as tuples."""
+    a, b, c = map(vector, rows)
+    return a, b, c
