@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import hypothesis
 import numpy as np
@@ -149,3 +150,60 @@ def test_a_leap_is_forgotten_when_the_joint_is_slow_again() -> None:
     assert watch.log[0].end == T0 + 4 * S
     assert all(map(math.isnan, known[200:400]))
     assert known[400:] == [0.3] * 200
+
+
+def heard(
+    told: list[tuple[int, float]], joint: str = 'hand_slide', **change: Any
+) -> list[tuple[str, int]]:
+    """Return the leaps (subject, seconds from the start) of a joint told (ms, position)."""
+    robot = settings().robot
+    joints = tuple(replace(j, lower=-9.0, upper=9.0, **change) for j in robot.joints)
+    of = replace(settings(), robot=replace(robot, joints=joints))
+    logs = []
+    for columns in (False, True):
+        watch = Watch(of)
+        merger = JointMerger(of, watch.leaps)
+        run = [Joints(T0 + at * MS, (joint,), (q,)) for at, q in told]
+        for part in split(run, [len(run) // 3, 370]):
+            if columns:
+                merger.merge_columns(batch_of(part).joints)
+            else:
+                for m in part:
+                    assert isinstance(m, Joints)
+                    merger.merge(m.time, m.names, m.position, (), ())
+        logs.append([(a.rule.subject, (a.start - T0) // S) for a in watch.log])
+    assert logs[0] == logs[1]
+    return logs[0]
+
+
+@pytest.mark.parametrize('every', [10, 100, 300])
+def test_two_robots_that_tell_of_one_joint_are_not_believed(every: int) -> None:
+    """The slide makes 1 m/s; another robot's stands 0.2 m off. Each second begins with ours."""
+    ours = [(at, 0.0) for at in range(0, 3000, 10)]
+    theirs = [(at + 3, 0.2) for at in range(20, 3000, every)]
+    assert heard(sorted(ours + theirs)) == [('slide', 1)]
+
+
+def test_robots_that_agree_are_believed() -> None:
+    """Two drivers of one robot, one a little behind: 0.05 m between them at 1 m/s."""
+    told = [(at + late, (at - 10 * late) / 1e3) for at in range(0, 3000, 10) for late in (0, 5)]
+    assert not heard(told, velocity=1.0)
+
+
+def test_a_wrong_reading_a_second_is_no_contradiction() -> None:
+    """There and back are two jumps; three in a second are one too many."""
+    told = [(at, 0.2 if at % 1000 == 500 else 0.0) for at in range(0, 4000, 10)]
+    assert not heard(told)
+    assert heard([*told[:160], (1601, 0.2), *told[160:]]) == [('slide', 2)]
+
+
+def test_messages_that_come_late_and_all_at_once_do_not_leap() -> None:
+    """Five of a moving slide within a millisecond of each other, again and again."""
+    assert not heard([(at - at % 50 + at % 50 // 10, at / 1e3) for at in range(0, 3000, 10)])
+
+
+@pytest.mark.parametrize(('kind', 'leaps'), [('continuous', 0), ('revolute', 1)])
+def test_a_turn_to_and_fro_is_no_leap_of_an_endless_joint(kind: str, leaps: int) -> None:
+    """It rests where its driver wraps: told as half a turn, and minus half a turn."""
+    told = [(at, math.pi * (-1) ** (at // 10)) for at in range(5, 3000, 10)]
+    assert len(heard(told, 'lift', kind=kind)) == leaps

@@ -56,6 +56,19 @@ def test_a_weak_motor_is_told_when_it_gives_no_more() -> None:
     assert all(0.2 < late < 0.6 for late in told)
 
 
+def test_a_second_publisher_is_alarmed_before_the_robot_tips() -> None:
+    """Positions of two robots in turn: no margin is told from either, a second later at most."""
+    told = [
+        event
+        for case in cases(CONFIG, 200, 0)
+        if case[0] == 'swing+second-publisher'
+        for event in label(CONFIG, *case).events
+        if event.kind == TIP
+    ]
+    assert len(told) > 2
+    assert all(e.alarmed < 4.1 < e.time - 0.5 for e in told)
+
+
 def test_braking_is_an_impact_and_a_swinging_arm_is_none() -> None:
     """What shoves the base before it tips is an impact; gravity and a moving arm are not."""
     dashed = [e.impact for s in (0, 1, 4) for e in labelled('dash', s).events if e.kind == TIP]

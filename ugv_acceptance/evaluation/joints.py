@@ -1,7 +1,8 @@
 """Joint states to the robot's joints: names matched, signs undone, partial messages merged.
 
 Once a second every joint's position is compared with that of the second before: what moves faster
-than the joint can is another unit or another joint, and counts for nothing.
+than the joint can is another unit or another joint, and counts for nothing. So does what jumps to
+and fro between messages: two robots tell of one joint, and nobody knows which to believe.
 """
 
 import math
@@ -15,9 +16,12 @@ from ugv_acceptance.evaluation.alerts import Signal
 from ugv_acceptance.evaluation.samples import JointStateColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Joint
+from ugv_acceptance.model.rows import Values
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
 # A position this far (rad or m) beyond a joint's limits cannot be the joint's.
 BEYOND = 0.1
@@ -26,6 +30,9 @@ ABSURD = 1e5
 NEVER = -1
 # Positions are compared in every one of these stretches of time (ns), if so much lies between them.
 SECOND, APART = 1_000_000_000, 500_000_000
+# Two messages may hold what lies this much (ns) apart: they are late, or overtake each other. A
+# joint that was homed jumps once, a wrong reading there and back; so many jumps contradict.
+SHORTEST, MANY = 10_000_000, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +50,7 @@ class JointRows:
     qd: Floats
     effort: Floats
     oldest: Times
-    unusable: NDArray[np.bool_]
+    unusable: Mask
 
 
 @dataclass(slots=True)
@@ -73,6 +80,9 @@ class JointMerger:
     _layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
     _range: list[tuple[float, float]] = field(init=False)
     _before: list[tuple[int, float]] = field(init=False)
+    _told: list[float] = field(init=False)
+    _jumps: list[int] = field(init=False)
+    _most: list[float] = field(init=False)
     _turn: list[float] = field(init=False)
     _leapt: bool = False
 
@@ -84,6 +94,9 @@ class JointMerger:
         joints = [robot.joint(name) for name in robot.joint_names]
         self._range = list(map(_believable, joints))
         self._before = [(NEVER, math.nan)] * n
+        self._told, self._jumps = [math.nan] * n, [0] * n
+        # What a joint can move by between two messages that come at once.
+        self._most = [s.rule.on * SHORTEST / SECOND for s in self.leaps] or [math.inf] * n
         self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
 
     def layout(self, names: tuple[str, ...]) -> Layout:
@@ -121,7 +134,11 @@ class JointMerger:
         for j, k in pairs:
             joint, (lower, upper) = self.settings.joints[j], self._range[j]
             q = joint.sign * position[k] + joint.offset
-            self.q[j] = q if lower <= q <= upper else math.nan
+            self.q[j] = q = q if lower <= q <= upper else math.nan
+            way = abs(q - self._told[j])
+            if way > self._most[j] and self._jumped(j, way, now - self.seen[j]):
+                self._jumps[j] += 1
+            self._told[j] = q
             self.seen[j] = now
             qd = joint.sign * velocity[k] if rates else math.nan
             self.qd[j] = qd if -ABSURD <= qd <= ABSURD else math.nan
@@ -150,9 +167,16 @@ class JointMerger:
         if not self.leaps or math.isnan(q) or (then != NEVER and now - then < APART):
             return
         self._before[j] = now, q
+        jumps, self._jumps[j] = self._jumps[j], 0
         if then != NEVER:
             way = abs(q - before)
-            self.leaps[j].step(now, min(way, abs(way - self._turn[j])) / (now - then) * SECOND)
+            rate = min(way, abs(way - self._turn[j])) / (now - then) * SECOND
+            self.leaps[j].step(now, max(rate, self.leaps[j].on if jumps >= MANY else 0.0))
+
+    def _jumped(self, j: int, way: Values, apart: Values) -> Values:
+        """Return whether joint number j cannot have moved so far in so long (ns), nor turned."""
+        way = np.minimum(way, abs(way - self._turn[j]))
+        return way > self._most[j] * np.maximum(apart / SHORTEST, 1.0)
 
     def merge_columns(self, segments: Sequence[JointStateColumns]) -> JointRows:
         """Take many messages: the same rows as `merge` one at a time, in order of receipt."""
@@ -174,11 +198,11 @@ class JointMerger:
             tables, named, of = tables[:, :, order], named[:, order], of[order]
         if self.leaps and n:
             rows_of = [(self.layout(x), np.flatnonzero(of == k)) for x, k in numbers.items()]
-            self._look_at(time, tables[0], rows_of)
+            self._look_at(time, tables[0], named, rows_of)
         return self._carry(time, stamp, tables, named)
 
     def _look_at(
-        self, time: Times, q: Floats, rows_of: Sequence[tuple[Layout, NDArray[np.intp]]]
+        self, time: Times, q: Floats, named: Mask, rows_of: Sequence[tuple[Layout, Indices]]
     ) -> None:
         """Look for leaps in the positions (j, n) that messages name, as `_look` at each of them."""
         before, seen = [signal.alert for signal in self.leaps], len(self.leaps[0].log)
@@ -188,9 +212,14 @@ class JointMerger:
             firsts = rows[np.flatnonzero(np.diff(seconds, prepend=layout.second))]
             layout.second = int(seconds[-1])
             looks += [(row, j) for row in firsts.tolist() for j, _ in layout.pairs]
+        jumps = [self._jump_rows(j, time, q[j], named[j]) for j in range(len(q))]
         for row, j in sorted(looks):
+            if len(jumps[j]):
+                count = int(np.searchsorted(jumps[j], row, 'right'))
+                self._jumps[j], jumps[j] = self._jumps[j] + count, jumps[j][count:]
             self._compare(j, int(time[row]), float(q[j, row]))
         for j, signal in enumerate(self.leaps):
+            self._jumps[j] += len(jumps[j])
             signal.advance(int(time[-1]))
             for alert in [before[j], *signal.log[seen:]]:
                 if alert is not None and alert.rule is signal.rule:
@@ -198,7 +227,21 @@ class JointMerger:
                     q[j, (time >= alert.start) & (time < end)] = np.nan
         self._leapt = not all(signal.quiet for signal in self.leaps)
 
-    def _fill(self, tables: Floats, named: NDArray[np.bool_], segment: JointStateColumns) -> None:
+    def _jump_rows(self, j: int, time: Times, q: Floats, named: Mask) -> Indices:
+        """Return the rows at which joint number j jumps, as `merge` finds them."""
+        rows = np.arange(len(q)) if named.all() else np.flatnonzero(named)
+        if not len(rows) or self._most[j] == math.inf:
+            return rows[:0]
+        told = q if len(rows) == len(q) else q[rows]
+        far = np.flatnonzero(np.abs(told[1:] - told[:-1]) > self._most[j]) + 1
+        if abs(told[0] - self._told[j]) > self._most[j]:
+            far = np.concatenate(([0], far))
+        before = np.where(far > 0, told[far - 1], self._told[j])
+        apart = time[rows[far]] - np.where(far > 0, time[rows[far - 1]], self.seen[j])
+        self._told[j] = float(told[-1])
+        return rows[far[self._jumped(j, np.abs(told[far] - before), apart)]]
+
+    def _fill(self, tables: Floats, named: Mask, segment: JointStateColumns) -> None:
         """Write a segment's positions, rates and efforts, and which joints it names."""
         layout = self.layout(segment.names).pairs
         if len(layout) < len(named) or not (segment.velocity.size and segment.effort.size):
@@ -217,9 +260,7 @@ class JointMerger:
                     tables[2, j] = scale * segment.effort[:, k]
             named[j] = True
 
-    def _carry(
-        self, time: Times, stamp: Times, tables: Floats, named: NDArray[np.bool_]
-    ) -> JointRows:
+    def _carry(self, time: Times, stamp: Times, tables: Floats, named: Mask) -> JointRows:
         """Let every joint keep its newest value until the next message that names it."""
         oldest, unusable = time, np.isnan(tables[0]).any(axis=0)
         if not named.all():
@@ -235,7 +276,7 @@ class JointMerger:
         q, qd, effort = (table.T for table in tables)
         return JointRows(time, stamp, q, qd, effort, oldest, unusable)
 
-    def _carry_joint(self, j: int, time: Times, tables: Floats, named: NDArray[np.bool_]) -> Times:
+    def _carry_joint(self, j: int, time: Times, tables: Floats, named: Mask) -> Times:
         """Fill the rows that do not name joint number j; return when its value was received."""
         newest = np.maximum.accumulate(np.where(named, np.arange(len(time)), -1))
         known = newest >= 0
