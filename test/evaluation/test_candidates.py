@@ -129,3 +129,49 @@ def test_a_robot_on_one_track_does_not_turn(across: float, slips: bool) -> None:
     assert ((0.3 - abs(y)) / 0.6 < 0.25) == slips
     for path in turn_paths(TOLD.robot, STILL, down, Payload()):
         assert path.forbidden.all() == slips
+
+
+def test_an_arm_that_lies_low_may_move_along_the_ground() -> None:
+    """At 3 cm a level slide comes no lower; the lift may go up, not down."""
+    robot = TOLD.robot
+    joints = (replace(robot.joints[0], xyz=(0.1, 0.0, 0.03)), *robot.joints[1:])
+    low = replace(TOLD, robot=replace(robot, joints=joints))
+    paths = joint_paths(low, STILL, np.array(DOWN), NO_TORQUE)
+    forbidden = {(p.subject, p.amount[-1] > 0.0): p.forbidden.tolist() for p in paths}
+    assert forbidden == {
+        ('lift', True): [False] * 16, ('lift', False): [True] * 16,
+        ('slide', True): [False] * 16, ('slide', False): [False] * 16,
+    }  # fmt: skip
+
+
+def test_the_last_joint_of_an_arm_without_a_load_counts() -> None:
+    """Where nothing is carried, the slide's joint, 1 m from the lift, is the lowest."""
+    bare = replace(TOLD, robot=replace(TOLD.robot, payload_link=None))
+    _, down, *_ = joint_paths(bare, STILL, np.array(DOWN), NO_TORQUE)
+    lowest = 0.3 + np.sin(down.q[:, 0])
+    assert (down.forbidden == (lowest < 0.06 - 1e-6)).all()
+    assert 0 < down.forbidden.sum() < 16
+
+
+def test_a_joint_that_cannot_move_has_no_path() -> None:
+    """Nor has a robot of such joints any."""
+    fixed = tuple(replace(j, lower=0.0, upper=0.0) for j in TOLD.robot.joints)
+    still = replace(TOLD, robot=replace(TOLD.robot, joints=fixed))
+    assert joint_paths(still, STILL, np.array(DOWN), NO_TORQUE) == []
+
+
+def test_a_turn_that_would_slip_anywhere_is_forbidden_there() -> None:
+    """A robot that leans to the front slips while the slope is across: on both sides, not before.
+
+    Closed form: gravity through the centre of gravity meets the ground beyond a quarter.
+    """
+    down = np.array((6.2, 0.0, -9.0))
+    cog = centre_of_gravity(TOLD.robot, STILL, Payload())
+    for path in turn_paths(TOLD.robot, STILL, down, Payload()):
+        y = cog[2] * path.gravity[:, 1] / 9.0
+        x = cog[0] + cog[2] * path.gravity[:, 0] / 9.0
+        stands = np.abs(x) < 0.4
+        slips = (0.3 - np.abs(y)) / 0.6 < 0.25
+        assert (path.forbidden == (slips | ~stands)).all()
+        assert slips.any()
+        assert not slips.all()

@@ -61,7 +61,7 @@ def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) 
     for j, name in enumerate(robot.joint_names):
         joint, speed = robot.joint(name), joint_speed(settings, j)
         for way in (1.0, -1.0):
-            if abs(torque[j]) >= settings.limits.torque[j] and torque[j] * way > 0.0:
+            if abs(torque[j]) >= settings.limits.torque[j] and np.sign(torque[j]) == way:
                 continue
             amount = _amounts(robot, joint, float(q[j]), way * speed * HORIZON)
             path = np.tile(q, (len(amount), 1))
@@ -75,7 +75,7 @@ def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) 
 def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
     """Return the steps of a joint's path, which ends where the joint does."""
     end = float(np.clip(start + reach, joint.lower, joint.upper)) - start
-    if end * reach <= 0.0:
+    if np.sign(end) != np.sign(reach):
         return np.empty(0)
     fine = _moves_contacts(robot, joint.child)
     count = max(STEPS, int(abs(end) / FINE)) if fine else STEPS
