@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bag.bag_cases import Message, expected, rows, run, write_mcap
+from bag.bag_cases import IMU, Message, expected, rows, run, write_mcap
 from bag.recordings import BOTH, SHAPES, chunk_starts, damaged, read
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.reader import make_reader
 from mcap.summary import Summary
+from mcap.writer import CompressionType
 
 from ugv_acceptance.bag.chunks import indexed, walk
 from ugv_acceptance.bag.mcap_index import MAGIC
@@ -173,6 +174,42 @@ def test_a_chunk_of_another_size_than_it_says(tmp_path: Path, shape: str, findin
     assert finding in facts.findings[0]
     raw = list(raw_messages(bag, bag.topics))
     assert [message.log_time for message in raw] == sorted(time for time, _ in found)
+
+
+def test_a_scan_leaves_out_what_it_cannot_unpack(tmp_path: Path) -> None:
+    """Without an index, a chunk that is broken or claims too much loses itself alone."""
+    path = write_mcap(tmp_path / 'run.mcap', WRITTEN, **SHAPES['no chunk indexes'])
+    starts = chunk_starts(path.read_bytes())
+    damaged(path, starts[0] + 33, b'\x01\x02\x03\x04')  # its checksum
+    damaged(path, starts[1] + 25, struct.pack('<Q', 1 << 40))
+    bag, batches, _ = read(path)
+    found = rows(batches)
+    assert 0 < len(found) < len(WRITTEN)
+    assert set(found) < set(expected(WRITTEN))
+    assert bag.findings[0].startswith(f'run.mcap: chunk at byte {starts[0]} not used: its checksum')
+    assert bag.findings[1].startswith(f'run.mcap: chunk at byte {starts[1]} not read: it claims')
+
+
+def test_a_scan_says_where_the_records_of_a_chunk_break(tmp_path: Path) -> None:
+    """What lies before the break is kept."""
+    options = {**SHAPES['no chunk indexes'], 'compression': CompressionType.NONE}
+    path = write_mcap(tmp_path / 'run.mcap', WRITTEN, enable_crcs=False, **options)
+    start = chunk_starts(path.read_bytes())[1]
+    damaged(path, path.read_bytes().index(b'\x05', start + 1500), bytes(9))
+    bag, batches, _ = read(path)
+    found = rows(batches)
+    assert 0 < len(found) < len(WRITTEN)
+    assert set(found) < set(expected(WRITTEN))
+    assert f'chunk at byte {start}: its records break at byte' in bag.findings[0]
+
+
+def test_a_scan_passes_a_record_that_is_too_big(tmp_path: Path) -> None:
+    """A message above the limit is left out with its size; those behind it are read."""
+    written = [*WRITTEN[:3], ('/big', IMU, WRITTEN[3][2], bytes(1_200_000)), *WRITTEN[3:]]
+    path = write_mcap(tmp_path / 'run.mcap', written, use_chunking=False)
+    bag, batches, _ = read(path, max_chunk_bytes=1 << 14)
+    assert rows(batches) == expected(WRITTEN)
+    assert 'record of 1200031 bytes at byte' in bag.findings[0]
 
 
 def test_a_file_cut_off_while_it_is_read(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_an_alert_appears_sounds_and_is_acknowledged(shown: Page, robot: Live) -
     shown.wait('document.body.dataset.sound === "armed"')
     assert shown.run(LEVEL) == 'ERROR'
     assert not shown.run('verdict.classList.contains("flash")')
-    assert 'Ada' in shown.text('#alerts li small')
+    assert 'Ada' in shown.text('#alerts li.ERROR small')
 
 
 def test_one_voice_at_a_time(shown: Page, robot: Live) -> None:

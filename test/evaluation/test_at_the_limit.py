@@ -1,7 +1,6 @@
-"""Values that are exactly at a limit, and the comparison with the model in closed form."""
+"""Values that are exactly at a limit, and least squares in closed form."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +10,6 @@ from evaluation.streams import LEVEL, MS, REST, STILL, T0, Joints, S, batch_of, 
 from numpy.typing import NDArray
 from scipy import stats
 
-from ugv_acceptance.evaluation import comparison
-from ugv_acceptance.evaluation.comparison import LEAST, _Samples
 from ugv_acceptance.evaluation.criteria import default_criteria
 from ugv_acceptance.evaluation.joints import JointMerger
 from ugv_acceptance.evaluation.live import LiveEvaluator
@@ -132,122 +129,6 @@ def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
     assert [c.name for c in found.criteria] == ['torque lift', 'tip-over', 'support', 'coverage']
     limits: list[Any] = [getattr(c.demand, 'limit', None) for c in found.criteria]
     assert limits == [0.9, Limits(()).tip_error, None, None]
-
-
-def samples(
-    count: int, effort: Callable[[Floats, Floats], Floats], *, moving: int = 0, lever: float = 2.0
-) -> _Samples:
-    """Return samples of one joint: `moving` of them at rates of both signs, the others at rest."""
-    rng = np.random.default_rng(count)
-    torque = rng.uniform(-10.0, 10.0, count)
-    rate = np.zeros(count)
-    rate[:moving] = rng.uniform(0.1, 1.0, moving) * np.where(np.arange(moving) % 2, 1.0, -1.0)
-    return _Samples(
-        effort(torque, rate), torque, np.full(count, lever), rate,
-        np.zeros(count, np.bool_), rate == 0.0,
-    )  # fmt: skip
-
-
-def test_friction_is_told_apart_by_speed() -> None:
-    """1.5 N m against any motion and 0.7 N m s/rad more, of a bias that is neither."""
-    found = comparison._friction(
-        samples(80, lambda t, r: t + 1.5 * np.sign(r) + 0.7 * r + 2.0, moving=60)
-    )
-    assert found is not None
-    assert found['coulomb']['value'] == pytest.approx(1.5)
-    assert found['viscous']['value'] == pytest.approx(0.7)
-
-
-@pytest.mark.parametrize(('moving', 'told'), [(LEAST, True), (LEAST - 1, False)])
-def test_friction_needs_thirty_samples_both_ways(moving: int, told: bool) -> None:  # noqa: FBT001
-    """Of one sign alone it is a bias."""
-    both = samples(80, lambda t, r: t + np.sign(r), moving=moving)
-    assert (comparison._friction(both) is not None) == told
-    for sign in (1.0, -1.0):
-        one = replace(both, rate=sign * np.abs(both.rate))
-        assert comparison._friction(one) is None
-
-
-@pytest.mark.parametrize(('count', 'told'), [(LEAST, True), (LEAST - 1, False)])
-def test_thirty_samples_at_rest_tell_of_bias_scale_and_payload(count: int, told: bool) -> None:  # noqa: FBT001
-    """Effort = 0.8 torque + 3: bias, root mean square and payload by their definitions."""
-    s = samples(count, lambda t, _: 0.8 * t + 3.0)
-    found, difference = comparison._rest(s), s.effort - s.torque
-    assert (found['bias'] is not None) == told
-    assert (comparison._pooled_payload([s]) is not None) == told
-    if told:
-        assert found['bias']['value'] == pytest.approx(difference.mean())
-        assert found['rms'] == pytest.approx(np.sqrt((difference**2).mean()))
-        assert found['scale']['value'] == pytest.approx(0.8)
-        assert found['payload_kg']['value'] == pytest.approx(difference.mean() / 2.0)
-        assert found['sign'] == 'same'
-
-
-@pytest.mark.parametrize(('lever', 'told'), [(0.51, True), (0.5, False), (-0.51, True)])
-def test_a_joint_that_feels_half_a_newton_metre_a_kg_weighs(lever: float, told: bool) -> None:  # noqa: FBT001
-    """Less leverage tells nothing of a payload."""
-    s = samples(50, lambda t, _: t + 1.0, lever=lever)
-    assert (comparison._rest(s)['payload_kg'] is not None) == told
-    assert (comparison._pooled_payload([s]) is not None) == told
-
-
-def test_joints_weigh_together_by_how_even_they_are() -> None:
-    """Least squares of all, each divided by its own scatter."""
-    rng = np.random.default_rng(8)
-    noisy = samples(60, lambda t, _: t + 1.0 + rng.normal(0.0, 1.0, len(t)))
-    even = samples(70, lambda t, _: t + 3.0 + rng.normal(0.0, 0.1, len(t)), lever=3.0)
-    found = comparison._pooled_payload([noisy, even])
-    assert found is not None
-    parts = [(s.lever / s.difference.std(), s.difference / s.difference.std())
-             for s in (noisy, even)]  # fmt: skip
-    x, y = (np.concatenate(part) for part in zip(*parts, strict=True))
-    assert found['value'] == pytest.approx(float(x @ y / (x @ x)))
-    assert found['low'] + found['high'] == pytest.approx(2.0 * found['value'])
-
-
-def test_f_is_that_of_the_mean_squares() -> None:
-    """Sum of squares over n - 1, motion over rest; the critical value is scipy's."""
-    rng = np.random.default_rng(9)
-    s = samples(200, lambda t, r: t + rng.normal(0.0, np.where(r == 0.0, 1.0, 1.4)), moving=90)
-    found = comparison._f_test(s)
-    assert found is not None
-    motion, rest = s.difference[:90], s.difference[90:]
-    squares = (motion @ motion / 89, rest @ rest / 109)
-    assert found['f'] == pytest.approx(squares[0] / squares[1])
-    assert found['rms_motion'] == pytest.approx(math.sqrt(squares[0]))
-    assert found['rms_rest'] == pytest.approx(math.sqrt(squares[1]))
-    freedom = [independent_samples(x) - 1.0 for x in (motion, rest)]
-    assert found['freedom'] == pytest.approx(freedom)
-    assert found['critical'] == pytest.approx(stats.f.ppf(0.95, *freedom))
-    assert found['static_model_holds'] == (found['f'] < found['critical'])
-
-
-@pytest.mark.parametrize(('moving', 'rest', 'told'), [(30, 30, True), (29, 30, False), (30, 29, False)])  # fmt: skip # noqa: E501
-def test_f_needs_thirty_samples_of_each(moving: int, rest: int, told: bool) -> None:  # noqa: FBT001
-    """And a rest that is not without any error."""
-    s = samples(moving + rest, lambda t, _: t + 0.1 * np.sin(t), moving=moving)
-    assert (comparison._f_test(s) is not None) == told
-    perfect = samples(moving + rest, lambda t, _: t, moving=moving)
-    assert comparison._f_test(perfect) is None
-
-
-def test_what_an_effort_says_of_itself() -> None:
-    """None, too few, one constant number, or counts of what was used."""
-    nothing = samples(40, lambda t, _: np.full(len(t), np.nan))
-    assert comparison._joint(nothing) == {'effort': 'not recorded'}
-    assert comparison._joint(samples(29, lambda t, _: t)) == {'effort': 'too few samples'}
-    still = samples(40, lambda t, _: np.full(len(t), 2.5))
-    assert comparison._joint(still) == {'effort': 'constant at 2.5'}
-    told = comparison._joint(samples(100, lambda t, _: t + 0.1, moving=40))
-    counts = [told[key] for key in ('clipped_samples', 'rest_samples', 'motion_samples')]
-    assert counts == [0, 60, 40]
-
-
-@pytest.mark.parametrize(('rate', 'motion'), [(0.05, 0), (0.051, 50), (-0.051, 50), (math.nan, 0)])
-def test_motion_is_faster_than_a_twentieth(rate: float, motion: int) -> None:
-    """rad/s or m/s; an unknown rate is none."""
-    s = replace(samples(50, lambda t, _: t), rate=np.full(50, rate))
-    assert s.motion().sum() == motion
 
 
 def test_independent_samples_are_counted_from_neighbours() -> None:

@@ -35,14 +35,14 @@ def test_a_robot_that_has_tipped_is_left_out_if_only_standing_counts() -> None:
 
 
 def test_a_sample_holds_what_was_measured_and_computed() -> None:
-    """Effort, torque, rate, position of each joint, and gravity, row by row."""
+    """Effort, torque, rate, position of each joint, and gravity; of a robot that tipped too."""
     sampler = Sampler(10)
     columns: dict[str, Any] = {
         name: np.arange(4.0).reshape(2, 2) + 10.0 * k
         for k, name in enumerate(('effort', 'torque', 'qd', 'q'))
     }
     gravity = [(1.0, 2.0, -9.0), (3.0, 4.0, -8.0)]
-    sampler.add(made([5, 15], gravity=gravity, **columns))
+    sampler.add(made([5, 15], gravity=gravity, angle=np.full((2, 4), -1.0), **columns))
     time, found = sampler.samples(2)
     assert time.tolist() == [5, 15]
     for name, table in zip(columns, found[:4], strict=True):
@@ -59,3 +59,7 @@ def test_of_more_than_forty_thousand_every_second_remains() -> None:
     assert times([made(time)]) == time[::2].tolist()
     after = [made(time), made([400_005, 400_010, 400_019, 400_020, 400_030, 400_040])]
     assert times(after)[-3:] == [400_000, 400_020, 400_040]
+    sampler = Sampler(10)
+    sampler.add(made(time, torque=np.column_stack((time, time))))
+    left, (_, torque, *_) = sampler.samples(2)
+    assert torque[:, 0].tolist() == left.tolist()

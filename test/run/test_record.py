@@ -1,5 +1,6 @@
 """A simulated run as a recording: the same seed gives the same bytes, other tools read it."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,13 @@ def test_an_unknown_scenario_is_refused() -> None:
     with pytest.raises(BadConfig, match='expected one of gentle, overreach') as error:
         case_of('gentl', ROBOT, 1, None)
     assert all(name in str(error.value) for name in names())
+
+
+@pytest.mark.parametrize('seconds', [0.0, -1.0, 1e6, math.nan])
+def test_a_run_of_no_length_is_refused(seconds: float) -> None:
+    """A run lasts longer than nothing and less than a million seconds."""
+    with pytest.raises(BadConfig, match='seconds: expected a number above 0'):
+        case_of('gentle', ROBOT, 1, seconds)
 
 
 def test_a_jolt_is_no_saturation() -> None:

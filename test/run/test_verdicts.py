@@ -156,6 +156,22 @@ def test_a_run_of_another_mode_is_not_continued(tmp_path: Path) -> None:
         opened(tmp_path / 'out', tmp_path / 'plan.yaml', resume=True, mode='robot')
 
 
+@pytest.mark.parametrize('text', ['', '[]', '3', '{"plan": ', '[' * 100_000])
+def test_a_run_whose_head_is_broken_is_not_continued(tmp_path: Path, text: str) -> None:
+    """A run.json that is no run's is refused in one line that names it."""
+    opened(tmp_path / 'out', tmp_path / 'plan.yaml')
+    (tmp_path / 'out' / 'run.json').write_text(text)
+    with pytest.raises(BadConfig, match=r'run\.json: expected the run to continue, got: '):
+        opened(tmp_path / 'out', tmp_path / 'plan.yaml', resume=True)
+
+
+def test_a_run_needs_a_place(tmp_path: Path) -> None:
+    """Where no folder can be made, the error says where."""
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(BadConfig, match='file/out: expected a folder to record into'):
+        opened(tmp_path / 'file' / 'out', tmp_path / 'plan.yaml')
+
+
 def test_what_an_interruption_left_is_kept(tmp_path: Path) -> None:
     """The recording of a step that was not finished moves aside; nothing recorded is lost."""
     folder = opened(tmp_path / 'out', tmp_path / 'plan.yaml')

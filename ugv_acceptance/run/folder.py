@@ -138,8 +138,10 @@ def _unborn(path: Path) -> bool:
 def _check_same(state: Path, head: dict[str, str]) -> None:
     try:
         found = json.loads(state.read_text('utf-8'))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise BadConfig(f'{state}: expected the run to continue, got: {error}') from None
     for key, value in head.items():
+        if not isinstance(found, dict):
+            raise BadConfig(f'{state}: expected the run to continue, got: {found!r:.40}')
         if found.get(key) != value:
             raise BadConfig(f'{state}: {key}: expected {value}, got {found.get(key)}')
