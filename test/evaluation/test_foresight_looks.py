@@ -207,6 +207,14 @@ def test_an_even_effort_while_the_need_grows_is_a_weak_motor(
     assert weak == ([('lift', 9 * case.apart / 50, None)] if told else [])
 
 
+@pytest.mark.parametrize(('largest', 'weak'), [(6.0, True), (6.1, False)])
+def test_six_tenths_of_the_growth_may_come_at_once(largest: float, weak: bool) -> None:  # noqa: FBT001
+    """Of 10 N m, between two looks."""
+    need = steps(0.0, largest, 7.0, 7.5, 8.0, 8.5, 9.0, 9.5, 9.75, 10.0)
+    found = Looks(torque=need, effort=lambda _: 20.0).told(10)
+    assert (('MOTOR_WEAK', 'lift', 9.0, None) in found) is weak
+
+
 @EACH
 def test_a_motor_that_follows_again_is_weak_no_more(each: int) -> None:
     """The warning ends with the first look whose last ten are not even."""
