@@ -37,6 +37,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/alerts.py', 'Signal.set', 'peak > self.peak -> peak >= self.peak'): 'the same',
     ('evaluation/foresight.py', '', '3 -> 4'): 'FEW only chooses between two ways to one result',
     ('evaluation/foresight.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
+    ('evaluation/sampling.py', 'Sampler', '1 -> 2'): 'no slot is below 0',
+    ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',
     ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
         'the size of a sign changes no order',
 }  # fmt: skip

@@ -82,7 +82,8 @@ class Reach:
         """Return the tests to try a mutant by: its file's own, then the quickest; to PATIENCE."""
         by_line = self.tests.get(mutant.file, {})
         lines = [str(line) for line in mutant.lines if any(by_line.get(str(line), ()))]
-        found = {test for line in lines or by_line for test in by_line[line] if test}
+        ran = {test for line in lines or by_line for test in by_line[line] if test}
+        found = ran or set(self.seconds)  # of a file without functions only imports ran a line
         own = f'/test_{Path(mutant.file).stem}.py::'
         ordered = sorted(found, key=lambda test: (own not in test, self.seconds[test]))
         total = accumulate(self.seconds[test] for test in ordered)

@@ -1,9 +1,7 @@
-"""Where each rule of the evaluation begins, to the digit, and defaults that are those promised."""
+"""Where each rule of the evaluation begins, to the digit."""
 
 import math
-import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,49 +13,10 @@ from ugv_acceptance.evaluation.freshness import Freshness
 from ugv_acceptance.evaluation.imu import ImuTracker
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.low_pass import LowPass
-from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 from ugv_acceptance.evaluation.watch import Watch
-from ugv_acceptance.model.robot import Robot
 
 G = 9.81
-
-
-def documented(repository: Path, key: str) -> list[str]:
-    """Return the defaults that the table of the configuration's keys gives on a key's line."""
-    text = (repository / 'docs' / 'robot_configuration.md').read_text('utf-8')
-    (line,) = re.findall(rf'^\| `{re.escape(key)}`.*\| ([^|]*) \|$', text, re.MULTILINE)
-    return [str(part).strip() for part in str(line).split(',')]
-
-
-def test_defaults_are_those_of_the_documentation(repository: Path) -> None:
-    """Who configures nothing gets what the table says."""
-    limits, delays, imu, joint = Limits((1.0,)), Delays(), ImuInput(), JointInput('x')
-    deg = math.degrees
-    found: dict[str, tuple[Any, ...]] = {
-        'limits.torque_warn': (limits.torque_warn, limits.torque_error),
-        'limits.torque_deadband_nm': (limits.torque_deadband,),
-        'limits.tip_warn_deg': tuple(
-            map(deg, (limits.tip_warn, limits.tip_error, limits.tip_deadband))
-        ),
-        'delays.tip_on_s': (
-            delays.tip_on,
-            delays.torque_on,
-            delays.fault_on,
-            delays.off,
-            delays.tip_off,
-        ),
-        'delays.stale_after_s': (delays.stale_after, delays.stale_periods, delays.tick),
-        'imu.rest_acceleration_mps2': (imu.rest_acceleration, imu.rest_rate),
-        'imu.agreement_deg': (deg(imu.agreement), imu.agreement_delay),
-        'imu.low_pass_s': (imu.low_pass,),
-        'joints.NAME.effort_sign': (joint.effort_sign, joint.effort_scale),
-        'gravity_mps2': (Robot('x', (), (), ()).gravity,),
-    }
-    for key, values in found.items():
-        assert [float(x) for x in documented(repository, key)] == pytest.approx(values), key
-    assert documented(repository, 'imu.attitude') == [imu.attitude]
-    assert documented(repository, 'imu.specific_force') == [str(imu.specific_force).lower()]
-    assert (joint.sign, joint.offset) == (1.0, 0.0)
 
 
 @pytest.mark.parametrize(('apart', 'wrong'), [(S, 0.0), (S + 1, 1.0), (-S, 0.0), (-S - 1, 1.0)])

@@ -3,10 +3,12 @@
 import json
 import math
 from dataclasses import replace
+from typing import Any
 
 import hypothesis
 import numpy as np
 import pytest
+from evaluation.hand_made import made
 from evaluation.streams import (
     MS,
     T0,
@@ -29,11 +31,11 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
-from ugv_acceptance.evaluation.settings import Delays, Settings
+from ugv_acceptance.evaluation.settings import Delays, Limits, Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.evaluation.watch import Watch
 from ugv_acceptance.evaluation.wording import WORDS, advice, describe
-from ugv_acceptance.model.stability import NO_CONTACT
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 
 
 def summed(told: Settings, messages: list[Message], cuts: list[int], end: int) -> Summary:
@@ -170,3 +172,86 @@ def test_a_force_is_told_in_newtons() -> None:
     ]
     assert words[0].endswith('45.0 N m')
     assert words[1].endswith('30.0 N')
+
+
+HALF = settings(limits=Limits((40.0, 30.0), torque_error=0.5, tip_error=0.1))
+FINE = (1.0, 1.0, 1.0, 1.0)
+
+
+def test_time_in_violation_counts_from_the_limit_on() -> None:
+    """Each row holds until the next, the last until its deadline or the end, unknown ones never.
+
+    Half of 40 N m and 30 N are allowed; 0.1 rad are left to any side.
+    """
+    rows = made(
+        [0, 1, 3, 7, 15],
+        until=[1, 3, 7, 15, 31],
+        known=[True, True, False, True, True],
+        torque=[(20.0, 0.0), (19.999, -15.0), (-99.0, 99.0), (-20.0, 14.999), (0.0, 16.0)],
+        angle=[(1.0, 0.1, 1.0, 1.0), (1.0, 1.0, 0.1001, 1.0), (-1.0,) * 4, FINE, (0.0,) * 4],
+    )
+    for end, last in ((40, 16), (20, 5), (15, 0)):
+        summary = Summary(HALF)
+        summary.add(made([]))
+        summary.add(rows)
+        summary.finish(end)
+        summary.finish(end + 1)  # nothing is left that could hold
+        assert summary.messages == 5
+        assert summary.evaluated == 1 + 2 + 8 + last
+        assert summary.load_violation == [1 + 8, 2 + last]
+        assert summary.tip_violation == 1 + last
+
+
+@pytest.mark.parametrize(('known', 'torque', 'tilt'), [
+    (True, 20.0, 1.0), (True, 0.0, 0.05), (True, 0.0, 1.0), (False, 20.0, 0.05),
+])  # fmt: skip
+def test_the_last_row_of_a_stretch_holds_until_the_next_stretch(
+    known: bool,  # noqa: FBT001
+    torque: float,
+    tilt: float,
+) -> None:
+    """With its own violations; three units of time here."""
+    summary = Summary(HALF)
+    end: dict[str, Any] = {
+        'torque': [(0.0, 0.0), (torque, 0.0)],
+        'angle': [FINE, (1.0, 1.0, 1.0, tilt)],
+    }
+    summary.add(made([0, 1], until=[1, 9], known=[True, known], **end))
+    summary.add(made([4], until=[5]))
+    summary.finish(9)
+    held = 3 if known else 0
+    assert summary.evaluated == 1 + held + 1
+    assert summary.load_violation == [held if torque == 20.0 else 0, 0]
+    assert summary.tip_violation == (held if tilt == 0.05 else 0)
+
+
+def test_the_worst_is_kept_of_each_joint_and_side_with_its_time() -> None:
+    """Torque by its size, tilt by what is least left; across stretches."""
+    summary = Summary(HALF)
+    angle = [(0.5, 0.6, 0.7, 0.8), (0.4, 0.9, 0.65, -0.1)]
+    summary.add(made([10, 20], torque=[(-7.0, 1.0), (5.0, -2.0)], angle=angle))
+    summary.add(made([30], torque=[(6.0, 3.0)], angle=[(0.45, 0.3, 0.65, 0.0)]))
+    assert [(e.value, e.time) for e in summary.load] == [(7.0, 10), (3.0, 30)]
+    assert [(-e.value, e.time) for e in summary.tip] == [
+        (0.4, 20),
+        (0.3, 30),
+        (0.65, 20),
+        (-0.1, 20),
+    ]
+    assert len(summary.tip) == len(SIDES)
+
+
+def test_states_are_counted_over_the_rows_that_are_known() -> None:
+    """One that never was is not named."""
+    summary = Summary(HALF)
+    summary.add(made([0, 1, 2], state=[0, 1, 2], known=[True, True, False]))
+    summary.add(made([3, 4], state=[1, len(STATES) - 1]))
+    assert summary.states == {STATES[0]: 1, STATES[1]: 2, STATES[-1]: 1}
+
+
+def test_nothing_was_seen_before_the_first_row() -> None:
+    """A summary begins with nothing, also where a run has no message."""
+    empty = Summary(HALF)
+    empty.finish(S)
+    assert (empty.evaluated, empty.messages, empty.tip_violation) == (0, 0, 0)
+    assert empty.load_violation == [0, 0]
