@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ugv_acceptance.model.attitude import (
+    NORM_SLACK,
     angle_between,
     is_rotation,
     moved_specific_force,
@@ -99,6 +100,14 @@ def test_another_norm_is_none(norm: float) -> None:
     """Drivers that send zeros or degrees are found out; arrays give a mask."""
     assert is_rotation(0.6 * norm, 0.0, 0.8 * norm, 0.0) is False
     assert not is_rotation(*np.array([[0.6], [0.0], [0.8], [0.0]]) * norm).any()
+
+
+@pytest.mark.parametrize('norm', [1.0 - NORM_SLACK, 1.0 + NORM_SLACK])
+def test_the_limit_of_the_norm_is_a_rotation_still(norm: float) -> None:
+    """A hundredth off, no further."""
+    assert is_rotation(norm, 0.0, 0.0, 0.0) is True
+    further = norm + math.copysign(1e-12, norm - 1.0)
+    assert is_rotation(further, 0.0, 0.0, 0.0) is False
 
 
 @given(angle, angle, st.floats(-3.0, 3.0))

@@ -1,6 +1,7 @@
 """Where rules of the model begin and end, to the last digit, and parts that are rigidly joined."""
 
 import math
+import threading
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from robots import DOWN, at, places, random_robot, tracked
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.attitude import is_rotation
-from ugv_acceptance.model.blocks import BLOCK, in_blocks
+from ugv_acceptance.model.blocks import BLOCK, Floats, in_blocks
 from ugv_acceptance.model.expressions import Scalar
 from ugv_acceptance.model.hull import THIN, drawn_in, heights_above, hull
 from ugv_acceptance.model.kernels import compile_kernel
@@ -22,11 +23,18 @@ from ugv_acceptance.model.stability import (
     INVERTED,
     RAISED,
     STANDING,
+    margins,
     stability,
     stability_of,
     stance_of,
 )
-from ugv_acceptance.model.statics import gripper_point, inverse_dynamics, utilisation
+from ugv_acceptance.model.statics import (
+    gripper_point,
+    inverse_dynamics,
+    payload_capacity,
+    static_torque,
+    utilisation,
+)
 from ugv_acceptance.model.support import support_of
 
 FEET: list[Vector] = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
@@ -182,6 +190,57 @@ def test_blocks_give_each_sample_its_own_value() -> None:
         found = in_blocks(lambda a, b, c: [a * b, a + c], 2, x, y, workers=workers)
         assert found.shape == (BLOCK + 7, 2)
         np.testing.assert_array_equal(found, np.hstack((x * 2.0, x + 3.0)))
+
+
+@pytest.mark.parametrize(
+    ('count', 'workers', 'others'),
+    [(BLOCK, 1, False), (BLOCK + 1, 1, False), (BLOCK, 2, False), (BLOCK + 1, 2, True)],
+)
+def test_other_threads_work_where_asked_for_and_worth_it(
+    count: int,
+    workers: int,
+    others: bool,  # noqa: FBT001
+) -> None:
+    """A single block is no work for two."""
+    seen = set[int]()
+
+    def same(x: Floats) -> list[Floats]:
+        seen.add(threading.get_ident())
+        return [x]
+
+    in_blocks(same, 1, np.zeros((count, 1)), workers=workers)
+    assert (threading.get_ident() not in seen) == others
+
+
+@pytest.mark.parametrize('width', [1, 3])
+def test_a_function_gives_as_many_values_as_are_asked_for(width: int) -> None:
+    """Neither fewer nor more."""
+    with pytest.raises(ValueError, match='zip'):
+        in_blocks(lambda x: [x, x], width, np.zeros((4, 1)))
+
+
+def test_one_thread_works_unless_more_are_asked_for() -> None:
+    """On torques, motions, payloads and margins of more than one block."""
+    started, arm, limit = list[str](), tracked(), [9.0] * 4
+    q, still = np.zeros((BLOCK + 1, 4)), np.zeros(4)
+    asks = (
+        lambda **more: static_torque(arm, q, DOWN, **more),
+        lambda **more: inverse_dynamics(arm, q, still, still, DOWN, **more),
+        lambda **more: payload_capacity(arm, q, DOWN, limit, **more),
+        lambda **more: stability(arm, q, DOWN, **more),
+        lambda **more: margins(arm, q, DOWN, **more),
+        lambda **more: in_blocks(lambda x: [x], 1, q[:, :1], **more),
+    )
+    threading.setprofile(lambda *_: started.append(threading.current_thread().name))
+    try:
+        for ask in asks:
+            ask()
+            assert not started
+            ask(workers=2)
+            assert started
+            started.clear()
+    finally:
+        threading.setprofile(None)
 
 
 @given(st.lists(st.integers(-3, 9000), min_size=1, max_size=30))

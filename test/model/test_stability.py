@@ -51,6 +51,7 @@ def stool(points: list[Vector], cog: Vector = (0.0, 0.0, 0.3)) -> Robot:
     return Robot('stool', (Link('base_link', 10.0, cog),), (), (), contacts)
 
 
+ORIGIN = (0.0, 0.0, 0.0)
 SQUARE: list[Vector] = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
 
 
@@ -305,6 +306,7 @@ def test_a_raised_robot_has_its_margins_about_the_lower_face() -> None:
         ([], NO_CONTACT),
         (SQUARE[:2], NO_CONTACT),
         ([*SQUARE[:2], (0.0, 0.0, 0.1)], NO_CONTACT),
+        ([(0.1 * k, 0.1 * k, 0.0) for k in range(3)], DEGENERATE),
         ([(0.1 * k, 0.1 * k, 0.0) for k in range(4)], DEGENERATE),
         ([(0.1 * k, 0.1 * k, -0.1) for k in range(4)], DEGENERATE),
     ],
@@ -362,6 +364,48 @@ def test_an_unknown_joint_makes_the_margins_unknown(bad: float, joint: int) -> N
     assert alone.state == UNKNOWN
     assert np.isnan(np.array([*found.angle, *found.moment, *found.energy])).all()
     assert all(map(math.isnan, (*alone.angle, *alone.moment, *alone.energy, alone.zmp)))
+
+
+@pytest.mark.parametrize('points', [SQUARE[:2], [(0.1 * k, 0.0, 0.0) for k in range(3)]])
+@pytest.mark.parametrize(
+    ('gravity', 'state'),
+    [((0.0, 0.0, 9.0), None), ((0.0, 0.0, -0.1), FREE_FALL), ((0.0, math.nan, 0.0), UNKNOWN)],
+)
+def test_a_robot_that_has_no_polygon_has_none_upside_down(
+    points: list[Vector], gravity: Vector, state: int | None
+) -> None:
+    """Its contact is told whatever the attitude; that nothing presses it down is told first."""
+    expected = one(stool(points), [], DOWN).state if state is None else state
+    stance = stance_of(
+        mechanics_of(stool(points)), posture_of(mechanics_of(stool(points)), [], 0.0, ORIGIN)
+    )
+    for found in (
+        one(stool(points), [], gravity),
+        stability(stool(points), np.empty((2, 0)), gravity),
+    ):
+        assert np.all(found.state == expected)
+        assert np.isnan(np.array([*found.angle, *found.moment, *found.energy])).all()
+    assert tip_angles_of(stance, gravity)[1] == expected
+    assert np.isnan(np.array(tip_angles_of(stance, gravity)[0])).all()
+
+
+def test_the_state_of_an_unknown_posture_is_unknown_even_in_free_fall() -> None:
+    """For one sample as for many."""
+    gravity = (0.0, 0.0, -0.1)
+    assert one(tracked(), [math.nan, 0.0, 0.0, 2.5], gravity).state == UNKNOWN
+    found = stability(tracked(), [[math.nan, 0.0, 0.0, 2.5]] * 2, gravity)
+    assert np.all(found.state == UNKNOWN)
+
+
+def test_a_payload_given_takes_the_place_of_the_robot_s_own() -> None:
+    """In all margins; left out, it is the robot's."""
+    robot, light = tracked(), Payload(0.0, ORIGIN)
+    for ask in (stability, margins):
+        own, given = ask(robot, HIGH, DOWN), ask(robot, HIGH, DOWN, robot.payload)
+        assert np.array_equal(np.array(own.angle), np.array(given.angle))
+        assert not np.array_equal(
+            np.array(own.angle), np.array(ask(robot, HIGH, DOWN, light).angle)
+        )
 
 
 def test_no_sample_has_no_margins() -> None:

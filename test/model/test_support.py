@@ -64,13 +64,47 @@ def test_the_ground_may_lie_anywhere_in_the_base() -> None:
     points = plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), -0.095)
     robot = Robot('r', (Link('a', 1.0),), (), (), (), ground=-0.095)
     assert support_of(robot, points, COG) == Support((0, 1, 2), 3, raised=False)
+    assert many(robot, [points] * 2, [COG] * 2) == [Support((0, 1, 2), 3, raised=False)] * 2
 
 
 @pytest.mark.parametrize('count', [0, 1, 2])
-def test_fewer_than_three_points_make_no_polygon(count: int) -> None:
-    """Their number is told."""
-    points = plane(np.array([(0.0, 0.0), (1.0, 0.0)]))[:count]
-    assert support_of(standing_on(points), points, COG) == Support((), count, raised=False)
+@pytest.mark.parametrize('height', [0.0, -0.3])
+def test_fewer_than_three_points_make_no_polygon(count: int, height: float) -> None:
+    """Their number is told, on the tracks' plane or below it."""
+    points = plane(np.array([(0.0, 0.0), (1.0, 0.0)]), height)[:count]
+    expected = Support((), count, raised=count > 0 and height < 0.0)
+    assert support_of(standing_on(points), points, COG) == expected
+    if count:
+        assert many(standing_on(points), [points] * 2, [COG] * 2) == [expected] * 2
+
+
+def test_nothing_stands_where_all_is_in_the_air() -> None:
+    """No point reaches the tracks' plane."""
+    points = plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), 0.2)
+    assert support_of(standing_on(points), points, COG) == Support((), 0, raised=False)
+    assert many(standing_on(points), [points] * 2, [COG] * 2) == [Support((), 0, raised=False)] * 2
+
+
+@pytest.mark.parametrize('cog', [(0.2, 0.2, 0.5), (0.9, 0.9, 0.5), (-1.0, 0.3, 0.5)])
+@pytest.mark.parametrize('extra', [[], [(0.4, 0.4, 0.3)]])
+def test_three_low_points_are_stood_on_wherever_the_cog_is(
+    cog: tuple[float, float, float], extra: Points
+) -> None:
+    """Above them or beside them; a point high above them does not count."""
+    points = [*plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), -0.2), *extra]
+    expected = Support((0, 1, 2), 3, raised=True)
+    assert support_of(standing_on(points), points, cog) == expected
+    assert many(standing_on(points), [points] * 3, [cog] * 3) == [expected] * 3
+
+
+def test_samples_above_and_beside_their_points_are_told_apart() -> None:
+    """The same points: the face under the first centre of gravity is not that under the second."""
+    points = [(0.0, 0.0, -0.3), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, -1.0, 0.0)]
+    cogs = [(0.3, 0.3, 0.4), (0.1, -0.4, 0.4), (-0.4, 0.1, 0.4), (3.0, 3.0, 0.4), (2.0, -3.0, 0.4)]
+    faces = [(0, 1, 2), (0, 3, 1), (0, 2, 3), (0, 1, 2), (0, 3, 1)]
+    expected = [Support(face, 3, raised=True) for face in faces]
+    assert [support_of(standing_on(points), points, cog) for cog in cogs] == expected
+    assert many(standing_on(points), [points] * 5, cogs) == expected
 
 
 @pytest.mark.parametrize('height', [0.0, -0.3])
