@@ -1,6 +1,8 @@
 """The player: every message, its bytes, order, quality of service and time."""
 
 import struct
+import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -8,10 +10,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.writer import Writer as McapWriter
 from nodes.live_case import Live, joints
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from sensor_msgs.msg import JointState
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance import BadBag, BadConfig
 from ugv_acceptance.bag.raw import Offered
@@ -41,6 +45,8 @@ def listener(live: Live, heard: list[bytes]) -> Node:
     node: Node = live.add(Node('listener'))
     qos = qos_of(Offered())
     node.create_subscription(JointState, 'joint_states', heard.append, qos, raw=True)
+    # All topics have a subscriber: nobody is waited for.
+    node.create_subscription(Imu, 'imu/data', lambda _: None, qos_of(Offered('best_effort')))
     return node
 
 
@@ -149,3 +155,99 @@ def test_it_tells_how_far_it_is(live: Live, tmp_path: Path) -> None:
     playing.run(Stop(), seen.append)
     assert seen == sorted(seen)
     assert seen[-1] == pytest.approx(playing.bag.duration_s)
+
+
+def test_a_loop_begins_again_and_the_clock_with_it(live: Live, tmp_path: Path) -> None:
+    """Looping it starts over; /clock tells the time of the recording, not that of the replay."""
+    path, sent = write(tmp_path)
+    heard: list[bytes] = []
+    clocks: list[int] = []
+    node, stop = listener(live, heard), Stop()
+
+    def on_clock(message: Any) -> None:
+        clocks.append(message.clock.sec * NS + message.clock.nanosec)
+
+    node.create_subscription(Clock, '/clock', on_clock, 1000)
+    playing = player(live, Play(path, loop=True, clock=True, rate=5.0))
+
+    def third_time(_: float) -> None:
+        stop.asked = playing.published >= 2.5 * len(sent)
+
+    playing.wait_for_subscribers(Stop(), 0.0)
+    playing.run(stop, third_time)
+    live.until(lambda: len(heard) == playing.published)
+    assert heard[: 2 * len(sent)] == sent * 2
+    live.until(lambda: clocks)
+    assert {T0 <= now < T0 + NS for now in clocks} == {True}
+
+
+def foreign(path: Path, *kinds: str) -> Path:
+    """Write an MCAP with a message of each of these types, whose content means nothing."""
+    with path.open('wb') as file:
+        writer = McapWriter(file)
+        writer.start('ros2', 'test')
+        for k, kind in enumerate(kinds):
+            schema = writer.register_schema(kind, 'ros2msg', b'')
+            channel = writer.register_channel(f'/t{k}', 'cdr', schema)
+            writer.add_message(channel, T0, bytes([0, 1, 0, 0]), T0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def test_what_is_not_installed_is_left_out_and_said(live: Live, tmp_path: Path) -> None:
+    """Topics of other types are played all the same."""
+    kinds = ('no_such_msgs/msg/Thing', 'sensor_msgs/msg/NoSuchThing', 'sensor_msgs/msg/Imu')
+    playing = player(live, Play(foreign(tmp_path / 'run.mcap', *kinds)))
+    assert list(playing.publishers) == ['/t2']
+    assert playing.skipped == {
+        '/t0': 'type no_such_msgs/msg/Thing is not installed',
+        '/t1': 'type sensor_msgs/msg/NoSuchThing is not installed',
+    }
+
+
+def test_a_recording_of_nothing_that_is_installed_is_refused(live: Live, tmp_path: Path) -> None:
+    """What cannot be published is named."""
+    path = foreign(tmp_path / 'run.mcap', 'no_such_msgs/msg/Thing')
+    with pytest.raises(BadBag, match=r'expected a topic that can be published: .*no_such_msgs'):
+        player(live, Play(path))
+
+
+def test_a_message_without_room_for_a_stamp_does_not_end_the_replay(
+    live: Live, tmp_path: Path
+) -> None:
+    """With restamp, a message that was cut off goes out as it is."""
+    playing = player(
+        live, Play(foreign(tmp_path / 'run.mcap', 'sensor_msgs/msg/Imu'), restamp=True)
+    )
+    playing.run(Stop())
+    assert playing.published == 1
+
+
+PROGRAM = 'from ugv_acceptance.nodes.player import main; main()'
+
+
+def test_the_node_plays_what_its_parameters_say(live: Live, tmp_path: Path) -> None:
+    """A process of its own: the recording, its topics, and how many messages there were."""
+    path, sent = write(tmp_path)
+    heard: list[bytes] = []
+    listener(live, heard)
+    given = (f'bag:={path}', 'topics:=["/joint_states"]', 'rate:=2.0')
+    options = [word for text in given for word in ('-p', text)]
+    command = [sys.executable, '-c', PROGRAM, '--ros-args', *options]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        live.until(lambda: len(heard) == len(sent))
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert heard == sent
+    assert f'{len(sent)} messages published' in said
+
+
+def test_the_node_needs_a_recording() -> None:
+    """Without one it ends with code 2 and one line."""
+    done = subprocess.run(
+        [sys.executable, '-c', PROGRAM], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        'ugv-acceptance: parameter bag: expected the path of a recording, got none'
+    ]
