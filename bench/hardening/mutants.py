@@ -26,9 +26,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('model/rows.py', '', '4096 -> 8192'): 'counted or sorted, the values are the same',
     ('model/rows.py', 'groups', 'high - low < _FEW -> high - low <= _FEW'): 'the same',
     ('model/rows.py', 'groups', 'high - low -> high + low'): 'the same',
-    ('model/rows.py', 'groups', 'low + np.flatnonzero(np.bincount(codes - low)) if few else '
-     'np.unique(codes) -> np.unique(codes) if few else low + np.flatnonzero(np.bincount(codes - low))'):
-        'the same',
     ('model/stability.py', '_state', '2 -> 3'): 'WEIGHTLESS is 1 m/s2, to any power',
     ('model/expressions.py', '_node',
      '_order(args[1]) < _order(args[0]) -> _order(args[1]) <= _order(args[0])'):

@@ -45,8 +45,10 @@ def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
     if low == high:
         yield low, ALL, codes.size
         return
-    few = high - low < _FEW
-    values = low + np.flatnonzero(np.bincount(codes - low)) if few else np.unique(codes)
+    if high - low < _FEW:
+        values = low + np.flatnonzero(np.bincount(codes - low))
+    else:
+        values = np.unique(codes)
     for code in values:
         rows = np.flatnonzero(codes == code)
         yield int(code), rows, rows.size
