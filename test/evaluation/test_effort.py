@@ -170,3 +170,113 @@ def test_an_effort_of_the_other_sign_is_named(rate: float, effort: float, named:
     torque = (LEVEL_TORQUE, 1.0)
     found = opposed_joints(TOLD, torque, (rate, 0.0), (effort, -1.0))
     assert found == (['lift'] if named else [])
+
+
+@pytest.mark.parametrize(
+    ('torque', 'rate', 'effort', 'named'),
+    [
+        (4.5, 0.0, -4.5, True),  # a tenth of 45 N m
+        (4.49, 0.0, -4.49, False),
+        (-4.5, 0.0, 4.5, True),
+        (8.0, 0.02, -8.0, True),
+        (8.0, -0.02, -8.0, True),
+        (8.0, 0.021, -8.0, False),
+        (8.0, -0.021, -8.0, False),
+        (8.0, 0.0, -4.0, True),  # half of it is alike
+        (8.0, 0.0, -12.0, True),
+        (8.0, 0.0, -3.99, False),
+        (8.0, 0.0, -12.01, False),
+        (math.nan, 0.0, -8.0, False),
+    ],
+)
+def test_the_bounds_of_an_effort_of_the_other_sign(
+    torque: float,
+    rate: float,
+    effort: float,
+    named: bool,  # noqa: FBT001
+) -> None:
+    """A tenth of the limit tells, 0.02 rad/s is rest, half of the load is alike."""
+    found = opposed_joints(TOLD, (torque, 0.0), (rate, 0.0), (effort, 0.0))
+    assert found == (['lift'] if named else [])
+
+
+def saturated(
+    level: float, model: float = 0.0, most: float = 1e6, urdf: float = 1e6, limit: float = 45.0
+) -> bool:
+    """Return whether the lift, whose motor and limit are these, stands at a limit."""
+    joints = (replace(TOLD.robot.joints[0], effort=urdf), *TOLD.robot.joints[1:])
+    limits = Limits((limit, 300.0))
+    told = replace(TOLD, robot=replace(TOLD.robot, joints=joints), limits=limits)
+    return EffortComparison(told)._saturated(0, np.full(40, level), model, most)
+
+
+def test_an_effort_is_clipped_at_the_lesser_of_its_limits() -> None:
+    """From 0.999 of it on, either way; a limit that is none, zero or infinite, clips nothing."""
+    assert saturated(0.999 * 45.0)
+    assert saturated(-0.999 * 45.0)
+    assert not saturated(math.nextafter(0.999 * 45.0, 0.0))
+    assert saturated(0.999 * 20.0, urdf=20.0)
+    assert saturated(0.5, urdf=0.5)
+    assert not saturated(5.0, urdf=0.0)
+    assert not saturated(5.0, limit=math.inf, urdf=math.inf)
+
+
+@pytest.mark.parametrize(
+    ('level', 'model', 'far'),
+    [
+        (10.0, 0.0, False), (10.1, 0.0, True), (-10.1, 0.0, True), (20.0, -2.0, False),
+        (20.1, -2.0, True), (20.1, 2.0, True), (10.1, 0.5, True),
+    ],
+)  # fmt: skip
+def test_ten_times_the_model_is_far_from_it(level: float, model: float, far: bool) -> None:  # noqa: FBT001
+    """Or ten N m, whichever is more, at the largest effort of the run."""
+    assert saturated(level, model, most=abs(level)) is far
+    assert not saturated(level, model, most=abs(level) + 0.1)
+
+
+@pytest.mark.parametrize(('count', 'clipped'), [(10, True), (9, False)])
+def test_a_quarter_of_the_samples_at_the_largest_effort_is_a_limit(
+    count: int,
+    clipped: bool,  # noqa: FBT001
+) -> None:
+    """Of forty; of either sign."""
+    effort = np.full(40, 20.0)
+    effort[:count] = np.tile((21.0, -21.0), 20)[:count]
+    assert EffortComparison(TOLD)._saturated(0, effort, 0.0, 21.0) is clipped
+
+
+@pytest.mark.parametrize(('slope', 'weighs'), [(1.01, True), (0.99, False)])
+def test_a_joint_that_feels_a_newton_metre_a_kg_weighs(slope: float, weighs: bool) -> None:  # noqa: FBT001
+    """The arm is nearly upright, from either side."""
+    for sign in (1.0, -1.0):
+        (found,) = plateaus([(5.0, 0.0, 5.0)], q=math.acos(sign * slope / LEVEL_SLOPE))
+        assert found.slope == pytest.approx(sign * slope)
+        assert (found.payload is not None) is weighs
+
+
+def test_a_result_counts_seconds_from_the_start() -> None:
+    """Ten seconds before the first message."""
+    (lift,) = compared([(5.0, 0.0, 20.0)]).result(T0 - 10 * S)['lift']
+    assert lift['start_s'] == pytest.approx(10.0, abs=0.051)
+    assert lift['end_s'] == pytest.approx(15.0, abs=0.06)
+    assert (lift['measured'], lift['model']) == (20.0, pytest.approx(LEVEL_TORQUE))
+
+
+@pytest.mark.parametrize(
+    ('levels', 'ends'),
+    [
+        ((20.0, 20.9, 21.4, 21.7), [(0, 40)]),  # each is near the middle of those before
+        ((20.0, 20.0, 20.0, 21.1, 21.1, 21.1), [(0, 30), (30, 60)]),
+        ((20.0, 20.0, 30.0, 30.0, 30.0), [(20, 50)]),
+        ((-40.0, -41.9, -39.0, -43.9), [(0, 30)]),
+        ((0.0, 0.9, -0.1, 0.95), [(0, 40)]),
+        ((0.0, 0.9, -0.1, 1.1), [(0, 30)]),
+    ],
+)
+def test_a_plateau_goes_on_while_a_second_is_near_the_middle_of_those_before(
+    levels: tuple[float, ...], ends: list[tuple[int, int]]
+) -> None:
+    """Within a twentieth, or a newton metre; ten samples a second, three seconds at least."""
+    effort = np.repeat(levels, 10)
+    time = T0 + np.arange(len(effort)) * 100 * MS
+    assert list(_split(time, effort)) == [slice(a, b) for a, b in ends]

@@ -164,8 +164,9 @@ def _friction(s: _Samples) -> Json | None:
     """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate."""
     motion = s.motion()
     rate = s.rate[motion]
-    if len(rate) < LEAST or not (rate > 0.0).any() or not (rate < 0.0).any():
+    if len(rate) < LEAST:
         return None
+    # Of motion one way alone the sign and the bias are one column: there is no fit.
     columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
     fit = least_squares(columns, s.difference[motion])
     return None if fit is None else {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
