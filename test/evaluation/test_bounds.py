@@ -1,13 +1,25 @@
 """Bounds of single moments: which effects count for a signal, in the unit people see."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from evaluation.streams import settings
 
-from ugv_acceptance.evaluation.bounds import _OF, Bounds, moment_json
-from ugv_acceptance.evaluation.examination import Moment
+from ugv_acceptance.evaluation.bounds import _OF, Bounds, margin_bounds, moment_json
+from ugv_acceptance.evaluation.criteria import (
+    IGNORED,
+    RSS,
+    WORST_CASE,
+    AlertDemand,
+    CriteriaSet,
+    Criterion,
+    Demand,
+    Value,
+)
+from ugv_acceptance.evaluation.examination import Examination, Moment, ValueMeasure
+from ugv_acceptance.evaluation.payload_log import PayloadLog
 from ugv_acceptance.evaluation.uncertainty import Effects, Source
 from ugv_acceptance.model.robot import Payload
 
@@ -84,3 +96,109 @@ def test_a_moment_is_told_in_degrees_and_metres(
     assert found['roll_deg'] == pytest.approx(roll)
     assert found['pitch_deg'] == pytest.approx(pitch)
     assert found['payload_kg'] == 1.5
+
+
+def known(effects: Effects = EFFECTS) -> Bounds:
+    """Return bounds to which the effects on the moment of `moment` are known."""
+    found = moment(0.0, 'lift')
+    return Bounds(TOLD, SOURCES, {(found.q, found.gravity, found.payload): effects})
+
+
+def measure(demand: Value, *worst: Moment) -> ValueMeasure:
+    """Return a measure with these worst moments."""
+    found = ValueMeasure(Criterion('c', demand), TOLD, PayloadLog(TOLD), (0, 1))
+    found.worst = list(worst)
+    return found
+
+
+LIFT = Value('torque', 'lift', below=True, limit=45.0)
+FRONT = Value('tip_angle', 'front', below=False, limit=0.1)
+
+
+@pytest.mark.parametrize(
+    ('method', 'used', 'bound'),
+    [(RSS, RSS, math.sqrt(10.0)), (IGNORED, RSS, math.sqrt(10.0)), (WORST_CASE, WORST_CASE, 4.0)],
+)
+def test_a_bound_takes_from_what_is_left(method: str, used: str, bound: float) -> None:
+    """Effects of 1 and 3 N m at 40 of 45; where bounds are ignored one is shown all the same."""
+    found = known().worst(measure(LIFT, moment(40.0, 'lift')), method)
+    assert found is not None
+    assert (found['method'], found['unit']) == (used, 'N m')
+    assert found['bound'] == pytest.approx(bound)
+    assert found['excess'] == pytest.approx(5.0 - bound)
+    assert found['largest'] == [{'name': 'b', 'effect': 3.0}, {'name': 'a', 'effect': 1.0}]
+
+
+def test_a_bound_of_an_angle_is_in_degrees() -> None:
+    """Bound, what is left, and what each source does."""
+    found = known().worst(measure(FRONT, moment(0.7, 'front')), WORST_CASE)
+    assert found is not None
+    assert found['unit'] == 'deg'
+    assert found['bound'] == pytest.approx(math.degrees(0.6))
+    assert found['excess'] == pytest.approx(math.degrees(0.6 - 0.6), abs=1e-9)
+    assert [one['effect'] for one in found['largest']] == pytest.approx(
+        [math.degrees(0.5), math.degrees(0.1)]
+    )
+
+
+def test_the_moment_with_the_least_left_counts() -> None:
+    """Not the one with the largest value: its bound may be smaller."""
+    bounds = known()
+    other = moment(44.0, 'lift', (0.0, 1.0, -9.0))
+    still = Effects(SOURCES, *(np.zeros_like(x) for x in (
+        EFFECTS.torque, EFFECTS.angle, EFFECTS.position, EFFECTS.limit, EFFECTS.tilt)))  # fmt: skip
+    bounds._known[other.q, other.gravity, other.payload] = still
+    found = bounds.worst(measure(LIFT, other, moment(42.0, 'lift')), RSS)
+    assert found is not None
+    assert found['excess'] == pytest.approx(3.0 - math.sqrt(10.0))
+    first = bounds.worst(measure(LIFT, other, moment(40.0, 'lift')), RSS)
+    assert first is not None
+    assert (first['excess'], first['bound'], first['largest']) == (1.0, 0.0, [])
+
+
+def test_no_moment_and_no_number_have_no_bound() -> None:
+    """An effect that is not a number, of one source, makes the bound unknown."""
+    assert known().worst(measure(LIFT), RSS) is None
+    torque = EFFECTS.torque.copy()
+    torque[1, 0] = math.nan
+    broken = Effects(SOURCES, torque, EFFECTS.angle, EFFECTS.position, EFFECTS.limit, EFFECTS.tilt)
+    assert known(broken).worst(measure(LIFT, moment(40.0, 'lift')), RSS) is None
+    assert known(broken).worst(measure(FRONT, moment(0.7, 'front')), RSS) is not None
+
+
+def test_margins_of_a_result_get_their_bounds() -> None:
+    """Torque in N m of its limit, tilt in degrees; None where there is none."""
+    use = Value('torque_utilisation', 'lift', below=True, limit=1.0)
+    slide = Value('torque_utilisation', 'slide', below=True, limit=1.0)
+    demands: dict[str, Demand] = {'a': use, 'b': slide, 'c': FRONT, 'd': AlertDemand(raised=False)}
+    criteria = CriteriaSet('', 1, tuple(Criterion(k, d) for k, d in demands.items()), '')
+    found = Examination(criteria, TOLD, 0, 1)
+    for name, value, subject in (('a', 0.5, 'lift'), ('c', 0.7, 'front')):
+        of = found.measures[name]
+        assert isinstance(of, ValueMeasure)
+        of.worst = [moment(value, subject)]
+    joints = {'lift': {'limit': 45.0, 'unit': 'N m'}, 'slide': {'limit': 30.0, 'unit': 'N'}}
+    result: dict[str, Any] = {'torque': joints, 'stability': {}}
+    margin_bounds(result, found, known())
+    lift = result['torque']['lift']['uncertainty']
+    effects = np.array((1.0 + 0.5 * 10.0, 3.0 + 0.5 * 30.0))  # of torque, and of half the limit
+    assert lift['bound'] == pytest.approx(np.hypot(*effects))
+    assert lift['excess'] == pytest.approx(22.5 - np.hypot(*effects))
+    assert (lift['unit'], lift['method']) == ('N m', RSS)
+    assert lift['largest'] == [
+        {'name': 'b', 'effect': pytest.approx(18.0)}, {'name': 'a', 'effect': pytest.approx(6.0)}
+    ]  # fmt: skip
+    assert result['torque']['slide']['uncertainty'] is None
+    assert result['stability']['uncertainty']['bound'] == pytest.approx(
+        math.degrees(math.hypot(0.1, 0.5))
+    )
+
+
+def test_effects_on_a_moment_are_worked_out_once() -> None:
+    """What is known of it is used; another payload is another moment."""
+    bounds = known()
+    assert bounds.of('torque', moment(1.0, 'slide')) == pytest.approx((2.0, 4.0))
+    assert len(bounds._known) == 1
+    heavier = Moment(0, 1.0, 'slide', (0.5, 0.1), (0.0, 0.0, -9.81), Payload(9.0))
+    assert bounds.of('torque', heavier) is not None
+    assert len(bounds._known) == 2

@@ -90,6 +90,13 @@ def test_a_tilt_that_is_lost_slowly_is_no_warning(rate: float, told: bool) -> No
     assert bool(found) is told
 
 
+@pytest.mark.parametrize(('before', 'told'), [(0.0074062500000000005, True), (0.0074, False)])
+def test_the_least_rate_itself_counts(before: float, told: bool) -> None:  # noqa: FBT001
+    """0.0035 rad in 0.2 s, to the last bit."""
+    tilt = np.linspace(before, 0.00390625, 5).tolist()
+    assert bool(Looks(tilt=steps(*tilt)).told(5)) is told
+
+
 @pytest.mark.parametrize(('rate', 'told'), [(1.19, False), (1.21, True)])
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 def test_a_torque_that_grows_slowly_is_no_warning(rate: float, sign: float, told: bool) -> None:  # noqa: FBT001
@@ -216,6 +223,23 @@ def test_six_tenths_of_the_growth_may_come_at_once(largest: float, weak: bool) -
 
 
 @EACH
+def test_the_bounds_of_a_weak_motor_count(each: int) -> None:
+    """Each to the last bit, of 100 and 40 N m: waver, growth, share of the limit, time."""
+    wavers = Looks(torque=growing(9.0), effort=lambda k: 50.0 + 1.5 * (k % 2), limit=(100.0, 20.0))
+    grows = Looks(torque=lambda k: 0.07 * 40.0 * k / 9.0, effort=lambda _: 20.0)
+    late = Looks(
+        torque=growing(4.0), effort=lambda _: 20.0, at=lambda k: 100.0 * k + 100.0 * (k == 9)
+    )
+    weak = ('MOTOR_WEAK', 'lift', 9.0, None)
+    assert weak in wavers.told(10, each)
+    assert weak in grows.told(10, each)
+    assert ('MOTOR_WEAK', 'lift', 20.0, None) in late.told(10, each)
+    for share in (0.3, 0.97):
+        low = Looks(torque=growing(9.0), effort=lambda _: 100.0 * share, limit=(100.0, 20.0))  # noqa: B023
+        assert weak in low.told(10, each)
+
+
+@EACH
 def test_a_motor_that_follows_again_is_weak_no_more(each: int) -> None:
     """The warning ends with the first look whose last ten are not even."""
     found = Looks(torque=growing(4.0), effort=lambda k: 20.0 if k < 14 else 25.0).told(16, each)
@@ -270,6 +294,15 @@ def test_a_position_that_moves_again_ends_it(each: int) -> None:
     assert found == [('ENCODER_FROZEN', 'lift', 6.0, 11.0)]
 
 
+@EACH
+def test_a_weak_joint_that_moves_is_not_frozen(each: int) -> None:
+    """Even one whose limit is 2 N m, whatever its effort does."""
+    found = Looks(torque=lambda _: 0.2, effort=lambda k: 0.5 * (k % 3), limit=(2.0, 2.0)).told(
+        12, each
+    )
+    assert found == []
+
+
 def test_every_kind_of_warning_has_its_own_delay() -> None:
     """Tilt that of tip-over, torque, effort and encoder that of torque; a weak motor none."""
     looks = Looks(
@@ -291,8 +324,9 @@ def test_every_kind_of_warning_has_its_own_delay() -> None:
 
 @pytest.mark.parametrize(('now', 'due'), [(0, 50), (1, 50), (49, 50), (50, 100), (130, 150)])
 def test_the_next_look_is_due_at_a_whole_multiple_of_fifty_milliseconds(now: int, due: int) -> None:
-    """After the sample that was kept."""
+    """After the sample that was kept; the first one is due whenever it comes."""
     foresight = quiet([])
+    assert foresight.due == 0
     foresight.keep(T0 + now * MS, (1.0,) * 4, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     assert foresight.due == T0 + due * MS
 
