@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ugv_acceptance import BadSample
+from ugv_acceptance.bag.encode import joint_state_cdr
 from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
 from ugv_acceptance.console.recording import Recording, RecordingFeed, judge_for_console
 from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE
@@ -103,6 +105,22 @@ def test_a_gap_is_no_data() -> None:
     assert gap.snapshot_at(gap.bag.start_ns + 13_000_000_000).known
 
 
+def test_a_recording_without_one_margin_can_be_shown(tmp_path: Path) -> None:
+    """Joint states alone: nothing is known at any time, and there is a timeline all the same."""
+    with BagWriter(tmp_path / 'run') as writer:
+        writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState', Qos())
+        writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu', Qos())
+        for k in range(5):
+            writer.write('/joint_states', 10**9 + k, joint_state_cdr(10**9 + k, '', ['a'], [0.0]))
+    bag = open_bag(tmp_path / 'run')
+    shown = judge_for_console(bag, choose_topics(bag), SETTINGS)
+    for when in (bag.start_ns, bag.end_ns):
+        snapshot = shown.snapshot_at(when)
+        assert (snapshot.level, snapshot.known) == (STALE, False)
+    assert set(shown.timeline()['tilt_deg']) == {None}
+    assert shown.timeline()['verdict'] == 'INCONCLUSIVE'
+
+
 @settings(max_examples=60)
 @given(st.floats(-5.0, 40.0))
 def test_no_alert_tells_what_is_yet_to_come(fail: Recording, seconds: float) -> None:
@@ -135,6 +153,8 @@ def test_commands_are_checked(fail: Recording) -> None:
     for do, values in (
         ('seek', {'to_s': 'x'}),
         ('seek', {'to_s': math.nan}),
+        ('seek', {'to_s': True}),
+        ('seek', {'to_s': 10**400}),
         ('speed', {'speed': 3}),
         ('acknowledge', {}),
     ):

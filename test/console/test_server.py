@@ -63,6 +63,8 @@ def test_a_client_gets_robot_map_and_frames(bag_url: str) -> None:
         '{"do": "seek", "to_s": NaN}',
         '{"do": "axes", "x": "<b>", "y": null}',
         '{"do": "probe", "x": 1e999, "y": []}',
+        pytest.param(f'{{"do": "seek", "to_s": 1{"0" * 400}}}', id='a whole number without end'),
+        pytest.param(f'{{"do": "probe", "x": 0, "y": 1{"0" * 400}}}', id='the same on the map'),
         '{"do": "acknowledge"}',
         '[' * 2000,
     ],

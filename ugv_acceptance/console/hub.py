@@ -11,6 +11,7 @@ from typing import Any
 from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.console.feed import Feed
 from ugv_acceptance.console.frame import describe_robot, frame_of
+from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.safe_map import MapKey, axes_of, key_of, probe, safe_map
 from ugv_acceptance.console.skeleton import Figure, figure_of
 from ugv_acceptance.console.snapshot import Snapshot
@@ -152,7 +153,7 @@ class Hub:
             client.shown = None
             return {'axes': list(client.axes)}
         if do == 'probe':
-            at = (_number(values.get('x')), _number(values.get('y')))
+            at = (number_in(values, 'x'), number_in(values, 'y'))
             return {'probe': probe(self._snapshot, settings, client.axes, at)}
         return {'text': self.feed.command(do, values)}
 
@@ -160,10 +161,6 @@ class Hub:
 def as_json(value: dict[str, Any]) -> str:
     """Return compact JSON that every parser takes: no NaN."""
     return json.dumps(value, separators=(',', ':'), allow_nan=False)
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def _small(number: object) -> int | None:
