@@ -9,8 +9,8 @@ from ugv_acceptance import BadSample
 def number_in(values: Mapping[str, object], name: str) -> float:
     """Return a finite number of a command. Raises BadSample where there is none."""
     value = values.get(name)
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        # JSON's whole numbers have no end, floats have.
-        if abs(value) <= sys.float_info.max:
-            return float(value)
-    raise BadSample(f'{name}: expected a finite number, got {value!r:.60}')
+    # JSON's whole numbers have no end, floats have.
+    most = sys.float_info.max
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
+        raise BadSample(f'{name}: expected a finite number, got {value!r:.60}')
+    return float(value)
