@@ -46,6 +46,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',
     ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
         'the size of a sign changes no order',
+    ('evaluation/examination.py', 'ValueMeasure._see',
+     'order[k] >= sign * self.worst[-1].value -> order[k] > sign * self.worst[-1].value'):
+        'of equal moments nsmallest keeps the earlier',
+    ('evaluation/advice.py', '_load', 'mass <= 0.0 -> mass < 0.0'):
+        'an empty hand gains nothing by being emptied',
 }  # fmt: skip
 
 

@@ -87,7 +87,7 @@ class Signal:
         """Say that the value is bad at `now`, and how bad it becomes before it is good again."""
         if not self.raw:
             self.advance(now)
-            self.raw, self.quiet = True, False
+            self.raw = True
             if self.alert is None:
                 self.due = now + self.rule.on_delay
                 self.peak = peak
