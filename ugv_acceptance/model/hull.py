@@ -122,8 +122,8 @@ def _turns_kernel(count: int) -> Kernel:
     """Return the turns of all pairs of `count` points about a place, from x and y of all."""
 
     def formula(*inputs: Scalar) -> list[Scalar]:
-        points = [inputs[2 * k : 2 * k + 2] for k in range(count)]
-        return [_turn(a, b, inputs[2 * count :]) for a, b in combinations(points, 2)]
+        *points, place = [(inputs[2 * k], inputs[2 * k + 1]) for k in range(count + 1)]
+        return [_turn(a, b, place) for a, b in combinations(points, 2)]
 
     return compile_kernel(formula, [f'x{k}' for k in range(2 * count + 2)])
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
 from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.model.edges import side_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
@@ -170,7 +171,7 @@ def tip_forms(
         square = g - along * (along @ g)
         sine.append(_affine(cog, start, -np.cross(along, g)))
         cosine.append(_affine(cog, start, square))
-        side.append(_side_of(along))
+        side.append(side_of(float(along[1]), -float(along[0])))
     return TipForms(np.array(sine), np.array(cosine), np.array(side, dtype=np.int8))
 
 
@@ -179,13 +180,6 @@ def _affine(cog: Floats, start: Floats, direction: Floats) -> Floats:
     form: Floats = -np.einsum('kab,k->ab', cog, direction)
     form[0, 0] += start @ direction
     return form
-
-
-def _side_of(along: Floats) -> int:
-    outward = (along[1], -along[0])
-    if abs(outward[0]) >= abs(outward[1]):
-        return 0 if outward[0] > 0 else 2
-    return 1 if outward[1] > 0 else 3
 
 
 def _fixed_contacts(robot: Robot, grid: Grid) -> list[Floats] | None:
