@@ -1,4 +1,4 @@
-"""Margin rows written by hand: two joints, one row a message, numbers that say where they stood."""
+"""Margin rows written by hand, two joints, one row a message; and what criteria find in them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,9 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.alerts import WARN, Alert, Rule
+from ugv_acceptance.evaluation.bounds import Bounds
+from ugv_acceptance.evaluation.criteria import CriteriaSet, Criterion, Demand, Window
+from ugv_acceptance.evaluation.examination import Examination
 from ugv_acceptance.evaluation.imu import ImuRows
 from ugv_acceptance.evaluation.joints import JointRows
+from ugv_acceptance.evaluation.outcomes import Findings
 from ugv_acceptance.evaluation.rows import MarginRows, Pairs
+from ugv_acceptance.evaluation.settings import Settings
 
 
 def made(
@@ -55,3 +61,50 @@ def made(
     )
     assert not columns, f'no such columns: {list(columns)}'
     return found
+
+
+S = 1_000_000_000
+# The recordings that `findings` tells of begin so late (ns).
+BEGIN = 100 * S
+
+
+def findings(
+    settings: Settings,
+    demand: Demand,
+    parts: Sequence[MarginRows] = (),
+    *,
+    end: float = 10.0,
+    window: Window | None = None,
+    alerts: Sequence[Alert] = (),
+    coverage: float = 0.95,
+    **other: Any,
+) -> tuple[Criterion, Findings]:
+    """Return a criterion, and what a recording of `end` seconds from BEGIN on tells of it.
+
+    `other` are `method` and `sources` of bounds, and `data`.
+    """
+    criterion = Criterion('it', demand, window=window)
+    criteria = CriteriaSet(
+        'set', 1, (criterion,), '', 'a.yaml', coverage, other.get('method', 'rss')
+    )
+    finish = BEGIN + round(end * S)
+    examination = Examination(criteria, settings, BEGIN, finish)
+    for part in parts:
+        examination.add(part)
+    examination.finish(finish)
+    bounds = Bounds(settings, tuple(other.get('sources', ())))
+    return criterion, Findings(examination, alerts, other.get('data', {}), bounds)
+
+
+def seconds(*times: float) -> list[int]:
+    """Return times (s) after BEGIN in ns."""
+    return [BEGIN + round(t * S) for t in times]
+
+
+def alert(
+    code: str, subject: str, start: float, end: float | None, level: int = WARN, peak: float = 1.0
+) -> Alert:
+    """Return an alert from `start` to `end` (s after BEGIN; None: still active)."""
+    rule = Rule(code, subject, level, 0.5, 0.5, 0, 0)
+    (at,), ends = seconds(start), None if end is None else seconds(end)[0]
+    return Alert(rule, at, peak, ends)

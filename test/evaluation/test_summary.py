@@ -255,3 +255,14 @@ def test_nothing_was_seen_before_the_first_row() -> None:
     empty.finish(S)
     assert (empty.evaluated, empty.messages, empty.tip_violation) == (0, 0, 0)
     assert empty.load_violation == [0, 0]
+
+
+def test_an_alert_is_told_with_what_was_computed_for_it() -> None:
+    """The others get what helps in general; a recording of a nanosecond is covered too."""
+    first, other = (
+        Alert(Rule('TIP_OVER', side, ERROR, -0.1, -0.12, 0, 0), T0, -0.05) for side in SIDES[:2]
+    )
+    found = result_of(Summary(HALF, evaluated=1), [first, other], T0, 1, {id(other): 'raise it'})
+    told = {one['subject']: (one['advice'], one['advice_computed']) for one in found['alerts']}
+    assert told == {SIDES[0]: (advice('TIP_OVER'), False), SIDES[1]: ('raise it', True)}
+    assert found['coverage']['fraction'] == 1.0

@@ -7,7 +7,7 @@ from evaluation.streams import T0, settings
 
 from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.settings import Limits
-from ugv_acceptance.evaluation.wording import describe, tilt_left
+from ugv_acceptance.evaluation.wording import advice, describe, tilt_left
 
 TOLD = settings(limits=Limits((45.0, 30.0)))
 RAD = math.radians(1.0)
@@ -68,3 +68,8 @@ def test_an_alert_is_one_sentence_with_its_numbers(
 def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
     """Past the tipping point is what is below zero."""
     assert tilt_left(degrees) == said
+
+
+def test_what_helps_is_told_beside_what_happened() -> None:
+    """By the code alone."""
+    assert advice('INPUT_STALE').startswith('check that its driver runs')

@@ -48,7 +48,7 @@ def least_squares(columns: Floats, y: Floats) -> Fit | None:
     residual = y - scaled @ value
     worth = independent_samples(residual)
     freedom = max(worth - k, 1.0)
-    variance = float(residual @ residual) / max(n - k, 1) * (n / max(worth, 1.0))
+    variance = float(residual @ residual) / (n - k) * (n / max(worth, 1.0))
     deviation = np.sqrt(variance * np.diag(inverse))
     quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
     return Fit(value / scale, quantile * deviation / scale, worth)

@@ -94,9 +94,8 @@ def describe(alert: Alert, settings: Settings) -> str:
     """Return the alert as one sentence: what happened."""
     rule = alert.rule
     peak, limit = alert.peak, rule.on
-    turning = True
-    if rule.subject in settings.robot.joint_names:
-        turning = settings.robot.joint(rule.subject).kind != 'prismatic'
+    robot = settings.robot
+    slides = rule.subject in robot.joint_names and robot.joint(rule.subject).kind == 'prismatic'
     if rule.code == 'TORQUE_LIMIT':
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
@@ -105,8 +104,8 @@ def describe(alert: Alert, settings: Settings) -> str:
         subject=rule.subject,
         peak=peak,
         limit=limit,
-        unit='N m' if turning else 'N',
-        rate='rad/s' if turning else 'm/s',
+        unit='N' if slides else 'N m',
+        rate='m/s' if slides else 'rad/s',
         tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
         slope=max(math.degrees(-alert.peak), 0.0),
