@@ -123,6 +123,7 @@ def test_what_an_effort_says_of_itself() -> None:
     nothing = samples(40, lambda t, _: np.full(len(t), np.nan))
     assert comparison._joint(nothing) == {'effort': 'not recorded'}
     assert comparison._joint(samples(29, lambda t, _: t)) == {'effort': 'too few samples'}
+    assert comparison._joint(samples(30, lambda t, _: t))['effort'] == 'recorded'
     still = samples(40, lambda t, _: np.full(len(t), 2.5))
     assert comparison._joint(still) == {'effort': 'constant at 2.5'}
     told = comparison._joint(samples(100, lambda t, _: t + 0.1, moving=40))
