@@ -165,6 +165,69 @@ def test_two_failures_are_no_trend() -> None:
     assert trend([1.0, 2.0], 10.0, 0.9) is None
 
 
+@pytest.mark.parametrize('times', [[0.0, 1.0, 2.0], [10.0, 10.0, 10.0]])
+def test_failures_all_at_one_end_are_no_trend(times: list[float]) -> None:
+    """A power law fits neither a failure before the first hour nor all in the last."""
+    assert trend(times, 10.0, 0.9) is None
+
+
+@pytest.mark.parametrize(
+    ('up', 'failures', 'down', 'value'),
+    [(10.0, 0, 0.0, 1.0), (0.0, 0, 0.0, None), (0.0, 2, 1.0, None), (10.0, 2, 0.0, None)],
+)
+def test_availability_without_repairs_is_unbounded(
+    up: float, failures: int, down: float, value: float | None
+) -> None:
+    """Nothing failed: all of the time; nothing run or no time of repair known: no number."""
+    found = availability(up, failures, down, 0.9)
+    assert (found.value, found.low, found.high, found.demonstrated) == (value, 0.0, 1.0, 0.0)
+
+
+def test_no_trial_says_nothing_of_success() -> None:
+    """Any share from 0 to 1."""
+    found = proportion(0, 0, 0.9)
+    assert (found.value, found.low, found.high, found.demonstrated) == (None, 0.0, 1.0, 0.0)
+
+
+def test_a_test_that_ended_with_its_only_failure_to_come_demonstrates_nothing() -> None:
+    """Without a failure it cannot have ended with one."""
+    assert demonstrated_mtbf(100.0, 0, 0.8, failure_terminated=True) == 0.0
+
+
+def test_two_groups_without_failure_do_not_differ() -> None:
+    """Chance explains them, and the ratio may be anything."""
+    found = compare_mtbf((10.0, 0), (20.0, 0), 0.9)
+    assert (found.p, found.ratio, found.low, found.high, found.power) == (
+        1.0,
+        None,
+        0.0,
+        math.inf,
+        0.0,
+    )
+
+
+def test_the_ratio_of_two_mtbfs() -> None:
+    """4 failures in 100 h against 2 in 150 h: 75 h over 25 h; without any in the second none."""
+    assert compare_mtbf((100.0, 4), (150.0, 2), 0.9).ratio == pytest.approx(3.0)
+    one_sided = compare_mtbf((100.0, 4), (150.0, 0), 0.9)
+    assert (one_sided.ratio, one_sided.high) == (None, math.inf)
+    assert compare_mtbf((100.0, 0), (150.0, 3), 0.9).power > 0.0
+
+
+def test_many_failures_are_normally_distributed() -> None:
+    """The power of a thousand times as many hours goes on where the exact sum ends."""
+    below, above = (mtbf_power(1.0, hours, hours, 1.05, 0.1) for hours in (1950.0, 2050.0))
+    assert 0.0 < above - below < 0.02
+
+
+def test_the_odds_of_two_groups() -> None:
+    """1 of 4 fails against 2 of 4: (2 x 1) / (2 x 3); without a failure there is no ratio."""
+    assert compare_success((3, 4), (2, 4), 0.9).ratio == pytest.approx(2.0 * 1.0 / (2.0 * 3.0))
+    assert compare_success((4, 4), (4, 4), 0.9).ratio is None
+    nothing = compare_success((0, 0), (3, 4), 0.9)
+    assert (nothing.p, nothing.power) == (1.0, 0.0)
+
+
 @settings(max_examples=40)
 @given(n1=counts, n2=counts, hours=st.floats(1.0, 1e3))
 def test_the_bounds_of_the_ratio_agree_with_the_test(n1: int, n2: int, hours: float) -> None:
