@@ -1,6 +1,7 @@
 """Campaigns on real recordings: what is counted, what is resumed, what comes out."""
 
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,11 @@ import pytest
 from campaign.fleet import brief, campaign, exit_at_b, said, write_run
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.campaign.groups import comparison
 from ugv_acceptance.campaign.pool import batches, in_processes, judge_all
 from ugv_acceptance.campaign.run import Place, carry_out
 from ugv_acceptance.campaign.sources import Source, find_sources, sorted_out
+from ugv_acceptance.campaign.work import judge_source
 
 
 @pytest.fixture(scope='module')
@@ -95,11 +98,44 @@ def written(path: Path) -> Path:
 
 
 def test_a_spoilt_result_is_computed_again(fleet: Path, tmp_path: Path) -> None:
-    """A kept result that cannot be read is as if it were not there."""
+    """A kept result that cannot be read, or says something else, is as if it were not there."""
     sources, place = find_sources([str(fleet / 'good_a')]), Place(tmp_path, 1)
     rows, _ = carry_out(sources, brief(), place)
-    (tmp_path / str(rows[0].result)).write_text('{')
-    assert carry_out(sources, brief(), place)[0] == rows
+    fields = '"verdict": 1, "coverage": [], "start_ns": null, "alerts"'
+    for spoilt in ('{', '3', '[' * 100_000, f'{{{fields}: 3}}', f'{{{fields}: [{{}}]}}'):
+        (tmp_path / str(rows[0].result)).write_text(spoilt)
+        assert carry_out(sources, brief(), place)[0] == rows
+
+
+def test_no_room_for_a_copy_breaks_that_run_alone(
+    fleet: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a recording cannot be fetched for want of a place, its run is broken, with why."""
+    pytest.importorskip('fsspec', reason='extra cluster is not installed')
+    (source,) = find_sources([f'file://{fleet}/good_a'])
+    monkeypatch.setattr(tempfile, 'tempdir', str(fleet / 'gone'))
+    assert 'No such file or directory' in judge_source(source, brief()).error
+
+
+def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    """A file where the campaign's folder should be, before anything is judged."""
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(AcceptanceError, match='file: '):
+        carry_out([], brief(), Place(tmp_path / 'file', 1))
+
+
+def test_groups_that_cannot_be_compared_are_refused(fleet: Path, tmp_path: Path) -> None:
+    """What is wrong with the groups is said."""
+    sources = find_sources([str(fleet / 'good_a'), str(fleet / 'tips')])
+    rows, _ = carry_out(sources, brief(), Place(tmp_path, 1))
+    wrong = {
+        'expected two groups, got 1': [('a', '*')],
+        'expected runs with judged time, got 0 runs': [('a', '*/good_*'), ('b', '*/nothing')],
+        'expected each run in one group': [('a', '*/good_*'), ('b', '*')],
+    }
+    for text, groups in wrong.items():
+        with pytest.raises(AcceptanceError, match=text):
+            comparison(rows, [], groups, 0.8)
 
 
 def test_a_worker_that_dies_takes_one_run_down() -> None:

@@ -125,6 +125,35 @@ def test_a_wrong_entry_is_refused(entry: str, text: str, rows: list[Row], tmp_pa
     assert f'{path}:2:' in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ('name', 'content', 'text'),
+    [
+        ('log.csv', b'run,what\ngood_a,fell,twice\n', ':2: expected as many fields as the head'),
+        ('log.csv', b'run,what\n"' + b'x' * 200_000 + b'"\n', ':2: expected CSV, got: '),
+        ('log.csv', b'run\n\xff\n', 'expected UTF-8 text'),
+        ('log.yaml', b'run: good_a\n', ':1: expected a list of failures, got dict'),
+        ('log.yaml', b' ' * 20_000_001, 'expected a failure log below 20 MB'),
+        ('gone.yaml', None, 'expected a failure log, got: No such file or directory'),
+    ],
+)
+def test_a_file_that_is_no_log_is_refused(
+    name: str, content: bytes | None, text: str, tmp_path: Path
+) -> None:
+    """The file, the line where there is one, and what was expected."""
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadConfig, match=text) as caught:
+        read_log(path)
+    assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize('text', ['', 'failures:\n'])
+def test_a_log_without_an_entry_is_one(text: str, tmp_path: Path) -> None:
+    """Nothing failed, or nothing was written down."""
+    assert read_log(written(tmp_path, text)) == []
+
+
 def test_an_entry_may_name_a_copy(rows: list[Row], tmp_path: Path) -> None:
     """A failure of a copy is one of the recording it copies."""
     found = failures(rows, written(tmp_path, '- {run: good_copy, class: sensor}'))

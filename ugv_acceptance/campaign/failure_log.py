@@ -100,7 +100,8 @@ def _csv_rows(text: str, path: Path) -> list[tuple[str, dict[str, object]]]:
             if filled:
                 rows.append((f'{path}:{reader.line_num}', dict(filled)))
     except csv.Error as error:
-        raise BadConfig(f'{path}:{reader.line_num}: expected CSV, got: {error}') from None
+        at = reader.reader.line_num  # the line read last, also one that is none
+        raise BadConfig(f'{path}:{at}: expected CSV, got: {error}') from None
     return rows
 
 

@@ -39,7 +39,7 @@ def read(folder: Path, key: str) -> Json:
         result = json.loads(path.read_text('utf-8'))
         if not all(field in result for field in ('verdict', 'coverage', 'alerts', 'start_ns')):
             raise AcceptanceError(f'{path}: expected a result of a run; remove it')
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, RecursionError) as error:
         raise AcceptanceError(
             f'{path}: expected a result of a run, got: {error}; remove it'
         ) from None

@@ -80,7 +80,7 @@ def _tried(source: Source, brief: Brief) -> Done:
             if found.result is None:
                 return Done(source, found.key, found.size)
             result = _renamed(found.result, source, paths)
-    except AcceptanceError as error:
+    except (AcceptanceError, OSError) as error:  # no room for a copy is this run's trouble alone
         return Done(source, error=str(error))
     row = row_of(source.name, found.key, result)
     return Done(source, found.key, found.size, row, json_text(result))
