@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import random_robot, tracked
 
-from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.robot import Joint, Link, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.studies.bilinear import Grid, evaluate, form_of, grid_of, level_curves
@@ -101,6 +101,36 @@ def test_limits_on_a_tilted_base(turret: float) -> None:
     used = utilisation_map(robot, grid, forms, limits)
     assert (within_limits(robot, grid, forms, limits) == ok).all()
     assert np.allclose(used, (np.abs(torque) / limits).max(axis=-1), atol=1e-12)
+
+
+def three_link() -> Robot:
+    """Return an arm of three links that turn about the same axis."""
+    names, lift = ('first', 'second', 'third'), (0.0, -1.0, 0.0)
+    links = [Link(name, 2.0, (0.2, 0.0, 0.05)) for name in names]
+    parents = ('base', *names)
+    joints = [
+        Joint(f'{name}_joint', 'revolute', parent, name, (0.4 * (k > 0), 0.0, 0.0), axis=lift)
+        for k, (name, parent) in enumerate(zip(names, parents, strict=False))
+    ]
+    return Robot('arm', (Link('base', 9.0), *links), tuple(joints), tuple(j.name for j in joints))
+
+
+@pytest.mark.parametrize('rows', [5, 40])
+@pytest.mark.parametrize('workers', [1, 2])
+@pytest.mark.parametrize('steps', [1.0, 1.2])
+@pytest.mark.parametrize('limits', [(30.0, 14.0, 3.0), (1e3, 1e3, 1e3), (30.0, 1e3, 3.0)])
+def test_limits_of_joints_that_share_an_axis(
+    rows: int, workers: int, steps: float, limits: tuple[float, ...]
+) -> None:
+    """The third joint has a wave of its own; equal and unequal steps, judged or never reached."""
+    robot = three_link()
+    ranges = [[-2.0, -2.0 + 0.1 * (rows - 1)], [-1.0, -1.0 + 0.1 * steps * (rows - 1)]]
+    axes = ('first_joint', 'second_joint')
+    grid = grid_of(robot, axes, ranges, (rows, rows), np.array([0.0, 0.0, 0.6]))
+    gravity = (1.0, 0.5, -9.7)
+    torque = static_torque(robot, grid.postures(), gravity)
+    found = within_limits(robot, grid, torque_forms(robot, grid, gravity), limits, workers)
+    assert (found == (np.abs(torque) <= limits).all(axis=-1)).all()
 
 
 @pytest.mark.parametrize('flippers', [math.pi, 0.3, -0.25, -0.8])

@@ -62,6 +62,17 @@ def test_just_outside_the_family_a_cell_differs() -> None:
     assert not matches(table_2(high + 1e-5, -0.00228)).all()
 
 
+def test_a_heavy_second_link_has_no_family() -> None:
+    """Its own error at rest is too large for any offset of the first to give the cells."""
+    arm = PlanarArm(0.23, 0.32, 13.6, 13.1, 6.2)
+    found = offset_family(np.array([-0.1, 0.0]), arm)
+    assert (found.offset2.shape, found.positive.shape, found.negative.shape) == (
+        (0,),
+        (0, 2),
+        (0, 2),
+    )
+
+
 def test_without_offsets_f_grows_as_the_fourth_power_of_speed() -> None:
     """The mid-link model has no error at rest: F at 180 deg/s is 180^4."""
     assert table_2(0.0, 0.0)[-1, 0] == pytest.approx(180.0**4)
