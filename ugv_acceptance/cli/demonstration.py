@@ -17,7 +17,7 @@ from rich.markup import escape
 from ugv_acceptance import BadBag
 
 if TYPE_CHECKING:
-    from ugv_acceptance.nodes.status import Status
+    from ugv_acceptance.cli.live_view import Raised
 
 BAG = 'packbot_fail'
 WORKED, BROKEN = 0, 1
@@ -71,7 +71,7 @@ def find(bag: Path | None) -> Path:
     return place
 
 
-def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple[list['Status'], bool]:
+def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Raised', bool]:
     """Play the recording into the monitor; return its alerts and whether the player succeeded."""
     from ugv_acceptance.cli.live_view import watch
 
@@ -116,14 +116,9 @@ def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
         console.print(text, soft_wrap=True)
 
 
-def conclude(console: Console, alerts: list['Status'], played: bool, result: dict[str, Any]) -> int:
+def conclude(console: Console, seen: 'Raised', played: bool, result: dict[str, Any]) -> int:
     """Say what came of it."""
     console.rule('3. What came of it')
-    seen = Counter(
-        (str(a.values['code']), str(a.values['subject']), str(a.values['level']))
-        for a in alerts
-        if a.values['state'] == 'raised'
-    )
     recorded = Counter((a['code'], a['subject'], a['level']) for a in result['alerts'])
     both, only_live, only_bag = seen & recorded, seen - recorded, recorded - seen
     console.print(f'{both.total()} alerts came both live and from the recording.')

@@ -2,7 +2,10 @@
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable
+from contextlib import nullcontext
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.console import Console, Group, RenderableType
@@ -13,6 +16,9 @@ from rich.table import Table
 if TYPE_CHECKING:
     from ugv_acceptance.nodes.monitor import Monitor
     from ugv_acceptance.nodes.status import Status
+
+# How often each alert was raised, by code, subject and level.
+Raised = Counter[tuple[str, str, str]]
 
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 COLOURS = ('bold green', 'bold yellow', 'bold red', 'bold magenta')
@@ -29,13 +35,13 @@ class Lines:
         self._next = 0.0
         self._level = -1
         self.began = time.monotonic()
-        self.alerts: list[Status] = []
+        self.raised: Raised = Counter()
 
     def __call__(self, kind: str, status: 'Status') -> None:
         """Take what the monitor says."""
         now = time.monotonic()
         if kind == 'alert':
-            self.alerts.append(status)
+            count(self.raised, status)
             self._print(now, status)
         elif status.level != self._level or now >= self._next:
             self._level, self._next = status.level, now + self._every
@@ -53,6 +59,7 @@ class Panel:
         self._live = Live(console=console, refresh_per_second=4, auto_refresh=False)
         self._lines: list[str] = []
         self._verdict = ''
+        self.raised: Raised = Counter()
 
     def __enter__(self) -> 'Panel':  # noqa: PYI034 - Self is Python 3.11
         self._live.start()
@@ -65,6 +72,7 @@ class Panel:
         """Take what the monitor says."""
         text = f'{mark(status.level)}  {escape(status.message)}'
         if kind == 'alert':
+            count(self.raised, status)
             self._lines.append(f'[dim]{time.strftime("%H:%M:%S")}[/]  {text}')
             del self._lines[:-_SHOWN]
         else:
@@ -79,6 +87,13 @@ class Panel:
             '[dim]Ctrl-C ends[/]',
         ]
         self._live.update(Group(*rows), refresh=True)
+
+
+def count(raised: Raised, status: 'Status') -> None:
+    """Count an alert where it was raised."""
+    said = status.values
+    if said['state'] == 'raised':
+        raised[str(said['code']), str(said['subject']), str(said['level'])] += 1
 
 
 def mark(level: int) -> str:
@@ -117,22 +132,18 @@ def watch(
     console: Console,
     every: float = 5.0,
     until: Callable[[], bool] = lambda: False,
-) -> list['Status']:
-    """Run the monitor in this process until it is interrupted; return the alerts it raised."""
+) -> Raised:
+    """Run the monitor in this process until it is interrupted; return what alerts it raised."""
     from ugv_acceptance.nodes.monitor import build
     from ugv_acceptance.nodes.running import end, ros, spin
 
-    lines = Lines(console, every)
-    with ros(ros_args) as stop:
-        if not console.is_terminal:
-            node = build(config, urdf, lines)
-            node.bring_up()
-            spin(node, stop, until)
-        else:
-            with Panel(console) as panel:
-                node = build(config, urdf, panel)
-                node.bring_up()
-                node.create_timer(0.25, lambda: panel.draw(node), clock=node.steady)
-                spin(node, stop, until)
+    panel = Panel(console) if console.is_terminal else None
+    shown = panel or Lines(console, every)
+    with ros(ros_args) as stop, panel or nullcontext():
+        node = build(config, urdf, shown)
+        node.bring_up()
+        if panel is not None:
+            node.create_timer(0.25, partial(panel.draw, node), clock=node.steady)
+        spin(node, stop, until)
         end(node)
-    return lines.alerts
+    return shown.raised
