@@ -13,7 +13,6 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.model.attitude import is_rotation
 from ugv_acceptance.model.blocks import BLOCK, Floats, in_blocks
 from ugv_acceptance.model.expressions import Scalar
-from ugv_acceptance.model.hull import THIN, drawn_in, heights_above, hull
 from ugv_acceptance.model.kernels import compile_kernel
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Matrix, Payload, Robot, Vector
@@ -38,7 +37,6 @@ from ugv_acceptance.model.statics import (
 from ugv_acceptance.model.support import support_of
 
 FEET: list[Vector] = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
-numbers = st.floats(-2.0, 2.0)
 
 
 def stool(points: list[Vector], tolerance: float = 0.125) -> Robot:
@@ -84,26 +82,6 @@ def test_a_point_stands_within_the_tolerance_itself(
     assert found.standing == standing
     whole = stability(robot, np.empty((2, 0)), DOWN)
     assert np.all(np.asarray(whole.state) == (RAISED if raised else STANDING))
-
-
-@pytest.mark.parametrize(('width', 'corners'), [(0.5 * THIN, 0), (2.0 * THIN, 3)])
-def test_a_polygon_thinner_than_a_micrometre_is_none(width: float, corners: int) -> None:
-    """Twice the area over the longest side is the width, at any size."""
-    for size in (0.1, 3.0):
-        points = ((0.0, 0.0, 0.0), (size, 0.0, 0.0), (0.4 * size, width, 0.0))
-        assert len(hull(points, (0, 1, 2))) == corners
-
-
-@given(numbers, numbers, st.floats(0.2, 2.0), numbers, numbers)
-def test_heights_above_a_plane_are_those_of_its_equation(
-    a: float, b: float, c: float, x: float, y: float
-) -> None:
-    """Over z = a x + b y + c every point is as high as z says."""
-    corners = [(0.0, 0.0), (1.0, 0.2), (0.3, 1.0)]
-    plane = [(u, v, a * u + b * v + c) for u, v in corners]
-    points = [*plane, (x, y, a * x + b * y + c + 0.7)]
-    found = heights_above(points, 0, 1, 2)
-    assert found == pytest.approx([0.0, 0.0, 0.0, 0.7], abs=1e-9)
 
 
 @pytest.mark.parametrize('factor', [-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 3.0])
@@ -275,18 +253,6 @@ def test_utilisation_is_a_share_of_the_limit() -> None:
     """Without sign; nothing of a limit that is infinite."""
     assert utilisation((-20.0, 30.0), (40.0, 20.0)).tolist() == [0.5, 1.5]
     assert utilisation((20.0,), (math.inf,)).tolist() == [0.0]
-
-
-def test_a_place_beyond_a_corner_is_drawn_to_that_corner() -> None:
-    """Whichever of the points it is, by a billionth of the way inside; also for many places."""
-    points: list[Vector] = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
-    for k, (x, y, _) in enumerate(points):
-        turned = points[k + 1 :] + points[: k + 1]
-        assert drawn_in(turned, (3.0 * x, 3.0 * y, 0.5)) == pytest.approx((x, y), abs=1e-8)
-    x, y = drawn_in(points, (np.array((3.0, 0.0)), np.array((0.5, -2.0)), 0.0))
-    assert x == pytest.approx((1.0, 0.0), abs=1e-8)
-    assert y == pytest.approx((0.5 / 3.0, -1.0), abs=1e-8)
-    assert abs(x[0]) < 1.0
 
 
 @pytest.mark.parametrize('part', range(4))

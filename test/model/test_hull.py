@@ -249,6 +249,14 @@ def test_a_place_outside_is_drawn_towards_the_middle(
             assert under(points, (*found.tolist(), 0.3)) is not None
 
 
+def test_many_places_are_drawn_each_its_own_way() -> None:
+    """Over a square about the origin: to x = 1 and to y = -1."""
+    points: list[Point] = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
+    x, y = drawn_in(points, (np.array((3.0, 0.5)), np.array((0.5, -2.0)), 0.0))
+    np.testing.assert_allclose(x, (1.0, 0.25), atol=1e-8)
+    np.testing.assert_allclose(y, (0.5 / 3.0, -1.0), atol=1e-8)
+
+
 @pytest.mark.parametrize('order', list(permutations(range(3))))
 def test_heights_are_above_the_plane_of_the_three(order: tuple[int, int, int]) -> None:
     """Along z, over z = 0.7 x - 0.4 y + 0.3, wherever the three stand."""
