@@ -61,10 +61,28 @@ def test_only_points_near_the_ground_stand() -> None:
 
 def test_the_ground_may_lie_anywhere_in_the_base() -> None:
     """With base_link at axle height the tracks' plane is below it."""
-    points = plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), -0.095)
+    points = [*plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), -0.095), (1.0, 1.0, 0.0)]
     robot = Robot('r', (Link('a', 1.0),), (), (), (), ground=-0.095)
-    assert support_of(robot, points, COG) == Support((0, 1, 2), 3, raised=False)
-    assert many(robot, [points] * 2, [COG] * 2) == [Support((0, 1, 2), 3, raised=False)] * 2
+    expected = Support((0, 1, 2), 3, raised=False, known=True)
+    assert support_of(robot, points, COG) == expected
+    assert support_of(robot, points, COG).known
+    assert many(robot, [points] * 2, [COG] * 2) == [expected] * 2
+
+
+@pytest.mark.parametrize('lift', [0.0, -0.25])
+@pytest.mark.parametrize(('height', 'stands'), [(0.125, True), (0.126, False)])
+def test_a_point_may_be_as_high_as_the_tolerance(
+    lift: float,
+    height: float,
+    stands: bool,  # noqa: FBT001
+) -> None:
+    """An eighth of a metre above the tracks' plane, or above the face the robot is raised on."""
+    flat = plane(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), lift)
+    points = [*flat, (1.0, 1.0, lift + height)]
+    cycle = (0, 1, 3, 2) if stands else (0, 1, 2)
+    expected = Support(cycle, len(cycle), raised=lift < 0.0)
+    assert support_of(standing_on(points, 0.125), points, (0.2, 0.2, 0.5)) == expected
+    assert many(standing_on(points, 0.125), [points] * 2, [(0.2, 0.2, 0.5)] * 2) == [expected] * 2
 
 
 @pytest.mark.parametrize('count', [0, 1, 2])
