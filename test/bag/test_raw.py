@@ -7,6 +7,7 @@ import pytest
 import zstandard
 from bag.bag_cases import JOINT_STATE, STORE, cdr, joint_state, run, write_mcap
 from bag.recordings import write_with
+from mcap.writer import Writer
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
@@ -100,6 +101,17 @@ def test_a_broken_compressed_message_is_left_out(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / 'run.mcap', written)
     found = [m.log_time for m in messages(open_bag(path), [topic, '/imu/data'])]
     assert found == [t for _, _, t, _ in written if t != time]
+
+
+def test_what_only_looks_compressed_is_left_alone(tmp_path: Path) -> None:
+    """Content that is no CDR is nobody's to unpack, whatever it begins with."""
+    path, content = tmp_path / 'run.mcap', zstandard.FRAME_HEADER + b'x'
+    with path.open('wb') as file:
+        writer = Writer(file)
+        writer.start('ros2')
+        writer.add_message(writer.register_channel('/a', 'json', 0), 1, content, 1)
+        writer.finish()  # type: ignore[no-untyped-call]
+    assert [m.data for m in messages(open_bag(path), ['/a'])] == [content]
 
 
 def test_a_garbled_ros_1_message_is_left_out(tmp_path: Path) -> None:

@@ -3,9 +3,11 @@
 import csv
 import json
 import os
+import sqlite3
 import subprocess
 import sys
 from collections import defaultdict
+from contextlib import closing
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +22,9 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
 
 from ugv_acceptance.bag.annotated import Said, write_annotated
 from ugv_acceptance.bag.reader import open_bag
@@ -271,6 +276,22 @@ def test_an_old_recording_becomes_an_mcap(shared_bags: Path, tmp_path: Path) -> 
         times = [t for c, t, _ in reader.messages() if c.topic == '/joint_states']
     assert [time for time, _ in found['/joint_states']] == times
     assert found['/joint_states'][0][1].name
+
+
+def test_a_recording_that_breaks_off_is_copied_up_to_there(tmp_path: Path) -> None:
+    """SQLite with a number for a message: what came before it is in the copy."""
+    folder = tmp_path / 'run'
+    with Ros2Writer(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        kind = 'std_msgs/msg/Empty'
+        connection = writer.add_connection('/a', kind, typestore=get_typestore(Stores.ROS2_JAZZY))
+        for time in range(1, 9):
+            writer.write(connection, time, b'\0\1\0\0')
+    (path,) = folder.glob('*.db3')
+    with closing(sqlite3.connect(path)) as db:
+        db.execute('UPDATE messages SET data = 7 WHERE id = 5')
+        db.commit()
+    assert write_annotated(tmp_path / 'out.mcap', open_bag(folder), {}, []) == 4
+    assert [m[0] for m in raw(tmp_path / 'out.mcap')] == [1, 2, 3, 4]
 
 
 channels = st.lists(st.tuples(st.sampled_from(['cdr', 'json', 'x']), st.booleans()), min_size=1)

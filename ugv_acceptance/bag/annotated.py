@@ -116,8 +116,14 @@ class _Copy:
 def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[_Copy]:
     """Return one file's messages, its channels made now: they stand at the file's beginning."""
     channels = _channels(writer, member)
-    messages = messages_of(member, set(bag.topics))
+    messages = _readable(messages_of(member, set(bag.topics)))
     return (_Copy(m.log_time, m, channels[m.channel]) for m in messages if m.channel in channels)
+
+
+def _readable(messages: Iterator[Logged]) -> Iterator[Logged]:
+    """Yield messages up to where their file breaks off, as the reader has said that it does."""
+    with suppress(BadBag):
+        yield from messages
 
 
 def _channels(writer: McapWriter, member: Member) -> dict[int, int]:

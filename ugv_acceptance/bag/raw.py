@@ -55,11 +55,14 @@ def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
 
 def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:
     """Yield the messages of one file, as `messages` does."""
+    channels = member.index.channels
     for message in (_mcap if member.storage == 'mcap' else _foreign)(member, wanted):
-        try:
-            content = plain(message.data)
-        except BadSample:
-            continue
+        content = message.data
+        if channels[message.channel].encoding == 'cdr':
+            try:
+                content = plain(content)
+            except BadSample:
+                continue
         yield message if content is message.data else message._replace(data=content)
 
 
