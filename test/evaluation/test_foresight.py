@@ -99,6 +99,13 @@ def test_an_even_effort_under_a_growing_need_is_a_weak_motor(*, even: bool) -> N
     assert bool(times(run(rows), 'MOTOR_WEAK')) is even
 
 
+@pytest.mark.parametrize(('roll', 'weak'), [(0.5, True), (0.9, False)])
+def test_the_motor_of_a_robot_that_lies_is_not_judged(roll: float, *, weak: bool) -> None:
+    """Past its tipping point the ground bears the arm: an even effort shows no weakness."""
+    rows = [message(t, 1.4 - 0.6 * t, 20.0, roll) for t in grid(2.0)]
+    assert bool(times(run(rows), 'MOTOR_WEAK')) is weak
+
+
 @pytest.mark.parametrize('frozen', [True, False])
 def test_a_position_that_keeps_every_bit_under_changing_effort_is_frozen(*, frozen: bool) -> None:
     """Effort rises by a fifth of the limit: a real encoder would have moved by some bits."""

@@ -114,7 +114,7 @@ class Foresight:
                 (self.tip, _ahead(time, angle, TILT_RATE)),
                 (self.torque, _ahead(time, limit - np.abs(tau), LOAD_RATE * limit)),
                 (self.effort, np.where(np.isfinite(limit), np.abs(effort), 0.0)),
-                (self.weak, _weak(time, tau, effort, limit)),
+                (self.weak, _weak(time, tau, effort, limit) * _standing(angle)),
                 (self.frozen, self._frozen(old, tau, effort, q) / limit),
             )
         for signals, values in found:
@@ -180,6 +180,13 @@ def _weak(time: Times, tau: Floats, effort: Floats, limit: Floats) -> Floats:
         soon = time[over:] - time[:-over] <= 2 * KEPT * SPACING
         found[over:] = even & grown & soon[:, None] & _steady(np.abs(tau), over)
     return found
+
+
+def _standing(angle: Floats) -> NDArray[np.bool_]:
+    """Return (n, 1) where no look of the last KEPT was past tipping: the ground bears the arm."""
+    tipped = np.convolve((angle < 0.0).any(axis=1), np.ones(KEPT))[: len(angle)]
+    standing: NDArray[np.bool_] = (tipped == 0.0)[:, None]
+    return standing
 
 
 def _steady(values: Floats, over: int) -> NDArray[np.bool_]:
