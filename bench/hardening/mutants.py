@@ -43,6 +43,22 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/foresight.py', '', '3 -> 4'): 'FEW only chooses between two ways to one result',
     ('evaluation/foresight.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
     ('evaluation/sampling.py', 'Sampler', '1 -> 2'): 'no slot is below 0',
+    ('evaluation/low_pass.py', 'LowPass', '0 -> 1'): 'nothing is carried to the first sample',
+    ('evaluation/low_pass.py', 'LowPass.columns', '8.0 -> 9.0'): 'longer stretches, same values',
+    ('evaluation/low_pass.py', 'LowPass.columns', 'elapsed / 8.0 -> elapsed * 8.0'):
+        'shorter stretches, same values',
+    ('evaluation/low_pass.py', 'LowPass.columns',
+     'np.diff(np.floor(elapsed / 8.0)) > 0 -> np.diff(np.floor(elapsed / 8.0)) >= 0'): 'the same',
+    ('evaluation/value_outcome.py', '_measured',
+     "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
+        'a distance of 0 is false before that',
+    ('evaluation/verdicts.py', '_judge_alert',
+     'isinstance(demand, AlertDemand) and isinstance(measure, KnownTime) -> '
+     'isinstance(demand, AlertDemand) or isinstance(measure, KnownTime)'):
+        'an assertion for the type checker, always true',
+    ('evaluation/verdicts.py', '_judge_map',
+     'isinstance(demand, MapDemand) and isinstance(measure, MapMeasure) -> '
+     'isinstance(demand, MapDemand) or isinstance(measure, MapMeasure)'): 'the same',
     ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',
     ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
         'the size of a sign changes no order',

@@ -6,8 +6,9 @@ import pytest
 from evaluation.hand_made import findings, made, seconds
 from evaluation.streams import settings
 
-from ugv_acceptance.evaluation.criteria import ANY, Value
+from ugv_acceptance.evaluation.criteria import ANY, Criterion, DataDemand, Value
 from ugv_acceptance.evaluation.settings import Limits
+from ugv_acceptance.evaluation.statements import demand_words
 from ugv_acceptance.evaluation.value_outcome import judge_value
 
 TOLD = settings(limits=Limits((50.0, 30.0)))
@@ -43,6 +44,18 @@ def test_a_violation_in_words(demand: Value, said: str) -> None:
     """In units of what turns or slides; for two and a half seconds here."""
     found = judge_value(*findings(TOLD, demand, [RUN]))
     assert found.reason == f'{said} (2.50 s in violation)'
+
+
+@pytest.mark.parametrize(
+    ('demand', 'words'),
+    [
+        (DataDemand('longest_gap', most=0.2), 'longest gap at most 0.2 s'),
+        (DataDemand('rate', 'imu', least=10.0), 'rate of imu at least 10 Hz'),
+    ],
+)
+def test_a_bound_that_is_not_given_is_not_told(demand: DataDemand, words: str) -> None:
+    """Neither at least minus infinity nor at most infinity."""
+    assert demand_words(Criterion('it', demand), TOLD) == words
 
 
 def test_a_tilt_of_nothing_is_not_past_the_tipping_point() -> None:

@@ -53,7 +53,7 @@ class LowPass:
         if not finite.all():
             x = np.where(finite, x, np.nan)
         carried = (step > 0.0) & (step <= LONGEST_STEP) & np.concatenate(([True], finite[:-1]))
-        decay = np.where(carried, step / self.constant, 0.0)
+        decay = carried * step / self.constant
         elapsed = np.cumsum(decay)
         starts = ~carried
         starts[1:] |= np.diff(np.floor(elapsed / 8.0)) > 0

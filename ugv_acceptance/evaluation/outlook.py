@@ -106,7 +106,7 @@ class Outlook:
         found = []
         for name, values, slowest in zip(names, np.hstack((tilt, left)).T, least, strict=True):
             value, rate = _line(time, values)
-            if -rate >= slowest and math.isfinite(slowest):
+            if -rate >= slowest:
                 seconds = float(time_to(0.0, -value, -value - rate, 1.0))
                 found.append(Ahead(name, rate, seconds))
         return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))

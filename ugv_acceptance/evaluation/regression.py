@@ -27,7 +27,7 @@ def independent_samples(residual: Floats) -> float:
     n = len(residual)
     centred = residual - residual.mean()
     power = float(centred @ centred)
-    if n < 3 or power == 0.0:
+    if power == 0.0:
         return float(n)
     r = min(max(float(centred[1:] @ centred[:-1]) / power, 0.0), 0.999)
     return n * (1.0 - r) / (1.0 + r)
