@@ -4,6 +4,7 @@ A verb's module imports what it needs inside its function, so that --help and co
 """
 
 import errno
+import os
 import sys
 from importlib import import_module
 
@@ -36,6 +37,10 @@ VERBS = (
     'risk',
     'doctor',
 )
+
+# Read by NumPy when it is imported. Products here are of few columns: threads that share one wait
+# for each other longer than they work, a seventh of what judging a recording costs.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 app = typer.Typer(
     name='ugv-acceptance',

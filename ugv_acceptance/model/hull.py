@@ -22,6 +22,8 @@ Cycle = tuple[int, ...]
 
 # A polygon thinner than this (m) has no inside that could be stood on.
 THIN = 1e-6
+# A triple at least as wide (m) tells the plane of its face as well as any other.
+WIDE = 1e-2
 # Slack (m2) within which three points lie in one line.
 _SLACK = 1e-12
 # A place outside the hull is drawn to it, and this part of the way further, to be inside.
@@ -83,7 +85,7 @@ def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cy
     left: Rows = ALL
     for _ in range(_TRIES):
         some = pick(tuple(points), left)
-        cycle = hull(tuple(_sample(some[k], 0) for k in active), active)
+        cycle = hull(sample(tuple([some[k] for k in active]), 0), active)
         same = np.array(np.broadcast_to(_is_hull(some, cycle, active), count))
         same[0] = True
         yield cycle, inner(left, ALL if same.all() else np.flatnonzero(same))
@@ -92,14 +94,16 @@ def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cy
         if not count:
             return
     some = pick(tuple(points), left)
-    alone = [hull(tuple(_sample(some[k], row) for k in active), active) for row in range(count)]
+    alone = [hull(sample(tuple([some[k] for k in active]), row), active) for row in range(count)]
     for cycle in set(alone):
         yield cycle, inner(left, np.flatnonzero([x == cycle for x in alone]))
 
 
-def _sample(point: Sequence[Any], row: int) -> Point:
-    x, y, z = (float(x[row]) if isinstance(x, np.ndarray) else x for x in point)
-    return x, y, z
+def sample(values: Values, row: int) -> Values:
+    """Return one sample of nested tuples of floats and arrays: floats all."""
+    if isinstance(values, tuple):
+        return tuple([sample(part, row) for part in values])
+    return float(values[row]) if isinstance(values, np.ndarray) else values
 
 
 def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
@@ -176,6 +180,14 @@ def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64
         best[rows[better]] = number
         lowest[rows[better]] = height[better]
     return best
+
+
+def carries(points: Values, place: Values, triple: tuple[int, int, int]) -> Values:
+    """Return where a triple that is nowhere near one line contains a place, seen from above."""
+    i, j, k = (points[n] for n in triple)
+    a, b, c = _turn(j, k, place), _turn(k, i, place), _turn(i, j, place)
+    sides = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) | (a <= 0.0) & (b <= 0.0) & (c <= 0.0)
+    return sides & (abs(a + b + c) > WIDE**2)
 
 
 def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:

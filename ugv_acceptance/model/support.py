@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from ugv_acceptance.model.hull import (
     Cycle,
     Point,
+    carries,
     drawn_in,
     heights_above,
     hull,
     hulls,
     pairs,
+    sample,
     triple_under,
     triples,
     triples_under,
@@ -49,6 +51,10 @@ class Support:
     known: bool = True
 
 
+# A plane is the lower hull's where no point lies further (m) below it.
+_LEVEL = 1e-12
+# So many triples are tried on all samples before each is searched for its own.
+_TRIES = 4
 _UNKNOWN = Support((), 0, raised=False, known=False)
 
 
@@ -114,16 +120,41 @@ def _faces(tolerance: float, points: Values, cog: Values, count: int) -> NDArray
 
     As bits; -1 where the points have no such face.
     """
-    chosen = triples_under(points, cog, count)
-    outside = np.flatnonzero(chosen < 0)
+    patterns = _faces_under(tolerance, points, cog, count)
+    outside = np.flatnonzero(patterns < 0)
     if outside.size:
         some, centre = pick((points, cog), outside)
-        chosen[outside] = triples_under(some, drawn_in(some, centre), outside.size)
-    patterns = chosen.copy()
-    for number, rows, _ in groups(chosen):
+        inside = drawn_in(some, centre)
+        patterns[outside] = _faces_under(tolerance, some, inside, outside.size)
+    return patterns
+
+
+def _faces_under(tolerance: float, points: Values, place: Values, count: int) -> NDArray[np.int64]:
+    """Return each sample's points on the face under a place inside their hull; -1: it is outside.
+
+    The triple under one sample is tried on all: the hull is convex, so where no point lies below
+    the triple's plane none other is lower. Samples that fit none are searched for theirs.
+    """
+    patterns, left = np.full(count, -1), np.arange(count)
+    for _ in range(_TRIES):
+        if not left.size:
+            return patterns
+        some, at = pick((points, place), left)
+        triple = triple_under(*sample((some, at), left.size // 2))
+        if triple is None:
+            break
+        with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+            heights = heights_above(some, *triple)  # where these three are in one line, too
+        fits = reduce(np.logical_and, [h >= -_LEVEL for h in heights], carries(some, at, triple))
+        fits = np.broadcast_to(fits, left.size)
+        found = np.broadcast_to(_pattern(heights, tolerance), left.size)
+        patterns[left[fits]] = found[fits]
+        left = left[~fits]
+    some, at = pick((points, place), left)
+    for number, rows, _ in groups(triples_under(some, at, left.size)):
         if number >= 0:
             triple = triples(len(points))[number]
-            patterns[rows] = _pattern(heights_above(pick(points, rows), *triple), tolerance)
+            patterns[left[rows]] = _pattern(heights_above(pick(some, rows), *triple), tolerance)
     return patterns
 
 
