@@ -52,19 +52,29 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/value_outcome.py', '_measured',
      "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
         'a distance of 0 is false before that',
-    ('evaluation/verdicts.py', '_judge_alert',
-     'isinstance(demand, AlertDemand) and isinstance(measure, KnownTime) -> '
-     'isinstance(demand, AlertDemand) or isinstance(measure, KnownTime)'):
-        'an assertion for the type checker, always true',
-    ('evaluation/verdicts.py', '_judge_map',
-     'isinstance(demand, MapDemand) and isinstance(measure, MapMeasure) -> '
-     'isinstance(demand, MapDemand) or isinstance(measure, MapMeasure)'): 'the same',
+    ('evaluation/recorded.py', 'RecordedEvaluator._table', '0.0 -> 1.0'):
+        'what stands in for a posture that is not whole is not read',
+    ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', 'never < 0 -> never <= 0'):
+        'whether the row before the first is usable is not read',
+    ('evaluation/live.py', 'LiveEvaluator.joint_state', '-signal.on -> +signal.on'):
+        'a small value changes nothing, calls are saved',
     ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',
     ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
         'the size of a sign changes no order',
     ('evaluation/examination.py', 'ValueMeasure._see',
      'order[k] >= sign * self.worst[-1].value -> order[k] > sign * self.worst[-1].value'):
         'of equal moments nsmallest keeps the earlier',
+    ('evaluation/alerts.py', 'Signal', 'True -> False'): 'quiet saves work: no value depends on it',
+    ('evaluation/alerts.py', 'Signal.advance', 'self.alert is None -> self.alert is not None'):
+        'never quiet, and the same',
+    ('evaluation/alerts.py', 'Signal.advance', 'self.due is None -> self.due is not None'):
+        'the same',
+    ('evaluation/foresight.py', 'Foresight._judge', '0.0 -> 1.0'):
+        'where there is no limit a warning begins at infinity',
+    ('evaluation/effort.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
+        'only efforts above ten are held to the largest of the run',
+    ('evaluation/comparison.py', '_sign', 'scale.value[0] > 0.0 -> scale.value[0] >= 0.0'):
+        'a scale of zero is unknown before',
     ('evaluation/advice.py', '_load', 'mass <= 0.0 -> mass < 0.0'):
         'an empty hand gains nothing by being emptied',
 }  # fmt: skip

@@ -285,3 +285,12 @@ def test_an_arm_that_is_too_heavy_itself_can_hold_nothing() -> None:
     found = advise(told, (0.0, 0.0), DOWN, Payload(3.0, (0.1, 0.0, 0.0)), of='lift')
     (load,) = [a for a in found if a.kind == 'payload']
     assert '3.0 kg is 3.0 kg too heavy' in load.sentence
+
+
+@pytest.mark.parametrize(('mass', 'told'), [(0.05, False), (0.08, True)])
+def test_setting_down_what_gains_next_to_nothing_is_not_told(mass: float, told: bool) -> None:  # noqa: FBT001
+    """A tenth of the way from 28.8 to 36 N m is 0.72; 1.1 m away a kg makes 10.8."""
+    weak = replace(TOLD, limits=replace(LIMITS, torque=(36.0, math.inf)))
+    found = advise(weak, (0.0, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)), of='lift')
+    assert found
+    assert ('payload' in [a.kind for a in found]) is told

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts import ERROR, Alert, Rule, Signal, feed
+from ugv_acceptance.evaluation.alerts import ERROR, Alert, Rule, Signal, feed, runs
 from ugv_acceptance.evaluation.settings import Delays, Limits
 from ugv_acceptance.evaluation.watch import Watch
 
@@ -198,3 +198,36 @@ def test_no_excursion_longer_than_the_on_delay_is_hidden(seed: int, period: floa
     assert long
     for last in long:
         assert any(a.start <= last <= (last if a.end is None else a.end) for a in signal.log)
+
+
+def test_a_value_that_stays_as_bad_raises_what_is_due() -> None:
+    """At its own sample: nobody waits for a timer."""
+    signal = Signal(rule(100, 0), [])
+    for now in (0, 99):
+        signal.step(now, 5.0)
+    assert signal.log == []
+    signal.step(150, 5.0)
+    assert found(signal.log) == [(100, None, 5.0)]
+
+
+@pytest.mark.parametrize(
+    ('values', 'raw', 'expected'),
+    [
+        ((2.0, 0.7, 0.0, 0.0, 1.0), False, [(0, 2, True), (2, 4, False), (4, 5, True)]),
+        ((0.7, 0.0, 1.0), True, [(0, 1, True), (1, 2, False), (2, 3, True)]),
+        ((math.nan, 0.7), True, [(0, 2, True)]),
+        ((math.nan, 0.5, 1.0), False, [(0, 2, False), (2, 3, True)]),
+        ((0.0, 2.0), True, [(0, 1, False), (1, 2, True)]),
+        ((), True, []),
+    ],
+)
+def test_runs_are_the_stretches_on_one_side(
+    values: tuple[float, ...], expected: list[tuple[int, int, bool]], *, raw: bool
+) -> None:
+    """What is in the deadband, or no number, belongs to what was before."""
+    assert list(runs(rule(0, 0), np.array(values), raw=raw)) == expected
+
+
+def test_the_first_value_of_a_part_may_be_the_worst() -> None:
+    """Of a stretch that began in the part before."""
+    assert fed(rule(0, 0), [1, 2, 3], [2.0, 9.0, 3.0], 5, [1]) == [(1, None, 9.0)]

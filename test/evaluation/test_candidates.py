@@ -94,6 +94,9 @@ def test_an_arm_that_lies_low_may_rise() -> None:
     up, down = joint_paths(TOLD, q, np.array(DOWN), NO_TORQUE)[:2]
     assert not up.forbidden.any()
     assert down.forbidden.all()
+    retracted = joint_paths(TOLD, q, np.array(DOWN), NO_TORQUE)[3]
+    assert retracted.subject == 'slide'
+    assert not retracted.forbidden.any()
 
 
 @pytest.mark.parametrize(('slope', 'count'), [(0.0499, 0), (0.0501, 2)])
@@ -106,18 +109,18 @@ def test_turning_is_for_slopes(slope: float, count: int) -> None:
 
 def test_a_turn_goes_half_around_either_way_in_steps_of_five_degrees() -> None:
     """Gravity keeps its size and turns against the robot; 0.4 rad/s."""
-    down = np.array((1.0, 2.0, -9.0))
+    down = np.array((1.5, 2.0, -9.0))
     left, right = turn_paths(TOLD.robot, STILL, down, Payload())
     for path, way in ((left, 1.0), (right, -1.0)):
         assert path.amount == pytest.approx(way * np.radians(np.arange(5.0, 181.0, 5.0)))
         assert path.seconds == pytest.approx(np.abs(path.amount) / 0.4)
         heading = np.arctan2(path.gravity[:, 1], path.gravity[:, 0])
-        turned = np.angle(np.exp(1j * (math.atan2(2.0, 1.0) - heading - path.amount)))
+        turned = np.angle(np.exp(1j * (math.atan2(2.0, 1.5) - heading - path.amount)))
         assert np.abs(turned).max() < 1e-9
         assert np.linalg.norm(path.gravity, axis=1) == pytest.approx(np.linalg.norm(down))
         assert (path.gravity[:, 2] == -9.0).all()
         assert (path.q == 0.0).all()
-    assert left.gravity[17] == pytest.approx((2.0, -1.0, -9.0))  # a quarter turn to the left
+    assert left.gravity[17] == pytest.approx((2.0, -1.5, -9.0))  # a quarter turn to the left
 
 
 @pytest.mark.parametrize(('across', 'slips'), [(5.9, False), (6.3, True)])
@@ -175,3 +178,22 @@ def test_a_turn_that_would_slip_anywhere_is_forbidden_there() -> None:
         assert (path.forbidden == (slips | ~stands)).all()
         assert slips.any()
         assert not slips.all()
+
+
+def test_the_joint_of_an_arm_that_is_its_lowest_point_counts() -> None:
+    """The lift at 3 cm: its load may come as low, not lower."""
+    robot = TOLD.robot
+    joints = (replace(robot.joints[0], xyz=(0.1, 0.0, 0.03)), *robot.joints[1:])
+    low = replace(TOLD, robot=replace(robot, joints=joints))
+    _, down, *_ = joint_paths(low, np.array((0.5, 0.0)), np.array(DOWN), NO_TORQUE)
+    assert (down.forbidden == (down.q[:, 0] < -1e-6)).all()
+    assert down.forbidden.any()
+
+
+def test_a_robot_that_slips_where_it_stands_does_not_turn() -> None:
+    """Though a step to the left would be enough."""
+    cog = centre_of_gravity(TOLD.robot, STILL, Payload())
+    across = 0.15 * 9.0 / cog[2] + 0.02
+    left, _ = turn_paths(TOLD.robot, STILL, np.array((1.0, across, -9.0)), Payload())
+    assert left.gravity[0, 1] < across - 0.04
+    assert left.forbidden.all()

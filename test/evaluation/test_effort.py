@@ -277,7 +277,8 @@ def test_a_result_counts_seconds_from_the_start() -> None:
 def test_a_plateau_goes_on_while_a_second_is_near_the_middle_of_those_before(
     levels: tuple[float, ...], ends: list[tuple[int, int]]
 ) -> None:
-    """Within a twentieth, or a newton metre; ten samples a second, three seconds at least."""
+    """Within a twentieth, or a newton metre; seconds are counted from the first of its samples."""
     effort = np.repeat(levels, 10)
     time = T0 + np.arange(len(effort)) * 100 * MS
     assert list(_split(time, effort)) == [slice(a, b) for a, b in ends]
+    assert list(_split(time + 370 * MS, effort)) == [slice(a, b) for a, b in ends]

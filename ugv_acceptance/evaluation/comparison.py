@@ -113,7 +113,7 @@ def _joint(s: _Samples) -> Json:
     if told.sum() < LEAST:
         return {'effort': 'not recorded' if not told.any() else 'too few samples'}
     if np.ptp(s.effort[told]) == 0.0:
-        return {'effort': f'constant at {s.effort[told][0]:g}'}
+        return {'effort': f'constant at {s.effort[told].max():g}'}
     return {
         'effort': 'recorded',
         'clipped_samples': int(s.clipped.sum()),

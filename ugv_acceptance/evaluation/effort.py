@@ -154,7 +154,7 @@ def _split(time: NDArray[np.int64], effort: Floats) -> Iterator[slice]:
     """Yield the rows of each plateau of at least three bins."""
     if not len(time):
         return
-    bins = np.flatnonzero(np.diff((time - time[0]) // BIN, prepend=-1))
+    _, bins = np.unique((time - time[0]) // BIN, return_index=True)
     edges = [*bins.tolist(), len(time)]
     medians = [float(np.median(effort[a:b])) for a, b in pairwise(edges)]
     first = 0

@@ -34,6 +34,8 @@ TILT_RATE, LOAD_RATE = 0.0175, 0.03
 # A weak motor: effort even to this share of the limit while the posture comes to need this share
 # more. A frozen encoder: not a bit changes for so many looks, but effort by this share.
 EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
+# A motor is weak (1) or not (0).
+WEAK = 0.5
 # Shares of the limit between which an even effort may mean a weak motor.
 LOW, HIGH = 0.3, 0.97
 # What changes by more than this share of the whole between two looks has jumped.
@@ -163,7 +165,7 @@ def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 -
         step = (time[OVER:] - time[:-OVER])[:, None]
         now, rate = left[OVER:], (left[OVER:] - left[:-OVER]) / step * 1e9
         shrinks = (rate <= -slowest) & _steady(-left, OVER)
-        seconds = time_to(0.0, -now, -now - np.where(shrinks, rate, 0.0), 1.0)
+        seconds = time_to(0.0, -now, -now - np.where(shrinks, rate, np.inf), 1.0)
         found[OVER:] = np.where(step <= LONGEST, -seconds, np.nan)
     return found
 
@@ -211,6 +213,6 @@ def foresight_of(settings: Settings, signal: SignalOf) -> Foresight:
             signal('EFFORT_LIMIT', name, (level, level - deadband), delays.torque_on)
             for name, level in zip(names, levels, strict=True)
         ],
-        [signal('MOTOR_WEAK', name, (0.5, 0.5), 0.0) for name in names],
+        [signal('MOTOR_WEAK', name, (WEAK, WEAK), 0.0) for name in names],
         [signal('ENCODER_FROZEN', name, (CHANGED, CHANGED), delays.torque_on) for name in names],
     )
