@@ -1,0 +1,86 @@
+"""A copy of any MCAP has all its messages, its channels and their types, whatever its summary."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bag.bag_cases import run, write_mcap
+from bag.recordings import SHAPES, chunk_starts
+from mcap.reader import make_reader
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.bag.annotated import Said, check_new, write_annotated
+from ugv_acceptance.bag.reader import open_bag
+
+WRITTEN = run(60)
+
+
+def copied(path: Path) -> list[tuple[str, str, int, bytes]]:
+    """Return topic, type, log time and content of every message, as the mcap package reads it."""
+    with path.open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        return [
+            (channel.topic, schema.name if schema else '', message.log_time, message.data)
+            for schema, channel, message in reader.iter_messages()
+        ]
+
+
+@pytest.mark.parametrize('shape', SHAPES)
+def test_every_shape_of_mcap_is_copied_whole(tmp_path: Path, shape: str) -> None:
+    """Where the summary does not say what the channels are, the file does."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN, **SHAPES[shape])
+    assert write_annotated(tmp_path / 'out.mcap', open_bag(path), {}, []) == len(WRITTEN)
+    assert copied(tmp_path / 'out.mcap') == list(WRITTEN)
+
+
+def test_a_file_cut_off_is_copied_up_to_there(tmp_path: Path) -> None:
+    """What the reader salvages is in the copy, which is whole."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
+    data = path.read_bytes()
+    path.write_bytes(data[: chunk_starts(data)[2] + 100])
+    count = write_annotated(tmp_path / 'out.mcap', open_bag(path), {}, [])
+    assert 0 < count < len(WRITTEN)
+    assert copied(tmp_path / 'out.mcap') == WRITTEN[:count]
+
+
+def test_no_half_file_is_left(tmp_path: Path) -> None:
+    """Where what is said cannot be made, neither the copy nor a part of it is there."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
+
+    def fault() -> Any:
+        yield Said(WRITTEN[0][2], '/said', b'\0\1\0\0')
+        raise ValueError('no more')
+
+    with pytest.raises(ValueError, match='no more'):
+        write_annotated(
+            tmp_path / 'out.mcap', open_bag(path), {'/said': 'std_msgs/msg/Empty'}, fault()
+        )
+    assert [p.name for p in tmp_path.iterdir()] == ['in.mcap']
+
+
+def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
+    """A folder where the file should be is named; nothing is left beside it."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
+    (tmp_path / 'out.mcap' / 'full').mkdir(parents=True)
+    with pytest.raises(AcceptanceError, match=r'out\.mcap: cannot be written'):
+        write_annotated(tmp_path / 'out.mcap', open_bag(path), {}, [])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['in.mcap', 'out.mcap']
+
+
+@pytest.mark.parametrize('overwrite', [False, True])
+def test_a_recording_is_never_written_over(tmp_path: Path, *, overwrite: bool) -> None:
+    """Neither by its own name nor by a link to it, asked for or not."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
+    (tmp_path / 'link.mcap').hardlink_to(path)
+    for target in (path, tmp_path / 'link.mcap'):
+        with pytest.raises(AcceptanceError, match='expected a new file, got the recording itself'):
+            check_new(target, [path], overwrite=overwrite)
+
+
+def test_another_file_is_replaced_only_when_asked(tmp_path: Path) -> None:
+    """With --overwrite, and not without."""
+    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
+    (tmp_path / 'old.mcap').write_bytes(b'')
+    check_new(tmp_path / 'old.mcap', [path], overwrite=True)
+    with pytest.raises(AcceptanceError, match='--overwrite only'):
+        check_new(tmp_path / 'old.mcap', [path], overwrite=False)
