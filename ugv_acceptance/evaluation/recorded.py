@@ -128,7 +128,7 @@ class RecordedEvaluator:
         due = fresh.deadline
         wrong = fresh.clocks(time, stamp)
         before, limits = fresh.messages(time)
-        deadlines = np.append(time[0] + 1 if due is None else due, time[:-1] + before[1:])
+        deadlines = np.append(time[0] if due is None else due, time[:-1] + before[1:])
         for k in np.flatnonzero(time > deadlines):
             signals.stale.set(int(deadlines[k]), 1.0)
             signals.stale.clear(int(time[k]))

@@ -1,0 +1,250 @@
+"""What is told at the very limits of time and value: live and of a recording, by hand-made runs."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation.streams import (
+    MS,
+    REST,
+    T0,
+    Carry,
+    Imu,
+    Joints,
+    Message,
+    S,
+    batch_of,
+    give,
+    live,
+    recorded,
+    run_of,
+    settings,
+    split,
+    tilted,
+    upright,
+)
+from robots import tracked
+
+from ugv_acceptance.evaluation.alerts import ERROR, OK, WARN, Alert
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.model.stability import margins
+
+FREE = Limits((1e3, 1e3), tip_warn=0.01, tip_error=0.001)
+QUICK = Delays(tip_on=0.1, torque_on=0.1, off=0.3, tip_off=0.3)
+
+
+def told(
+    messages: Sequence[Message], end: int, code: str, settings_: Settings | None = None
+) -> list[tuple[str, int, int | None, float]]:
+    """Return subject, start, end (ms) and peak of the alerts of a code: the same on both roads."""
+    chosen = settings_ or settings(limits=FREE, delays=QUICK)
+    _, ours = live(chosen, messages, end)
+    _, evaluator = recorded(chosen, split(messages, [len(messages) // 3]), end)
+    found = [[_facts(a) for a in log if a.rule.code == code] for log in (ours, evaluator.watch.log)]
+    assert found[0] == found[1]
+    return found[0]
+
+
+def _facts(a: Alert) -> tuple[str, int, int | None, float]:
+    end = None if a.end is None else round((a.end - T0) / MS)
+    return a.rule.subject, round((a.start - T0) / MS), end, round(a.peak, 9)
+
+
+@pytest.mark.parametrize(
+    ('rate', 'found'),
+    [
+        (0.6, [('lift', 100, None, 0.6)]), (-0.6, [('lift', 100, None, 0.6)]), (0.5999, []),
+        (-0.5999, []), (math.nan, []),
+    ],
+)  # fmt: skip
+def test_a_speed_at_its_limit_is_too_fast(rate: float, found: Any) -> None:
+    """In both directions, after its delay."""
+    limits = replace(FREE, speed=(0.6, math.inf))
+    run = run_of(1.0, joints=Joints(0, velocity=(rate, 9.0)))
+    chosen = settings(limits=limits, delays=QUICK)
+    assert told(run, T0 + S, 'STATIC_MODEL', chosen) == found
+
+
+def test_a_robot_on_two_points_has_no_support() -> None:
+    """From its first margins on, after the delay of a tilt; on four there is nothing to say."""
+    chosen, run = settings(limits=FREE, delays=QUICK), run_of(1.0)
+    assert told(run, T0 + S, 'NO_SUPPORT', chosen) == []
+    robot = replace(chosen.robot, contacts=chosen.robot.contacts[:2])
+    found = told(run, T0 + S, 'NO_SUPPORT', replace(chosen, robot=robot))
+    assert found == [('robot', 101, None, 1.0)]
+
+
+def test_sliding_is_told_from_the_warning_limit_on() -> None:
+    """A friction of 0.3 holds to 16.7 degrees: 1.7 are left at 15."""
+    lean = tilted(math.radians(15.0))
+    run = run_of(1.0, imu=Imu(0, lean, acceleration=upright(lean)))
+    left = math.atan(0.3) - math.radians(15.0)
+    for warn, count in ((left + 1e-6, 1), (left - 1e-6, 0)):
+        limits = replace(FREE, friction=0.3, tip_warn=warn)
+        found = told(run, T0 + S, 'SLIDE', settings(limits=limits, delays=QUICK))
+        assert len(found) == count
+
+
+@pytest.mark.parametrize(('late', 'stale'), [(0, False), (1, True)])
+@pytest.mark.parametrize(('silent', 'subject'), [(Joints, 'joint_states'), (Imu, 'imu')])
+def test_a_message_on_its_deadline_is_not_late(
+    silent: type,
+    subject: str,
+    late: int,
+    stale: bool,  # noqa: FBT001
+) -> None:
+    """A tenth of a second after the last, both every 20 ms before; a nanosecond later it is.
+
+    Margins are known up to the deadline, itself included, whichever input asks.
+    """
+    run = run_of(2.0, imu_hz=50.0)
+    start = T0 + (MS if silent is Imu else 0)
+    last = start + 1480 * MS
+    kept = [m for m in run if not (isinstance(m, silent) and last < m.time < last + 200 * MS)]
+    other: Message = Imu(last + 100 * MS + late) if silent is Joints else Joints(
+        last + 100 * MS + late
+    )  # fmt: skip
+    asked = sorted([*kept, other], key=lambda m: m.time)
+    seen, _ = live(settings(limits=FREE), asked, T0 + 2 * S)
+    ((_, found),) = [(m, x) for m, x in seen if m is other]
+    assert (found is None) == stale
+    rows, _ = recorded(settings(limits=FREE), [asked], T0 + 2 * S)
+    assert bool(rows[0].known[rows[0].time == other.time][0]) != stale
+    back = Joints(last + 100 * MS + late) if silent is Joints else Imu(last + 100 * MS + late)
+    heard = sorted([*kept, back], key=lambda m: m.time)
+    alerts = told(heard, T0 + 2 * S, 'INPUT_STALE')
+    assert [one[0] for one in alerts] == [subject] * (1 if stale else 0)
+    _, evaluator = recorded(settings(), [heard], T0 + 2 * S)
+    which = int(silent is Imu)
+    gap = [(last + 100 * MS, back.time)] if stale else []
+    assert [g for g in evaluator.gaps[which] if g[0] == last + 100 * MS] == gap
+    assert evaluator.gaps[1 - which] == []
+
+
+def test_a_recording_that_ends_in_silence_has_a_gap_to_its_end() -> None:
+    """From the deadline on; not where it ends at the deadline."""
+    for rest, gaps in ((100 * MS, []), (100 * MS + 1, [(T0 + 1080 * MS, T0 + 1080 * MS + 1)])):
+        _, evaluator = recorded(settings(), [run_of(1.0)], T0 + 980 * MS + rest)
+        assert evaluator.gaps[0] == gaps
+
+
+def test_who_has_not_said_when_it_began_misses_nothing_before_the_first_message() -> None:
+    """Neither live nor in a recording; what falls silent later is stale."""
+    evaluator, other = LiveEvaluator(settings()), RecordedEvaluator(settings())
+    messages = run_of(1.0)
+    for m in messages:
+        give(evaluator, m)
+    rows = other.batch(batch_of(messages))
+    assert rows.known[1:].all()
+    for log in (evaluator.watch.log, other.watch.log):
+        assert not [a for a in log if a.rule.code == 'INPUT_STALE']
+    assert other.gaps == ([], [])
+
+
+@pytest.mark.parametrize(('late', 'missing'), [(0, False), (1, True)])
+def test_a_joint_is_missing_when_its_last_message_is_older_than_silence_may_be(
+    late: int,
+    missing: bool,  # noqa: FBT001
+) -> None:
+    """A tenth of a second at 50 Hz, though the other joint comes on."""
+    run: list[Message] = [
+        replace(m, names=('lift',), position=(0.1,))
+        if isinstance(m, Joints) and m.time > T0 + S
+        else m
+        for m in run_of(1.1)
+    ]
+    run = [m for m in run if not (isinstance(m, Joints) and m.time > T0 + 1090 * MS)]
+    run = [
+        *(m for m in run if m.time < T0 + 1100 * MS),
+        Joints(T0 + 1100 * MS + late, ('lift',), (0.1,)),
+    ]
+    found = told(run, T0 + 1101 * MS, 'INPUT_INCOMPLETE')
+    assert found == ([('joint_states', 1100, None, 1.0)] if missing else [])
+
+
+def test_a_payload_that_cannot_be_is_told_and_leaves_the_one_before() -> None:
+    """Until one comes that can, and after its delay."""
+    run = sorted(
+        [*run_of(2.0), Carry(T0 + 500 * MS + 1, -1.0), Carry(T0 + 800 * MS + 1, 2.0)],
+        key=lambda m: m.time,
+    )
+    assert told(run, T0 + 2 * S, 'PAYLOAD_INVALID') == [('payload', 500, 1100, 1.0)]
+    seen, _ = live(settings(), run, T0 + 2 * S)
+    torque = {m.time: x.torque[0] for m, x in seen if x is not None}
+    first, bad, good = (abs(torque[T0 + t * MS]) for t in (400, 600, 1000))
+    assert first == bad
+    # 2 kg at the hand's origin, 1 m out, for 1 kg at 1.1 m.
+    assert good - bad == pytest.approx(9.81 * (2.0 - 1.1))
+
+
+def test_positions_that_cannot_be_are_told_until_they_can() -> None:
+    """From the message on; cleared as long after as any fault."""
+    run = [
+        replace(m, position=(math.nan, 0.0))
+        if isinstance(m, Joints) and 500 <= (m.time - T0) // MS < 700
+        else m
+        for m in run_of(2.0)
+    ]
+    assert told(run, T0 + 2 * S, 'INPUT_INVALID') == [('joint_states', 500, 1000, 1.0)]
+
+
+def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
+    """Row by row for an arm that reaches to any side on ground that leans to any; in parts."""
+    robot = tracked()
+    names = robot.joint_names
+    chosen = Settings(
+        robot,
+        tuple(JointInput(name) for name in names),
+        ImuInput(agreement=9.0),
+        Limits((1e3,) * 4),
+    )
+    rng = np.random.default_rng(6)
+    messages: list[Message] = []
+    for k in range(60):
+        roll, pitch = rng.uniform(-0.3, 0.3, 2).tolist()
+        q = tuple(rng.uniform((-3, 0, -1, 2), (3, 1, 1, 3)).tolist())
+        lean = tilted(roll, pitch)
+        messages += [
+            Imu(T0 + 20 * k * MS, lean, acceleration=upright(lean)),
+            Joints(T0 + (20 * k + 10) * MS, names, q),
+        ]
+    parts = split(messages, [1, 50])
+    full, _ = recorded(chosen, parts, T0 + 2 * S)
+    short, _ = recorded(chosen, parts, T0 + 2 * S, detail=False)
+    found, checked = [], 0
+    for rows, less in zip(full, short, strict=True):
+        known = rows.known
+        checked += int(known.sum())
+        expected = margins(robot, rows.q[known], rows.gravity[known])
+        for made in (rows, less):
+            np.testing.assert_allclose(made.torque[known], expected.torque, rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(made.angle[known], expected.angle, rtol=1e-9, atol=1e-9)
+            assert made.state[known].tolist() == expected.state.tolist()
+        found.append((less.moment.shape[1], less.energy.shape[1], less.zmp.shape[0]))
+        assert np.isnan(rows.torque[~known]).all()
+    assert checked == 119
+    assert set(found) == {(0, 0, 0)}
+
+
+def test_a_live_robot_tells_its_level_rates_efforts_and_orientations() -> None:
+    """The most severe of what is active; what the joints report in robot convention."""
+    evaluator = LiveEvaluator(settings(limits=replace(FREE, speed=(0.6, math.inf)), delays=QUICK))
+    evaluator.start(T0)
+    for m in run_of(0.5, joints=Joints(0, velocity=(0.5, 0.1), effort=(0.02, 7.0))):
+        give(evaluator, m)
+    assert evaluator.level == OK
+    assert evaluator.measured == ((-0.5, 0.1), (-20.0, 7.0))
+    counts = evaluator.orientations
+    assert list(counts.values()) == [0, 0, 50]  # the identity tells nothing by itself
+    for k in range(20):
+        give(evaluator, Joints(T0 + (500 + 20 * k) * MS, velocity=(0.7, 0.0)))
+        give(evaluator, Imu(T0 + (501 + 20 * k) * MS, tilted(0.1), acceleration=REST))
+    assert evaluator.level == WARN
+    assert evaluator.orientations == {**counts, 'used': 20}
+    evaluator.carry(T0 + 900 * MS, math.nan, (0.0, 0.0, 0.0), 'hand')
+    assert evaluator.level == ERROR
