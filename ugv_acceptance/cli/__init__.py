@@ -39,7 +39,7 @@ VERBS = (
 )
 
 # Read by NumPy when it is imported. Products here are of few columns: threads that share one wait
-# for each other longer than they work, a seventh of what judging a recording costs.
+# for each other longer than they work: up to a tenth of what judging a recording costs.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 app = typer.Typer(
