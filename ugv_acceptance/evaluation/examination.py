@@ -125,7 +125,7 @@ class ValueMeasure:
         self.samples += int(np.count_nonzero(~np.isnan(values)))
         if np.isnan(values[k]):
             return
-        if self.first is None and self._bad(values[k : k + 1])[0]:
+        if self.first is None and self._bad(values[[k]])[0]:
             at = int(self._bad(values).argmax())
             self.first = self._moment(rows, at, float(values[at]))
         if len(self.worst) == CANDIDATES and order[k] >= sign * self.worst[-1].value:
