@@ -13,13 +13,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from nodes.live_case import PATIENCE
+import rclpy
+from nodes.live_case import PATIENCE, Live
+from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.cli import running_plan
 from ugv_acceptance.config import load
+from ugv_acceptance.nodes.guard import Guard
 from ugv_acceptance.plan.plan import Plan, write_plan
+from ugv_acceptance.run.hands import OPERATOR, ROBOT
 from ugv_acceptance.run.verdicts import seen_in
 
 HOME = {'turret_joint': 0, 'shoulder_joint': 95, 'elbow_joint': 140, 'flipper_joint': 180}
@@ -190,6 +194,19 @@ def test_a_killed_run_loses_nothing_and_is_continued(tmp_path: Path) -> None:
     assert '1 of 2 steps are done already' in text
     assert (out / 'steps' / 'one.json').read_text() == first
     assert open_bag(out / 'steps' / 'two.interrupted-1').topics['/imu/data'].count > 50
+
+
+@pytest.mark.parametrize('mode', [ROBOT, OPERATOR])
+def test_a_run_does_not_begin_before_the_arm_controller_listens(live: Live, mode: str) -> None:
+    """A first trajectory that nobody takes is lost: the arm stays, and a step would fail."""
+    guard = live.add(Guard(load(), lambda _: None, mode=mode))
+    _, driver = live.running()
+    arm = '/arm_controller/joint_trajectory'
+    wanted = '' if mode == OPERATOR else f'a listener on {arm}'
+    live.until(lambda: guard.missing() == wanted, driver.send)
+    controller = live.add(rclpy.create_node('controller'))
+    controller.create_subscription(JointTrajectory, arm, lambda _: None, 10)
+    live.until(lambda: not guard.missing(), driver.send)
 
 
 def test_two_runs_never_share_a_ros_domain(monkeypatch: pytest.MonkeyPatch) -> None:

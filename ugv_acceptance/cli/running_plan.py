@@ -148,7 +148,9 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
             stack.enter_context(child('simulator', simulated))
         stack.enter_context(child('monitor', [*args, *named]))
         stop = stack.enter_context(ros(list(asked.ros_args)))
-        guard = Guard(config, lambda reason: say_stop(shown.console, reason), shown.moved)
+        guard = Guard(
+            config, lambda reason: say_stop(shown.console, reason), shown.moved, asked.mode
+        )
         stack.callback(guard.destroy_node)
         stack.enter_context(spinning(guard))
         hands = Hands(guard, asked.mode, asking(shown.console))

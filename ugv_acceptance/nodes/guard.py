@@ -31,6 +31,7 @@ from ugv_acceptance.nodes.hands import RosCommands
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.outputs import LATCHED
 from ugv_acceptance.nodes.running import PATIENCE
+from ugv_acceptance.run.hands import OPERATOR
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
 MONITOR = 'acceptance_monitor'
@@ -51,7 +52,8 @@ class _Recording:
 class Guard(Node):
     """The live world of a runner: a node that records and hears, and can freeze the robot.
 
-    `on_stop(reason)` is told what froze it, `progress(now)` the time while the runner waits.
+    `on_stop(reason)` is told what froze it, `progress(now)` the time while the runner waits. `mode`
+    says who moves the robot, so who has to listen before a run begins.
     """
 
     def __init__(
@@ -59,12 +61,14 @@ class Guard(Node):
         config: Config,
         on_stop: Callable[[str], None],
         progress: Callable[[float], None] = lambda _: None,
+        mode: str = OPERATOR,
         **node: Any,  # noqa: ANN401 - as Node does
     ) -> None:
         super().__init__('acceptance_runner', **node)
-        self.config, self._progress = config, progress
+        self.config, self._progress, self._mode = config, progress, mode
         self.positions = Positions(config)
-        self.commands: Commands = RosCommands(self, config)
+        self._sent = RosCommands(self, config)
+        self.commands: Commands = self._sent
         self.brake = Brake(self.commands.freeze, on_stop)
         self._recording = _Recording()
         self._looks = self._silent = 0
@@ -173,10 +177,13 @@ class Guard(Node):
     # The world of a runner
 
     def missing(self) -> str:
-        """Return who was not heard yet, empty when everything is there."""
+        """Return who was not heard, or does not listen, yet; empty when everything is there."""
         if not self.positions.now:
             return 'joint states of the robot'
-        return '' if self._heard else 'the monitor'
+        if not self._heard:
+            return 'the monitor'
+        unheard = self._sent.unheard(self._mode)
+        return f'a listener on {unheard}' if unheard else ''
 
     def dead(self) -> bool:
         """Return whether the monitor has fallen silent."""

@@ -12,10 +12,11 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.run.hands import OPERATOR, SIM
 
 SIMULATOR = 'packbot_simulator'
-# Seconds in which a simulator answers.
-PATIENCE = 5.0
+# Seconds in which a simulator answers, on a busy machine too.
+PATIENCE = 30.0
 
 
 class RosCommands:
@@ -31,6 +32,21 @@ class RosCommands:
         self._pull = publish(Vector3, f'{SIMULATOR}/pull', 10)
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
         self._reset: Any = node.create_client(Trigger, f'{SIMULATOR}/reset')
+
+    def unheard(self, mode: str) -> str:
+        """Return a topic that nobody listens to yet though a run of this mode needs it; or empty.
+
+        A command that is sent before its topic is matched is lost, and nobody is told.
+        """
+        needed = [self._payload]
+        if mode != OPERATOR:
+            needed.append(self._trajectory)
+        if mode == SIM:
+            needed += [self._velocity, self._ground, self._pull, self._load]
+        alone = [p.topic_name for p in needed if not p.get_subscription_count()]
+        if mode == SIM and not self._reset.service_is_ready():
+            alone.append(self._reset.srv_name)
+        return alone[0] if alone else ''
 
     def move(self, posture: Mapping[str, float], seconds: float) -> None:
         """Start a motion to `posture` (rad) that takes `seconds`."""

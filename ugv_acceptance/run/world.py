@@ -114,7 +114,7 @@ class World(Protocol):
     positions: Positions
 
     def missing(self) -> str:
-        """Return who was not heard yet, empty when everything is there."""
+        """Return who was not heard, or does not listen, yet; empty when everything is there."""
 
     def dead(self) -> bool:
         """Return whether the monitor has fallen silent."""
