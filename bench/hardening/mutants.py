@@ -29,6 +29,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('model/support.py', '', '4 -> 5'): 'tried on all or searched one by one, faces are the same',
     ('model/support.py', '_faces_under', 'h >= -_LEVEL -> h > -_LEVEL'): 'the same',
     ('model/support.py', '_faces_under', '-_LEVEL -> +_LEVEL'): 'the same',
+    ('model/support.py', '_faces_under', '2 -> 3'): 'any sample may lend its triple',
     ('model/support.py', '_faces_under', '1 -> 2'): 'any number below 0 says that there is none',
     ('model/stability.py', '_state', '2 -> 3'): 'WEIGHTLESS is 1 m/s2, to any power',
     ('model/expressions.py', '_node',

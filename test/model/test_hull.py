@@ -9,13 +9,16 @@ from scipy.optimize import linprog
 
 from ugv_acceptance.model.hull import (
     THIN,
+    WIDE,
     Cycle,
     Point,
+    carries,
     drawn_in,
     heights_above,
     hull,
     hulls,
     pairs,
+    sample,
     triple_under,
     triples,
     triples_under,
@@ -173,6 +176,38 @@ def test_a_triple_carries_what_lies_above_it(
     x, y = np.array(weights) @ corners
     points: list[Point] = [(*corners[k].tolist(), 0.1 * k) for k in order]
     assert under(points, (x, y, 3.0)) == ((0, 1, 2) if weights in INSIDE else None)
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+@pytest.mark.parametrize('weights', [*INSIDE, *OUTSIDE])
+def test_a_triple_tried_on_many_carries_the_same(
+    order: tuple[int, ...], weights: tuple[float, ...]
+) -> None:
+    """Its edges and corners too, for one sample as for many."""
+    corners = np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
+    x, y = (float(value) for value in np.array(weights) @ corners)
+    points: list[Point] = [(9.0, 9.0, 9.0), *((*corners[k].tolist(), 0.1) for k in order)]
+    assert bool(carries(points, (x, y), (1, 2, 3))) == (weights in INSIDE)
+    many = carries(columns([points] * 2), (np.array((x, x)), np.array((y, y))), (1, 2, 3))
+    assert many.tolist() == [weights in INSIDE] * 2
+
+
+@pytest.mark.parametrize(('area', 'found'), [(2.0, True), (1.0, False), (0.5, False)])
+def test_a_narrow_triple_is_not_tried_on_many(
+    area: float,
+    found: bool,  # noqa: FBT001
+) -> None:
+    """Of no more than a square centimetre; whichever way round."""
+    points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, area * WIDE**2, 0.0)]
+    for triple in ((0, 1, 2), (0, 2, 1)):
+        assert bool(carries(points, (0.0, 0.0), triple)) == found
+
+
+def test_a_sample_of_arrays_is_its_floats() -> None:
+    """Nested as they are; floats are every sample's."""
+    found = sample(((np.array((1.0, 2.0)), 3.0), (np.array((4.0, 5.0)),)), 1)
+    assert found == ((2.0, 3.0), (5.0,))
+    assert all(type(x) is float for part in found for x in part)
 
 
 @pytest.mark.parametrize(
