@@ -242,6 +242,8 @@ def try_some(
                 dead[mutant.file] += status != 0
                 if not status:
                     print(f'survived: {mutant.text}', file=sys.stderr, flush=True)
+                if tried.total() % 50 == 0:
+                    print(f'{tried.total()} of {len(waiting)} tried', file=sys.stderr, flush=True)
     return {file: (dead[file], tried[file]) for file in sorted(tried)}
 
 
