@@ -61,7 +61,8 @@ class ParquetSink:
         return path.with_name(path.name + '.part')
 
     def _write(self, rows: MarginRows) -> None:
-        if not len(rows.time):
+        # The first stretch, though it be empty, makes the file: no older one must stay.
+        if not len(rows.time) and self._writer is not None:
             return
         table = self._arrow.table(self._columns(rows))
         try:
@@ -69,7 +70,7 @@ class ParquetSink:
                 self._writer = self._parquet.ParquetWriter(self._part, table.schema)
             self._writer.write_table(table)
         except OSError as error:
-            raise unwritable(self._part, error.strerror) from None
+            raise unwritable(self._path or Path(), error.strerror) from None
 
     def _columns(self, rows: MarginRows) -> dict[str, Any]:
         names, states = self._settings.robot.joint_names, np.array(STATES)
