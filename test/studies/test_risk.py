@@ -96,6 +96,49 @@ def test_each_sample_is_judged_as_a_robot_of_its_own(flippers: object) -> None:
         assert either[k] == (saturated[k] or tipped[k])
 
 
+@pytest.mark.parametrize('contacts', ['raised', 'too few', 'none'])
+def test_a_robot_without_fixed_edges_is_judged_by_its_stance(contacts: str) -> None:
+    """Raised by its flippers, on two points, or on none: no margin at all counts as tipped."""
+    robot, q = tracked(), (0.0, 0.5, -0.5, -0.6)
+    if contacts != 'raised':
+        robot = replace(robot, contacts=robot.contacts[: 2 * (contacts == 'too few')])
+    spreads = {'slope': uniform(0.0, 0.9), 'heading': TURN}
+    study = Study(robot, spreads, q, (math.inf,) * 4)
+    assert risk_kernel(robot, ('slope', 'heading'), q, ()).edges == 0
+    rng = np.random.default_rng(4)
+    columns = {name: spread.draw(rng, 200) for name, spread in spreads.items()}
+    saturated, tipped, _ = failures_of(study, columns, 200)
+    s, h = columns['slope'], columns['heading']
+    gravity = -9.81 * np.stack([np.sin(s) * np.cos(h), np.sin(s) * np.sin(h), np.cos(s)], axis=-1)
+    least = np.array(stability(robot, q, gravity).angle).min(axis=0)
+    assert not saturated.any()
+    assert (tipped == (~(least > 0.0) & bool(robot.contacts))).all()
+    assert tipped.any() == bool(robot.contacts)
+
+
+def test_a_robot_that_carries_nothing_is_judged_too() -> None:
+    """Its torque is that of its links alone."""
+    robot = replace(arm_robot(PAPER), payload_link=None)
+    study = Study(robot, {'theta1.position': uniform(0.0, math.pi)}, (0.0, 0.0), (20.0, math.inf))
+    at = np.linspace(0.1, 3.0, 20)
+    saturated, _, _ = failures_of(study, {'theta1.position': at}, 20)
+    q = np.stack([at, np.zeros(20)], axis=-1)
+    torque = inverse_dynamics(robot, q, 0.0 * q, 0.0 * q, (0.0, 0.0, -9.81))
+    assert (saturated == (np.abs(torque[:, 0]) > 20.0)).all()
+    assert 0 < saturated.sum() < 20
+
+
+def test_counts_of_samples_not_looked_at_leave_the_bins() -> None:
+    """They add to the samples and failures alone."""
+    bins = np.ones((2, 3, risk_module.BINS), np.int64)
+    counts = risk_module.Counts(10, np.array((1, 2, 3)), 10, bins)
+    counts.add(risk_module.Counts(5, np.array((1, 1, 1))))
+    assert (counts.samples, counts.looked_at, counts.failures.tolist()) == (15, 10, [2, 3, 4])
+    assert (counts.bins == 1).all()
+    counts.add(risk_module.Counts(5, np.zeros(3, np.int64), 5, bins))
+    assert (counts.bins == 2).all()
+
+
 def test_a_seed_gives_the_same_counts_whatever_the_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """One worker or two processes: equal counts, equal sensitivities."""
     one = run(two_link(), 600_000, seed=5, workers=1)
