@@ -76,14 +76,20 @@ def test_a_result_has_the_published_layout(papers: Path, repository: Path, name:
 def test_a_list_with_an_unreadable_recording_has_the_published_layout(
     tmp_path: Path, repository: Path
 ) -> None:
-    """Several recordings give a list; one that cannot be read has its reason."""
-    broken, out = tmp_path / 'broken.mcap', tmp_path / 'r.json'
+    """Several recordings give a list; one that cannot be read has its reason, in JUnit too."""
+    broken, out, xml = tmp_path / 'broken.mcap', tmp_path / 'r.json', tmp_path / 'r.xml'
     broken.write_bytes(b'no recording')
-    assert run(EVALUATE, broken, SHIPPED / 'packbot_gap', '--json', out).exit_code == 2
+    given = (broken, SHIPPED / 'packbot_gap', '--json', out, '--junit', xml)
+    assert run(EVALUATE, *given).exit_code == 2
     schema = json.loads((repository / 'schema' / 'result.schema.json').read_text('utf-8'))
     results = json.loads(out.read_text('utf-8'))
     jsonschema.validate(results, schema)
     assert [result['verdict'] for result in results] == ['BAD INPUT', 'INCONCLUSIVE']
+    document: Any = JUnitXml.fromfile(str(xml))
+    suite = next(iter(document))
+    (case,) = suite
+    assert (suite.name, suite.errors, case.name) == (str(broken), 1, 'recording')
+    assert case.result[0].message == results[0]['reasons'][0]
 
 
 def test_the_schema_refuses_another_layout(papers: Path, repository: Path) -> None:
