@@ -7,10 +7,10 @@ stream are judged by the same columns: the live one whenever time passes (`judge
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts import Signal, feed
@@ -133,11 +133,10 @@ class Foresight:
         moved[1:] = q[1:] != q[:-1]
         if old:
             moved[:old] = False
-        start = np.maximum.accumulate(np.where(moved, rows, -1))
-        before = start < 0
-        at = np.maximum(start, 0)
+        before = ~np.logical_or.accumulate(moved)
+        at = np.maximum.accumulate(np.where(moved, rows, 0))
         looks, effort_then, tau_then = self._since
-        looks = np.where(before, looks + rows - old + 1, rows - start)
+        looks = np.where(before, looks + rows - old + 1, rows - at)
         effort_then = np.where(before, effort_then, np.take_along_axis(effort, at, 0))
         tau_then = np.where(before, tau_then, np.take_along_axis(tau, at, 0))
         self._since = np.array([looks[-1], effort_then[-1], tau_then[-1]])
@@ -164,7 +163,9 @@ def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 -
     if len(time) > OVER:
         step = (time[OVER:] - time[:-OVER])[:, None]
         now, rate = left[OVER:], (left[OVER:] - left[:-OVER]) / step * 1e9
-        shrinks = (rate <= -slowest) & _steady(-left, OVER)
+        shrinks = rate <= -slowest
+        if shrinks.any():
+            shrinks &= _steady(-left, OVER)
         seconds = time_to(0.0, -now, -now - np.where(shrinks, rate, np.inf), 1.0)
         found[OVER:] = np.where(step <= LONGEST, -seconds, np.nan)
     return found
@@ -173,12 +174,11 @@ def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 -
 def _weak(time: Times, tau: Floats, effort: Floats, limit: Floats) -> Floats:
     """Return 1 where effort is even, below its limit, while the posture comes to need more."""
     found, over = np.zeros(tau.shape), KEPT - 1
-    if len(time) > over:
-        seen = sliding_window_view(effort, KEPT, axis=0)
-        even = seen.max(axis=-1) - seen.min(axis=-1) <= EVEN * limit
+    grown = np.abs(tau[over:]) - np.abs(tau[:-over]) >= GROWN * limit
+    if grown.any():
+        even = _largest(effort, KEPT) + _largest(-effort, KEPT) <= EVEN * limit
         share = np.abs(effort[over:]) / limit
         even &= (share >= LOW) & (share <= HIGH)
-        grown = np.abs(tau[over:]) - np.abs(tau[:-over]) >= GROWN * limit
         soon = time[over:] - time[:-over] <= 2 * KEPT * SPACING
         found[over:] = even & grown & soon[:, None] & _steady(np.abs(tau), over)
     return found
@@ -196,9 +196,15 @@ def _steady(values: Floats, over: int) -> NDArray[np.bool_]:
 
     A load that is declared makes a step of all margins; that is no rate.
     """
-    largest = sliding_window_view(np.diff(values, axis=0), over, axis=0).max(axis=-1)
+    largest = _largest(values[1:] - values[:-1], over)
     steady: NDArray[np.bool_] = largest <= JUMP * (values[over:] - values[:-over])
     return steady
+
+
+def _largest(values: Floats, over: int) -> Floats:
+    """Return the largest of each column of values (n, m) in every `over` neighbours; NaN counts."""
+    last = len(values) - over + 1
+    return reduce(np.maximum, [values[k : last + k] for k in range(over)])
 
 
 def foresight_of(settings: Settings, signal: SignalOf) -> Foresight:
