@@ -61,6 +61,16 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'what stands in for a posture that is not whole is not read',
     ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', 'never < 0 -> never <= 0'):
         'whether the row before the first is usable is not read',
+    ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', '0 -> 1'): 'the same',
+    ('evaluation/recorded.py', '', '1 -> 2'): 'no row and no time is below 0',
+    ('evaluation/recorded.py', 'RecordedEvaluator._watch_pairs',
+     'self.watch.slide.on < np.inf -> self.watch.slide.on <= np.inf'):
+        'nothing slides where friction is not known, a call is saved',
+    ('evaluation/recorded.py', 'RecordedEvaluator._watch_inputs',
+     'signal.on < np.inf -> signal.on <= np.inf'):
+        'no rate reaches an infinite limit, a call is saved',
+    ('evaluation/live.py', 'LiveEvaluator._watch',
+     'watch.slide.on < math.inf -> watch.slide.on <= math.inf'): 'the same',
     ('evaluation/live.py', 'LiveEvaluator.joint_state', '-signal.on -> +signal.on'):
         'a small value changes nothing, calls are saved',
     ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',

@@ -126,6 +126,68 @@ def test_a_message_on_its_deadline_is_not_late(
     assert evaluator.gaps[1 - which] == []
 
 
+def test_a_torque_is_told_at_two_levels() -> None:
+    """An arm that reaches out from 0.5 s to 1 s: 4 kg at 0.5 m, 1 kg at 1.35 m, 1 kg at 1.4 m."""
+    run: list[Message] = [Imu(T0 - S)]
+    for m in run_of(2.0):
+        out = 500 <= (m.time - T0) // MS < 1000
+        position = (0.1, 0.3) if out else (-0.9, 0.0)
+        run.append(replace(m, position=position) if isinstance(m, Joints) else m)
+    chosen = settings(limits=replace(FREE, torque=(45.0, math.inf)), delays=QUICK)
+    found = told(run, T0 + 2 * S, 'TORQUE_LIMIT', chosen)
+    assert found == [('lift', 600, 1300, round(9.81 * 4.75, 9))] * 2
+
+
+@pytest.mark.parametrize(('room', 'count'), [(-0.01, 0), (0.001, 1), (0.01, 2)])
+def test_a_tilt_is_told_at_two_levels(room: float, count: int) -> None:
+    """Ground that leans by 20 degrees from 1 s on; the limits are 5 mrad apart."""
+    lean, chosen = tilted(math.radians(20.0)), settings()
+    gravity = -np.array(upright(lean))
+    left = float(margins(chosen.robot, (0.0, 0.0), gravity).angle.min())
+    run: list[Message] = [Imu(T0 - S)]
+    for m in run_of(2.0):
+        tilt = lean if (m.time - T0) // MS >= 1000 else tilted(0.001)
+        one = replace(m, orientation=tilt, acceleration=upright(tilt)) if isinstance(m, Imu) else m
+        run.append(one)
+    limits = replace(FREE, tip_warn=left + room, tip_error=left + room - 0.005)
+    chosen = settings(ImuInput(agreement=9.0), QUICK, limits)
+    found = told(run, T0 + 2 * S, 'TIP_OVER', chosen)
+    assert found == [('right', 1101, None, round(-left, 9))] * count
+
+
+@pytest.mark.parametrize('lost', [math.nan, math.inf])
+def test_an_acceleration_that_cannot_be_is_told_until_it_can(lost: float) -> None:
+    """Of the message itself: the low-pass forgets it."""
+    run = [
+        replace(m, acceleration=(lost, 0.0, 9.81))
+        if isinstance(m, Imu) and 500 <= (m.time - T0) // MS < 700
+        else m
+        for m in run_of(2.0)
+    ]
+    assert told(run, T0 + 2 * S, 'INPUT_INVALID') == [('imu', 501, 1001, 1.0)]
+
+
+def test_a_clock_that_is_off_is_told_until_it_is_right() -> None:
+    """By two seconds; its jump back is one more wrong stamp."""
+    run = [
+        replace(m, stamp=m.time - 2 * S)
+        if isinstance(m, Joints) and 500 <= (m.time - T0) // MS < 700
+        else m
+        for m in run_of(2.0)
+    ]
+    assert told(run, T0 + 2 * S, 'CLOCK') == [('joint_states', 500, 1020, 1.0)]
+
+
+def test_a_joint_that_was_never_named_is_missing_not_invalid() -> None:
+    """Nobody has said anything wrong."""
+    run = [
+        replace(m, names=('lift',), position=(0.1,)) if isinstance(m, Joints) else m
+        for m in run_of(1.0)
+    ]
+    assert told(run, T0 + S, 'INPUT_INVALID') == []
+    assert told(run, T0 + S, 'INPUT_INCOMPLETE') == [('joint_states', 0, None, 1.0)]
+
+
 def test_a_recording_that_ends_in_silence_has_a_gap_to_its_end() -> None:
     """From the deadline on; not where it ends at the deadline."""
     for rest, gaps in ((100 * MS, []), (100 * MS + 1, [(T0 + 1080 * MS, T0 + 1080 * MS + 1)])):
@@ -141,6 +203,7 @@ def test_who_has_not_said_when_it_began_misses_nothing_before_the_first_message(
         give(evaluator, m)
     rows = other.batch(batch_of(messages))
     assert rows.known[1:].all()
+    assert rows.moment.shape == (len(messages), 0)  # not unless asked for
     for log in (evaluator.watch.log, other.watch.log):
         assert not [a for a in log if a.rule.code == 'INPUT_STALE']
     assert other.gaps == ([], [])
@@ -207,7 +270,7 @@ def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
     messages: list[Message] = []
     for k in range(60):
         roll, pitch = rng.uniform(-0.3, 0.3, 2).tolist()
-        q = tuple(rng.uniform((-3, 0, -1, 2), (3, 1, 1, 3)).tolist())
+        q = tuple(rng.uniform((-3, 0, -1, -0.5), (3, 1, 1, 3)).tolist())
         lean = tilted(roll, pitch)
         messages += [
             Imu(T0 + 20 * k * MS, lean, acceleration=upright(lean)),
@@ -229,6 +292,8 @@ def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
         assert np.isnan(rows.torque[~known]).all()
     assert checked == 119
     assert set(found) == {(0, 0, 0)}
+    states = np.concatenate([rows.state[rows.known] for rows in full])
+    assert len(set(states.tolist())) > 1  # on its tracks, and raised by its flippers
 
 
 def test_a_live_robot_tells_its_level_rates_efforts_and_orientations() -> None:
@@ -238,6 +303,7 @@ def test_a_live_robot_tells_its_level_rates_efforts_and_orientations() -> None:
     for m in run_of(0.5, joints=Joints(0, velocity=(0.5, 0.1), effort=(0.02, 7.0))):
         give(evaluator, m)
     assert evaluator.level == OK
+    assert evaluator.evaluated == 74  # all but the first message
     assert evaluator.measured == ((-0.5, 0.1), (-20.0, 7.0))
     counts = evaluator.orientations
     assert list(counts.values()) == [0, 0, 50]  # the identity tells nothing by itself
