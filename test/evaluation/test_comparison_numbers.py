@@ -39,8 +39,7 @@ def test_friction_is_told_apart_by_speed() -> None:
     """1.5 N m against any motion and 0.7 N m s/rad more, of a bias that is neither."""
     found = comparison._friction(
         samples(80, lambda t, r: t + 1.5 * np.sign(r) + 0.7 * r + 2.0, moving=60)
-    )
-    assert found is not None
+    )['friction']
     assert found['coulomb']['value'] == pytest.approx(1.5)
     assert found['viscous']['value'] == pytest.approx(0.7)
 
@@ -49,10 +48,28 @@ def test_friction_is_told_apart_by_speed() -> None:
 def test_friction_needs_thirty_samples_both_ways(moving: int, told: bool) -> None:  # noqa: FBT001
     """Of one sign alone it is a bias."""
     both = samples(80, lambda t, r: t + np.sign(r), moving=moving)
-    assert (comparison._friction(both) is not None) == told
+    found = comparison._friction(both)
+    assert (found['friction'] is not None) == told
+    assert found['friction_unknown'] == ('' if told else 'too little motion')
     for sign in (1.0, -1.0):
-        one = replace(both, rate=sign * np.abs(both.rate))
-        assert comparison._friction(one) is None
+        one = comparison._friction(replace(both, rate=sign * np.abs(both.rate)))
+        assert one['friction'] is None
+        assert not told or one['friction_unknown'] == 'motion one way or at one speed alone'
+
+
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+@pytest.mark.parametrize(('coulomb', 'viscous'), [(1.5, 0.0), (0.0, 2.0)])
+def test_a_force_that_drives_the_motion_is_no_friction(
+    sign: float, coulomb: float, viscous: float
+) -> None:
+    """Friction takes power; what gives it, beyond its interval, has another cause: no number."""
+    rng = np.random.default_rng(3)
+    noise = rng.normal(0.0, 0.1, 80)
+    found = comparison._friction(
+        samples(80, lambda t, r: t + sign * (coulomb * np.sign(r) + viscous * r) + noise, moving=60)
+    )
+    assert (found['friction'] is None) == (sign < 0.0)
+    assert found['friction_unknown'] == ('' if sign > 0.0 else 'other forces outweigh it')
 
 
 @pytest.mark.parametrize(('count', 'told'), [(LEAST, True), (LEAST - 1, False)])

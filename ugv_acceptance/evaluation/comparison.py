@@ -32,6 +32,8 @@ SPREAD, LEVER = 0.5, 0.5
 ALPHA = 0.05
 # An effort from this share of the joint's limit on is clipped: it does not tell the load.
 CLIPPED = 0.99
+# Less friction (N m, N m s/rad; N, N s/m) than this is rounding.
+ROUNDING = 1e-6
 
 
 @dataclass(slots=True)
@@ -120,7 +122,7 @@ def _joint(s: _Samples) -> Json:
         'rest_samples': int(s.rest().sum()),
         'motion_samples': int(s.motion().sum()),
         **_rest(s),
-        'friction': _friction(s),
+        **_friction(s),
         'f_test': _f_test(s),
     }
 
@@ -160,16 +162,25 @@ def _interval(fit: Fit | None, k: int = 0) -> Json | None:
     return {'value': value, 'low': value - half, 'high': value + half}
 
 
-def _friction(s: _Samples) -> Json | None:
-    """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate."""
+def _friction(s: _Samples) -> Json:
+    """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate.
+
+    `friction` is None where the run does not tell it; `friction_unknown` says why, else is empty.
+    """
     motion = s.motion()
     rate = s.rate[motion]
     if len(rate) < LEAST:
-        return None
+        return {'friction': None, 'friction_unknown': 'too little motion'}
     # Of motion one way alone the sign and the bias are one column: there is no fit.
     columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
     fit = least_squares(columns, s.difference[motion])
-    return None if fit is None else {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
+    if fit is None:
+        return {'friction': None, 'friction_unknown': 'motion one way or at one speed alone'}
+    found = {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
+    # Friction takes power: what certainly gives some is inertia, or a load that moves the arm.
+    if any(part is not None and part['high'] < -ROUNDING for part in found.values()):
+        return {'friction': None, 'friction_unknown': 'other forces outweigh it'}
+    return {'friction': found, 'friction_unknown': ''}
 
 
 def _f_test(s: _Samples) -> Json | None:
