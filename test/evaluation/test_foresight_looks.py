@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from evaluation.margin_rows import rows
 from evaluation.streams import MS, T0, S, settings
 
 from ugv_acceptance.evaluation.alerts import WARN, Alert, Rule, Signal
@@ -240,6 +241,18 @@ def test_the_bounds_of_a_weak_motor_count(each: int) -> None:
 
 
 @EACH
+@pytest.mark.parametrize(
+    ('tilt', 'start'), [((0.0, 0.0, 1.0), 9.0), ((-1e-9, 1.0), 10.0), ((1.0, -1e-9, 1.0), 11.0)]
+)
+def test_a_motor_is_not_weak_within_ten_looks_of_lying(
+    tilt: tuple[float, ...], start: float, each: int
+) -> None:
+    """On the very edge the robot still stands."""
+    found = Looks(tilt=steps(*tilt), torque=growing(4.0), effort=lambda _: 20.0).told(13, each)
+    assert [a for a in found if a[0] == 'MOTOR_WEAK'] == [('MOTOR_WEAK', 'lift', start, None)]
+
+
+@EACH
 def test_a_motor_that_follows_again_is_weak_no_more(each: int) -> None:
     """The warning ends with the first look whose last ten are not even."""
     found = Looks(torque=growing(4.0), effort=lambda k: 20.0 if k < 14 else 25.0).told(16, each)
@@ -360,3 +373,24 @@ def test_the_signals_are_those_of_sides_and_joints() -> None:
     assert [(r.code, r.subject) for r in rules[4:]] == [
         (code, joint) for code in codes for joint in ('lift', 'slide')
     ]
+
+
+def test_of_a_recording_the_first_known_row_of_each_fifty_milliseconds_is_a_look() -> None:
+    """However it is cut into parts."""
+    foresight = quiet([])
+    parts = [
+        ((0.010, 0.020, 0.060, 0.070), (True, True, False, True)),
+        ((0.099, 0.120, 0.149, 0.150), (True, True, True, True)),
+        ((0.199,), (True,)),
+        ((0.200, 0.249, 0.330), (True, True, True)),
+        ((0.420,), (False,)),
+    ]
+    dues = []
+    for time, known in parts:
+        told = rows(time, known=known)
+        joints = told.pairs.joints
+        effort = replace(joints, effort=np.zeros_like(joints.q))
+        foresight.rows(replace(told, pairs=replace(told.pairs, joints=effort)), LIMIT)
+        dues.append(foresight.due // MS)
+    assert (foresight._time // MS).tolist() == [10, 70, 120, 150, 200, 330]
+    assert dues == [100, 200, 200, 350, 350]
