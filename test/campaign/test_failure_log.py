@@ -13,6 +13,7 @@ from ugv_acceptance.campaign.rows import Row
 from ugv_acceptance.campaign.run import Place, all_failures, carry_out
 from ugv_acceptance.campaign.sources import find_sources
 from ugv_acceptance.campaign.statement import Origin, Question, failure_times, statement
+from ugv_acceptance.report.campaign import campaign_page, closing
 
 LOG = """
 failures:
@@ -102,6 +103,17 @@ def test_a_campaign_that_ends_by_failure_counts_hours_up_to_it(rows: list[Row]) 
     assert found['hours']['counted'] == last < found['hours']['judged']
     assert found['mtbf_h']['ended_by'] == 'failure'
     json.dumps(found, allow_nan=False)
+
+
+def test_a_trend_is_drawn_as_its_power_law(rows: list[Row], tmp_path: Path) -> None:
+    """From three failures on a slope is fitted, and the page draws and names it."""
+    entries = ''.join(f'- {{run: good_a, what: stuck, at_s: {t}}}\n' for t in (0.5, 1.0, 2.0))
+    found = failures(rows, written(tmp_path, entries))
+    said = statement(rows, found, Question(), Origin('packbot', '', 'limits', None))
+    law, page = said['trend']['power_law'], campaign_page(said)
+    assert law['beta'] > 0.0
+    assert f'power law, slope {law["beta"]:.2f}' in page
+    assert closing(said) in page
 
 
 @pytest.mark.parametrize(
