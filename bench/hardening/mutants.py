@@ -84,6 +84,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'never quiet, and the same',
     ('evaluation/alerts.py', 'Signal.advance', 'self.due is None -> self.due is not None'):
         'the same',
+    ('evaluation/foresight.py', '_ahead', 'len(time) > OVER -> len(time) >= OVER'):
+        'of so few looks there is no rate: empty arrays',
     ('evaluation/foresight.py', 'Foresight._judge', '0.0 -> 1.0'):
         'where there is no limit a warning begins at infinity',
     ('evaluation/effort.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
