@@ -57,6 +57,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/value_outcome.py', '_measured',
      "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
         'a distance of 0 is false before that',
+    ('evaluation/joints.py', 'JointMerger.layout', '64 -> 65'): "a cache's size changes no value",
+    ('evaluation/joints.py', '', '1 -> 2'): 'no time is below 0',
+    ('evaluation/instructions.py', 'joint_words',
+     'amount * joint.axis[2] -> amount / joint.axis[2]'): 'only the sign counts',
     ('evaluation/recorded.py', 'RecordedEvaluator._table', '0.0 -> 1.0'):
         'what stands in for a posture that is not whole is not read',
     ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', 'never < 0 -> never <= 0'):

@@ -1,6 +1,7 @@
 """What to do in words: each form of sentence, by a posture whose geometry is plain."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,9 +63,14 @@ def test_up_is_against_gravity_wherever_the_robot_stands() -> None:
 
 @pytest.mark.parametrize(('amount', 'side'), [(0.5, 'left'), (-0.5, 'right')])
 def test_a_turret_is_turned(amount: float, side: str) -> None:
-    """To the left about z."""
+    """To the left about z; a turret whose axis points down counts the other way."""
     found = words(TRACKED, 'turret', amount, (0.0,) * 4)
     assert found == f'turn the turret by 29 deg to the {side}'
+    joints = tuple(
+        replace(j, axis=(0.0, 0.0, -1.0)) if j.name == 'turret' else j for j in TRACKED.joints
+    )
+    hung = words(replace(TRACKED, joints=joints), 'turret', -amount, (0.0,) * 4)
+    assert hung == found
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.joints import JointMerger
+from ugv_acceptance.evaluation.settings import JointInput
 from ugv_acceptance.evaluation.watch import Watch
 
 
@@ -70,6 +71,35 @@ def test_a_position_that_cannot_be_the_joints_is_unknown(position: float) -> Non
     merger = merged(Joints(T0, position=(position, 0.2)))
     assert math.isnan(merger.q[0])
     assert merger.q[1] == 0.2
+
+
+@pytest.mark.parametrize(
+    ('slide', 'known'), [(0.5, True), (0.5001, False), (-0.3, True), (-0.3001, False)]
+)
+def test_a_position_may_be_a_tenth_beyond_its_limits(slide: float, known: bool) -> None:  # noqa: FBT001
+    """The slide goes from -0.2 m to 0.4 m; alone and in columns."""
+    message = Joints(T0, position=(0.1, slide))
+    assert math.isnan(merged(message).q[1]) != known
+    rows = JointMerger(settings()).merge_columns(batch_of([message]).joints)
+    assert np.isnan(rows.q[0, 1]) != known
+    assert rows.unusable[0] != known
+
+
+@pytest.mark.parametrize(
+    ('number', 'known'), [(1e5, True), (-1e5, True), (1.0001e5, False), (-1.0001e5, False)]
+)
+def test_no_angle_and_no_rate_is_beyond_a_hundred_thousand(number: float, known: bool) -> None:  # noqa: FBT001
+    """However far an endless joint has turned; alone and in columns."""
+    told = settings()
+    lift = replace(told.robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf)
+    endless = replace(told.robot, joints=(lift, told.robot.joints[1]))
+    told = replace(told, robot=endless, joints=(JointInput('lift'), told.joints[1]))
+    message = Joints(T0, position=(number, 0.1), velocity=(number, 0.0))
+    one = JointMerger(told)
+    one.merge(T0, message.names, message.position, message.velocity, ())
+    rows = JointMerger(told).merge_columns(batch_of([message]).joints)
+    found = (one.q[0], one.qd[0], float(rows.q[0, 0]), float(rows.qd[0, 0]))
+    assert [x == number for x in found] == [known] * 4
 
 
 def test_a_name_that_stands_twice_is_left_out() -> None:
