@@ -172,7 +172,8 @@ class Guard(Node):
                     self._recording.bag.flush()
         if self.brake.armed and self.dead() and not self.brake.stopped:
             silent = self._silent * LOOK
-            self.brake.stop(f'the monitor has said nothing for {silent:.1f} s')
+            # It may be heard again a moment later: what it did not watch is lost all the same.
+            self.brake.stop(f'the monitor has said nothing for {silent:.1f} s', blind=True)
 
     # The world of a runner
 

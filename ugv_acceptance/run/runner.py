@@ -216,7 +216,7 @@ class Runner:
     def _done(self, begin: int, hold: int, wrong: str) -> Done:
         stopped = self.brake.stopped
         # Missing data neither passes nor fails.
-        missing = self.world.dead() or stopped.startswith('STALE')
+        missing = self.world.dead() or self.brake.blind
         fault = REFUSED if self.hands.refused else stopped if missing else ''
         return Done(begin, hold, self.world.stamp(), wrong, '' if fault else stopped, fault)
 

@@ -18,7 +18,8 @@ class Brake:
     """Freezes motion at an alert that is not wanted now, and says why.
 
     `unwanted` are alert patterns, `stopped` is the first reason since the brake was armed; empty:
-    nothing stopped it. `freeze()` holds the robot still, `on_stop(reason)` tells people.
+    nothing stopped it; `blind` says that something was missing then, so that nothing was shown.
+    `freeze()` holds the robot still, `on_stop(reason)` tells people.
     """
 
     freeze: Callable[[], None]
@@ -26,21 +27,22 @@ class Brake:
     unwanted: tuple[str, ...] = ()
     armed: bool = False
     stopped: str = ''
+    blind: bool = False
     active: set[Active] = field(default_factory=set)
 
     def arm(self, unwanted: tuple[str, ...]) -> None:
         """Watch from now on; what freezes is named by alert patterns."""
-        self.unwanted, self.stopped, self.armed = unwanted, '', True
+        self.unwanted, self.stopped, self.blind, self.armed = unwanted, '', False, True
 
     def disarm(self) -> None:
         """Let everything pass, as while a person changes the set-up."""
         self.armed = False
 
-    def stop(self, reason: str) -> None:
-        """Freeze all motion now."""
+    def stop(self, reason: str, *, blind: bool = False) -> None:
+        """Freeze all motion now; `blind`: because something is missing, as at a STALE alert."""
         self.freeze()
         if not self.stopped:
-            self.stopped = reason
+            self.stopped, self.blind = reason, blind or reason.startswith('STALE')
             self.on_stop(reason)
 
     def raised(self, alert: Active, text: str) -> None:
