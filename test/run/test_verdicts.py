@@ -71,11 +71,29 @@ def test_a_step_passes_if_its_alerts_are_those_it_expects(
         (Done(0, 5, 8, fault='the monitor has said nothing'), 1.0, 'INCONCLUSIVE'),
         (Done(0, 5, 8, wrong='the posture was not reached'), 1.0, 'FAIL'),
         (DONE, 0.9, 'INCONCLUSIVE'),
+        (Done(0, 5, 8, wrong='the posture was not held'), 0.9, 'FAIL'),
     ],
 )
 def test_what_was_stopped_or_not_seen_never_passes(done: Done, share: float, expected: str) -> None:
     """A frozen motion fails; missing data is inconclusive."""
     assert decide(step(), [], WINDOW, done, share)[0] == expected
+
+
+@pytest.mark.parametrize(
+    ('alerts', 'share', 'expected'),
+    [
+        ([], 1.0, 'FAIL'),
+        ([], 0.9, 'INCONCLUSIVE'),
+        ([alert('STALE INPUT_STALE imu', 6.0, 6.5)], 1.0, 'INCONCLUSIVE'),
+        ([alert(ERROR, 6.0, None)], 0.9, 'FAIL'),
+    ],
+)
+def test_an_alert_that_does_not_come_while_data_are_missing_shows_nothing(
+    alerts: list[dict[str, Any]], share: float, expected: str
+) -> None:
+    """It may have been due then; what was active all the same still fails."""
+    asked = step(('WARN TIP_OVER left',))
+    assert decide(asked, alerts, WINDOW, DONE, share)[0] == expected
 
 
 def test_a_run_is_as_good_as_its_worst_step() -> None:

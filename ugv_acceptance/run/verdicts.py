@@ -134,13 +134,14 @@ def decide(
         return INCONCLUSIVE, [done.fault]
     if done.stopped:
         return FAIL, [f'stopped: {done.stopped}']
-    wrong = [*missing, *unwanted, *([done.wrong] if done.wrong else [])]
-    if wrong:
-        return FAIL, [*wrong, *unknown]
-    if unknown:
-        return INCONCLUSIVE, unknown
     if share < LEAST and not any(p.startswith('STALE') for p in step.alerts.must):
-        return INCONCLUSIVE, [f'only {share:.0%} of the hold could be evaluated']
+        unknown.append(f'only {share:.0%} of the hold could be evaluated')
+    # What was not raised may have been due while nothing was seen.
+    wrong = [*unwanted, *([done.wrong] if done.wrong else [])]
+    if wrong or (missing and not unknown):
+        return FAIL, [*missing, *wrong, *unknown]
+    if unknown:
+        return INCONCLUSIVE, [*missing, *unknown]
     return PASS, ['every alert as expected']
 
 
