@@ -57,6 +57,11 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/value_outcome.py', '_measured',
      "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
         'a distance of 0 is false before that',
+    ('evaluation/freshness.py', 'Freshness', '0 -> 1'): 'the first message sets both',
+    ('evaluation/imu.py', 'ImuTracker', '0.0 -> 1.0'): 'the first message sets it',
+    ('evaluation/imu.py', 'ImuTracker', 'False -> True'):
+        'what is quiet is judged quiet, a call is saved',
+    ('evaluation/imu.py', 'ImuTracker.columns', 'none != 0 -> none == 0'): 'there are no rows',
     ('evaluation/joints.py', 'JointMerger.layout', '64 -> 65'): "a cache's size changes no value",
     ('evaluation/joints.py', '', '1 -> 2'): 'no time is below 0',
     ('evaluation/instructions.py', 'joint_words',

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from evaluation.streams import LEVEL, MS, STILL, T0, Imu, imu_columns, settings, tilted
+from evaluation.streams import LEVEL, MS, STILL, T0, Imu, imu_columns, settings, tilted, upright
 
 from ugv_acceptance.evaluation.imu import ImuTracker
 from ugv_acceptance.evaluation.settings import ImuInput
@@ -141,3 +141,70 @@ def test_who_asks_for_the_accelerometer_hears_nothing_of_orientations_that_say_n
     assert unusable == contradicts
     if not contradicts:
         assert gravity == pytest.approx((0.0, 0.0, -10.0))
+
+
+LEAN = tilted(0.2)
+LEANING = upright(LEAN, 10.0)
+
+
+@pytest.mark.parametrize(
+    ('orientation', 'covariance_0', 'counts', 'found'),
+    [
+        ((0.0,) * 4, 0.0, [0, 0, 100], {'IMU_ORIENTATION'}),
+        (LEVEL, 0.0, [0, 0, 100], {'IMU_ORIENTATION'}),
+        ((0.0,) * 4, -1.0, [0, 100, 0], set()), (LEVEL, -1.0, [0, 100, 0], set()),
+        (LEAN, 0.0, [100, 0, 0], set()), (tilted(0.9), -1.0, [0, 100, 0], set()),
+    ],
+)  # fmt: skip
+def test_a_warning_of_the_orientation_leaves_gravity_to_the_accelerometer(
+    orientation: tuple[float, ...], covariance_0: float, counts: list[int], found: set[str]
+) -> None:
+    """What says of itself that it has none is no fault, whatever stands there."""
+    message = Imu(T0, orientation, STILL, LEANING, covariance_0)
+    gravity, unusable, taken, codes = tracked(message, 100)
+    assert gravity == pytest.approx([-x for x in LEANING])
+    assert (unusable, taken, codes) == (False, counts, found)
+
+
+@pytest.mark.parametrize(('frame', 'found'), [('imu_link', set()), ('arm', {'IMU_FRAME'})])
+def test_a_foreign_frame_takes_gravity_away_at_once(frame: str, found: set[str]) -> None:
+    """With its first message."""
+    gravity, unusable, _, codes = tracked(
+        Imu(T0, LEAN, STILL, LEANING, frame=frame), frame='imu_link'
+    )
+    assert codes == found
+    assert unusable == math.isnan(gravity[0]) == bool(found)
+
+
+def test_gravity_is_gone_from_the_alert_on_until_the_alert_ends() -> None:
+    """Half a second after it began to disagree; a second after it agreed again, to the message."""
+    told = settings(ImuInput(agreement_delay=0.5))
+    right, wrong = Imu(T0, LEAN, STILL, upright(LEAN)), Imu(T0, tilted(0.9), STILL, upright(LEAN))
+    run = [replace(wrong if 30 <= k < 100 else right, time=T0 + 10 * k * MS) for k in range(300)]
+    known = [k for k in range(300) if not 80 <= k < 200]
+    one = ImuTracker(told, Watch(told).attitude)
+    steps = [one.step(m.time, m.time, m.orientation, 0.0, m.omega, m.acceleration)[0] for m in run]
+    assert [k for k, g in enumerate(steps) if math.isfinite(g[0])] == known
+    for cut in (0, 50, 80, 150, 199, 200, 201):
+        many = ImuTracker(told, Watch(told).attitude)
+        parts = [many.columns([imu_columns(part)]) for part in (run[:cut], run[cut:]) if part]
+        gravity = np.concatenate([rows.gravity for rows in parts])
+        assert np.flatnonzero(np.isfinite(gravity[:, 0])).tolist() == known
+
+
+def test_messages_of_several_frames_come_in_order_of_receipt() -> None:
+    """As one stream; no message gives no row."""
+    told = settings()
+    first, second = (
+        [Imu(T0 + k * MS, tilted(0.01 * k), (9.0, 0.0, 0.0), frame=frame) for k in times]
+        for frame, times in (('a', (1, 4)), ('b', (2, 3)))
+    )
+    rows = ImuTracker(told, Watch(told).attitude).columns(
+        [imu_columns(first), imu_columns([]), imu_columns(second)]
+    )
+    assert rows.time.tolist() == [T0 + k * MS for k in (1, 2, 3, 4)]
+    np.testing.assert_allclose(
+        rows.gravity[:, 1], [-9.81 * math.sin(0.01 * k) for k in (1, 2, 3, 4)]
+    )
+    empty = ImuTracker(told, Watch(told).attitude).columns([])
+    assert (empty.time.shape, empty.gravity.shape, empty.unusable.shape) == ((0,), (0, 3), (0,))
