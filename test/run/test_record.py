@@ -104,7 +104,7 @@ TOLD: dict[str, str | None] = {
     'wrong-mounting': None,
     'identity-orientation': None,
     'clock-jump': 'CLOCK',
-    'second-publisher': None,  # live, its publisher is told: SECOND_PUBLISHER
+    'second-publisher': 'POSITION_LEAP',  # live, its publisher is told too: SECOND_PUBLISHER
     'heavy-payload': None,
     'weak-motor': None,
 }
