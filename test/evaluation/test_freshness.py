@@ -117,3 +117,10 @@ def test_columns_of_a_frozen_clock_are_wrong_after_half_a_second() -> None:
     times = T0 + np.arange(20) * 50 * MS
     wrong = Freshness(Delays()).clocks(times, np.full(20, T0))
     assert np.flatnonzero(wrong)[0] * 50 == 550
+
+
+def test_no_message_has_no_clock() -> None:
+    """A batch without one changes nothing."""
+    fresh = Freshness(Delays())
+    assert fresh.clocks(np.empty(0, np.int64), np.empty(0, np.int64)).tolist() == []
+    assert fresh.deadline is None
