@@ -83,6 +83,7 @@ def test_a_publisher_that_stops_makes_the_verdict_stale(live: Live, end: signal.
     try:
         live.until(lambda: session_of(monitor).counts['imu'].taken > 100)
         live.until(lambda: session_of(monitor).evaluator.margins is not None)
+        live.until(lambda: not session_of(monitor).follower.open)  # what the start was STALE for
         process.send_signal(end)
         live.until(lambda: session_of(monitor).level == STALE)
         live.until(lambda: len(session_of(monitor).follower.open) >= 2)
