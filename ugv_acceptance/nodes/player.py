@@ -24,8 +24,8 @@ from ugv_acceptance.bag.reader import Bag, open_bag
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import BAD_INPUT, Stop, ros
 
-# Seconds to wait for subscribers at the start: discovery takes one or two.
-DISCOVERY = 3.0
+# Seconds to wait for subscribers at the start: discovery takes one to three.
+DISCOVERY = 5.0
 # Seconds until a subscriber that we know of knows of us too, and until it has what was on its way.
 SETTLING = 0.7
 _NS = 1_000_000_000
