@@ -31,7 +31,8 @@ CONSOLE = ['starlette', 'textual', 'uvicorn', 'websockets']
 FOXGLOVE = ['foxglove-sdk']
 PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
 TABLE = ['pyarrow']
-CLUSTER = ['dask', 'distributed', 'fsspec', 's3fs']
+# Older ones of s3fs know no `endpoint_url`; pip falls back to them beside a newer botocore.
+CLUSTER = ['dask', 'distributed', 'fsspec', 's3fs>=2023.1']
 TEST = [
     'catkin-pkg',
     'flask',  # with flask-cors: the S3 server of moto
