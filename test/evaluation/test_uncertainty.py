@@ -169,3 +169,16 @@ def test_without_a_polygon_torques_still_have_bounds() -> None:
     effects = effects_of(told, [SOURCES[3]], POSTURES[0], GRAVITY, PAYLOAD)
     assert np.isnan(effects.angle).all()
     assert effects.torque[0][1] != 0.0
+
+
+@each_posture
+@each_source
+def test_a_joints_offset_moves_its_own_position_and_nothing_else_does(
+    source: Source, q: tuple[float, ...]
+) -> None:
+    """By as much as the offset, in every posture."""
+    expected = [source.value if source.subject == name else 0.0 for name in ROBOT.joint_names]
+    if source.what != 'offset':
+        expected = [0.0] * len(q)
+    found = effects_of(SETTINGS, [source], q, GRAVITY, PAYLOAD).position
+    assert found[0] == pytest.approx(expected)
