@@ -109,7 +109,10 @@ class Page:
         end = time.monotonic() + seconds
         while not (value := self.run(code)):
             if time.monotonic() > end:
-                raise AssertionError(f'not within {seconds} s: {code}; {self.complaints}')
+                shown = self.run('document.getElementById("alerts")?.innerText')
+                raise AssertionError(
+                    f'not within {seconds} s: {code}; {self.complaints}; alerts shown: {shown!r}'
+                )
             time.sleep(0.02)
         return value
 
