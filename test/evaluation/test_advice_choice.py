@@ -164,7 +164,7 @@ def test_a_load_that_is_light_is_not_spoken_of() -> None:
 )
 def test_enough_is_beyond_the_deadband_of_the_warning(of: str, worst: int, enough: float) -> None:
     """Else the alert would stay."""
-    found = advice._case_of(TOLD, (0.0, 0.0), DOWN, Payload(), of)
+    (found,) = advice._cases(TOLD, [(0.0, 0.0)], [DOWN], Payload(), [of])
     assert found is not None
     assert (found.worst, found.subject, found.tips) == (worst, of, worst < 4)
     assert found.enough == pytest.approx(enough + SLACK, abs=1e-9)

@@ -9,9 +9,10 @@ comes first, then the others by what they gain; turning, which shakes the robot,
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ugv_acceptance.evaluation.candidates import Path, joint_paths, turn_paths
 from ugv_acceptance.evaluation.instructions import joint_words, load_words, turn_words
@@ -109,11 +110,26 @@ def advise(
     `q` (j,), `gravity` (3,) m/s2 in `base_link`. The margin is `of` a side or joint, else the one
     to speak of first. Nothing too where no margin is known.
     """
-    case = _case_of(settings, q, gravity, payload, of)
-    if case is None or not case.scores[case.worst] < 1.0:
-        return ()
-    found = [*_moves(case), *_load(case)]
-    return tuple(sorted(found, key=_order))
+    return advise_each(settings, [q], [gravity], payload, [of])[0]
+
+
+def advise_each(
+    settings: Settings,
+    q: ArrayLike,
+    gravity: ArrayLike,
+    payload: Payload,
+    of: Sequence[str | None],
+) -> list[tuple[Advice, ...]]:
+    """Return `advise` of many situations: `q` (n, j), `gravity` (n, 3), `of` (n,).
+
+    All go through the model together: fifty then take little longer than one.
+    """
+    cases = _cases(settings, q, gravity, payload, of)
+    warned = [case for case in cases if case is not None and case.scores[case.worst] < 1.0]
+    found: dict[int, list[Advice]] = {id(case): [] for case in warned}
+    for case, advice in chain(_moves(warned), _loads(warned)):
+        found[id(case)].append(advice)
+    return [tuple(sorted(found.get(id(case), ()), key=_order)) for case in cases]
 
 
 def _order(advice: Advice) -> tuple[bool, bool, float]:
@@ -122,30 +138,40 @@ def _order(advice: Advice) -> tuple[bool, bool, float]:
     return not advice.enough, advice.kind == 'turn', by
 
 
-def _case_of(
+def _cases(
     settings: Settings,
-    q: Sequence[float],
-    gravity: Sequence[float],
+    q: ArrayLike,
+    gravity: ArrayLike,
     payload: Payload,
-    of: str | None,
-) -> _Case | None:
+    of: Sequence[str | None],
+) -> list[_Case | None]:
+    """Return the situations, None where no margin is known."""
     at, down = np.array(q, dtype=np.float64), np.array(gravity, dtype=np.float64)
-    if not (np.isfinite(at).all() and np.isfinite(down).all()):
-        return None
     now = margins(settings.robot, at, down, payload)
-    state = int(now.state)
-    if state >= NO_CONTACT:
-        return None
-    scores = scores_of(settings, now.torque, now.angle)
-    worst = _most_severe(scores) if of is None else margin_names(settings).index(of)
+    with np.errstate(invalid='ignore'):
+        scores = scores_of(settings, now.torque, now.angle)
+    known = np.isfinite(at).all(axis=1) & np.isfinite(down).all(axis=1) & (now.state < NO_CONTACT)
+    worst = [
+        _most_severe(mine) if name is None else margin_names(settings).index(name)
+        for mine, name in zip(scores, of, strict=True)
+    ]
+    rows = zip(at, down, scores, now.torque, now.state.tolist(), worst, strict=True)
+    return [
+        _Case(settings, x, g, payload, score, torque, state, k, _enough(settings, k))
+        if told
+        else None
+        for told, (x, g, score, torque, state, k) in zip(known, rows, strict=True)
+    ]
+
+
+def _enough(settings: Settings, worst: int) -> float:
+    """Return the score from which a margin's warning ends: beyond its deadband."""
     limits, (tip, span) = settings.limits, _spans(settings)
     if worst < len(SIDES):
         reserve = limits.tip_deadband / tip
     else:
         reserve = limits.torque_deadband / limits.torque[worst - len(SIDES)] / span
-    return _Case(
-        settings, at, down, payload, scores, now.torque, state, worst, 1.0 + reserve + SLACK
-    )
+    return 1.0 + reserve + SLACK
 
 
 def _most_severe(scores: Floats) -> int:
@@ -157,23 +183,30 @@ def _most_severe(scores: Floats) -> int:
     return min(range(len(order)), key=lambda k: order[k])
 
 
-def _ends(case: _Case) -> Iterator[tuple[Path, int, float, bool]]:
-    """Yield every path that gains something, and where to stop as `_end` says."""
-    paths = joint_paths(case.settings, case.q, case.gravity, case.torque)
+def _paths(case: _Case) -> Iterator[tuple[_Case, Path]]:
+    for path in joint_paths(case.settings, case.q, case.gravity, case.torque):
+        yield case, path
     # Turning helps against tipping on a slope, but shakes a robot that is past its ERROR limit.
     if case.tips and case.scores[case.worst] > 0.0:
-        paths += turn_paths(case.settings.robot, case.q, case.gravity, case.payload)
+        for path in turn_paths(case.settings.robot, case.q, case.gravity, case.payload):
+            yield case, path
+
+
+def _ends(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Path, int, float, bool]]:
+    """Yield every path that gains something, and where to stop as `_end` says."""
+    paths = [found for case in cases for found in _paths(case)]
     if not paths:
         return
-    q, down = (np.vstack([getattr(p, name) for p in paths]) for name in ('q', 'gravity'))
-    found = margins(case.settings.robot, q, down, case.payload)
-    scores = scores_of(case.settings, found.torque, found.angle)
-    cuts = np.cumsum([len(path.q) for path in paths])[:-1]
+    settings, payload = cases[0].settings, cases[0].payload
+    q, down = (np.vstack([getattr(p, name) for _, p in paths]) for name in ('q', 'gravity'))
+    found = margins(settings.robot, q, down, payload)
+    scores = scores_of(settings, found.torque, found.angle)
+    cuts = np.cumsum([len(path.q) for _, path in paths])[:-1]
     parts = np.split(scores, cuts), np.split(found.state, cuts)
-    for path, mine, states in zip(paths, *parts, strict=True):
+    for (case, path), mine, states in zip(paths, *parts, strict=True):
         end = _end(case, mine, path.forbidden | (states != case.state))
         if end is not None:
-            yield path, *end
+            yield case, path, *end
 
 
 def _end(
@@ -205,39 +238,43 @@ def _gain(case: _Case, score: float) -> float:
     return more * span * case.settings.limits.torque[case.worst - len(SIDES)]
 
 
-def _moves(case: _Case) -> Iterator[Advice]:
-    for path, k, score, enough in _ends(case):
+def _moves(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
+    for case, path, k, score, enough in _ends(cases):
         gain, seconds, amount = _gain(case, score), float(path.seconds[k]), float(path.amount[k])
         if path.subject == 'robot':
             kind, words = 'turn', turn_words(amount, path.gravity[k])
         else:
             kind, words = 'joint', joint_words(case.settings.robot, path, k, case.payload)
         sentence = f'{words}: {_gain_words(case, gain)}, in {seconds:.1f} s'
-        yield Advice(kind, path.subject, amount, seconds, case.subject, gain, enough, sentence)
+        yield (
+            case,
+            Advice(kind, path.subject, amount, seconds, case.subject, gain, enough, sentence),
+        )
 
 
-def _load(case: _Case) -> Iterator[Advice]:
+def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
     """Setting the load down: how much of it is too much, and what is gained without it."""
-    mass = case.payload.mass
-    if mass <= 0.0:
+    if not cases or cases[0].payload.mass <= 0.0:
         return
-    empty = Payload(0.0, case.payload.cog)
-    found = margins(case.settings.robot, case.q, case.gravity, empty)
-    score = float(scores_of(case.settings, found.torque, found.angle)[case.worst])
-    if not score > case.scores[case.worst] + LEAST_GAIN:
-        return
-    gain, enough = _gain(case, score), score >= 1.0
-    holds = None if case.tips else _holds(case)
-    words = f'{load_words(mass, holds)}: {_gain_words(case, gain)}'
-    # Nobody sets a load down as fast as a joint moves: it comes after what moves in time.
-    yield Advice('payload', 'payload', -mass, 10.0, case.subject, gain, enough, words)
-
-
-def _holds(case: _Case) -> float:
-    """Return the mass (kg) that no joint's warning limit forbids in this posture."""
-    limits = case.settings.limits
-    torque = limits.torque_warn * np.array(limits.torque)
-    return max(float(payload_capacity(case.settings.robot, case.q, case.gravity, torque)), 0.0)
+    settings, payload = cases[0].settings, cases[0].payload
+    q, down = (np.array([getattr(case, name) for case in cases]) for name in ('q', 'gravity'))
+    found = margins(settings.robot, q, down, Payload(0.0, payload.cog))
+    scores = scores_of(settings, found.torque, found.angle)
+    # The mass that no joint's warning limit forbids in this posture.
+    torque = settings.limits.torque_warn * np.array(settings.limits.torque)
+    holds = np.maximum(payload_capacity(settings.robot, q, down, torque), 0.0).tolist()
+    for case, mine, held in zip(cases, scores, holds, strict=True):
+        score = float(mine[case.worst])
+        if not score > case.scores[case.worst] + LEAST_GAIN:
+            continue
+        gain, enough = _gain(case, score), score >= 1.0
+        words = load_words(payload.mass, None if case.tips else held)
+        sentence = f'{words}: {_gain_words(case, gain)}'
+        # Nobody sets a load down as fast as a joint moves: it comes after what moves in time.
+        told = Advice(
+            'payload', 'payload', -payload.mass, 10.0, case.subject, gain, enough, sentence
+        )
+        yield case, told
 
 
 def _gain_words(case: _Case, gain: float) -> str:

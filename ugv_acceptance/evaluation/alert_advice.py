@@ -6,13 +6,13 @@ A case is kept an alert, not a message; what costs milliseconds is done at the e
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ugv_acceptance.evaluation.advice import COMPUTED, advise
+from ugv_acceptance.evaluation.advice import COMPUTED, advise_each
 from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.rows import Floats, MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
-# Advice is computed for so many alerts of a run, the most severe first: a sixth of a second.
+# Advice is computed for so many alerts of a run, the most severe first.
 MOST = 50
 
 
@@ -59,18 +59,19 @@ class AlertAdvice:
         if self._last is not None:
             self._cases += [(alert, self._last) for alert in self._fresh()]
         order = sorted(self._cases, key=lambda case: (-case[0].rule.level, case[0].start))
-        found = {}
+        alike: dict[Payload, list[tuple[Alert, _Moment]]] = {}
         for alert, moment in order[:MOST]:
-            payload = self.payload_at(moment.heard)
-            told = advise(
-                self.settings,
-                moment.q.tolist(),
-                moment.gravity.tolist(),
-                payload,
-                alert.rule.subject,
-            )
-            if told:
-                found[id(alert)] = told[0].sentence
+            alike.setdefault(self.payload_at(moment.heard), []).append((alert, moment))
+        found: dict[int, str] = {}
+        for payload, cases in alike.items():
+            q, gravity = ([getattr(m, name) for _, m in cases] for name in ('q', 'gravity'))
+            of = [alert.rule.subject for alert, _ in cases]
+            told = advise_each(self.settings, q, gravity, payload, of)
+            found |= {
+                id(alert): best[0].sentence
+                for (alert, _), best in zip(cases, told, strict=True)
+                if best
+            }
         return found
 
 
