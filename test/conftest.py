@@ -38,9 +38,13 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 _LOGS = tempfile.TemporaryDirectory(prefix='ugv_acceptance_log_')
 os.environ['ROS_LOG_DIR'] = _LOGS.name
 
-# No deadline: other work on the machine is no fault of the code. CI always takes the same cases.
-hypothesis.settings.register_profile('here', deadline=None)
-hypothesis.settings.register_profile('ci', deadline=None, derandomize=True, print_blob=True)
+# No deadline, and cases may be slow to make: other work on the machine is no fault of the code. CI
+# always takes the same cases.
+ANY_SPEED = hypothesis.settings(
+    deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.register_profile('here', ANY_SPEED)
+hypothesis.settings.register_profile('ci', ANY_SPEED, derandomize=True, print_blob=True)
 hypothesis.settings.load_profile('ci' if os.environ.get('CI') else 'here')
 
 

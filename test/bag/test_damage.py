@@ -27,7 +27,7 @@ from ugv_acceptance.bag.raw import messages as messages_of
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     cut=st.integers(0, 12000), shape=st.sampled_from(['zstd', 'lz4', 'uncompressed', 'no chunks'])
 )
@@ -94,7 +94,7 @@ def test_unprotected_damage_is_seen_where_it_breaks_records(tmp_path: Path) -> N
     assert any('messages lost' in text for text in facts.findings)
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     place=st.integers(8, 11000),
     content=st.binary(min_size=1, max_size=12),
@@ -206,7 +206,7 @@ def test_topics_not_wanted_are_not_unpacked(tmp_path: Path) -> None:
     assert reading.facts.findings == ()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(
     place=st.integers(0, 30000),
     content=st.binary(min_size=1, max_size=12),

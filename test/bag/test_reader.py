@@ -69,7 +69,10 @@ def test_parts_are_one_recording(tmp_path: Path) -> None:
     assert bag.sha256() == hashlib.sha256(b''.join(digests)).hexdigest()
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    max_examples=30,
+)
 @given(order=st.permutations(range(40)), chunk=st.sampled_from([1, 1000, 5000, 10**6]))
 def test_batches_follow_each_other(tmp_path: Path, order: list[int], chunk: int) -> None:
     """However log times jump in the file, no batch begins before the one before it ends."""

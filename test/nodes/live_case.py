@@ -24,8 +24,9 @@ from ugv_acceptance.nodes.status import Status
 
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 FOLDED = (0.0, 2.0, -2.5, 2.0)
-# Seconds in which whatever is waited for comes, on a busy machine too.
-PATIENCE = 20.0
+# Seconds in which whatever is waited for comes, on a busy machine too. ROS forgets a process that
+# was killed, with its publishers, after twenty.
+PATIENCE = 60.0
 OK, WARN, ERROR, STALE = range(4)
 
 
@@ -145,6 +146,12 @@ class Live:
         monitor, driver = self.monitor(**values), self.driver()
         self.until(lambda: session_of(monitor).evaluator.margins is not None, driver.send)
         return monitor, driver
+
+    def alone(self) -> None:
+        """Wait until nobody is known to publish an input: who was killed stays known a while."""
+        node = self.add(rclpy.create_node(f'lonely_{len(self.nodes)}'))
+        topics = ('joint_states', 'imu/data')
+        self.until(lambda: not any(map(node.count_publishers, topics)))
 
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
         """Call a service and return its answer."""

@@ -15,6 +15,7 @@ from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alarms import State
+from ugv_acceptance.evaluation.alerts import ERROR, Alert
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.wording import WORDS as EVALUATED
 from ugv_acceptance.model.robot import Payload
@@ -48,22 +49,31 @@ def give(
 
 def wait_until(condition: Any, meanwhile: Any) -> None:
     """Give messages until it is so."""
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < end
         meanwhile()
         time.sleep(0.01)
 
 
+def raised(session: Session, code: str, subject: str = '', level: int = 0) -> list[Alert]:
+    """Return the alerts of a code that are active: on a busy machine an input may be late too."""
+    rules = [(a, a.rule) for a in session.active if a.rule.code == code]
+    return [a for a, rule in rules if rule.subject.startswith(subject) and rule.level >= level]
+
+
 def test_advice_comes_without_holding_up_a_message() -> None:
     """First the general advice, then the computed one, which a thread has worked out."""
     session = session_with()
-    wait_until(lambda: session.active, lambda: give(session, STRETCHED))
+    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
     session.follower.take()
     assert 'raise the elbow' not in verdict_of(session).message
     wait_until(session.counsel.arrived, lambda: give(session, STRETCHED))
+    wait_until(
+        lambda: 'raise the elbow by' in verdict_of(session).message,
+        lambda: give(session, STRETCHED),
+    )
     verdict = verdict_of(session)
-    assert 'raise the elbow by' in verdict.message
     assert verdict.values['do'] == verdict.values['advice_1']
     assert verdict.values['class'] in {'physical / effector', 'human / interaction'}
 
@@ -76,9 +86,9 @@ def test_a_robot_that_slides_before_it_tips_is_told() -> None:
     wait_until(lambda: session.evaluator.margins, lambda: give(session, FOLDED, slope))
     verdict = verdict_of(session)
     assert verdict.values['slide_left_deg'] == pytest.approx(1.7, abs=0.01)
-    wait_until(lambda: session.active, lambda: give(session, FOLDED, slope))
-    (alert,) = session.active
-    assert (alert.rule.code, alert.rule.subject) == ('SLIDE', 'robot')
+    wait_until(lambda: raised(session, 'SLIDE'), lambda: give(session, FOLDED, slope))
+    assert [a.rule.subject for a in raised(session, 'SLIDE')] == ['robot']
+    assert not raised(session, 'TIP_OVER')
     said = verdict_of(session).message
     assert 'the tracks slide before it tips: 1.7 degrees of slope left' in said
     assert 'stop; go back to where the slope is less' in said
@@ -89,10 +99,10 @@ def test_a_robot_that_tips_before_it_slides_is_not_told_of_sliding() -> None:
     limits = replace(PACKBOT.limits, friction=0.8)
     session = session_with(replace(PACKBOT, limits=limits))
     wait_until(
-        lambda: any(a.rule.code == 'TIP_OVER' for a in session.active),
+        lambda: raised(session, 'TIP_OVER'),
         lambda: give(session, STRETCHED, math.radians(30.0)),
     )
-    assert not any(a.rule.code == 'SLIDE' for a in session.active)
+    assert not raised(session, 'SLIDE')
 
 
 def test_a_load_that_the_motors_feel_is_offered() -> None:
@@ -207,7 +217,10 @@ def test_what_is_wrong_with_an_operation_is_said(sent: DiagnosticStatus, said: s
 def test_one_alarm_can_be_acknowledged_by_its_code() -> None:
     """The others stay as they are."""
     session = session_with()
-    wait_until(lambda: len(session.active) > 3, lambda: give(session, STRETCHED))
+    wait_until(
+        lambda: raised(session, 'TIP_OVER', 'front', ERROR) and len(session.active) > 3,
+        lambda: give(session, STRETCHED),
+    )
     session.follower.take()
     asked = message('acknowledge', code='TIP_OVER', subject='front', level='ERROR')
     (change,) = operate(session, asked)

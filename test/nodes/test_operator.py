@@ -22,6 +22,8 @@ import pytest
 import rclpy
 from nodes.live_case import PATIENCE, Live, live_nodes
 from nodes.test_run_verb import HOME, LONG, plan_file, step
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from ugv_acceptance.nodes.child import child
@@ -34,16 +36,24 @@ class Arm:
 
     def __init__(self, live: Live) -> None:
         node = live.add(rclpy.create_node('hands_of_the_operator'))
+        self.live, self.at = live, dict[str, float]()
         self.topic = node.create_publisher(JointTrajectory, 'arm_controller/joint_trajectory', 10)
+        node.create_subscription(JointState, 'joint_states', self._see, qos_profile_sensor_data)
         live.until(self.topic.get_subscription_count)
 
+    def _see(self, message: JointState) -> None:
+        self.at |= dict(zip(message.name, message.position, strict=True))
+
     def move(self, **degrees: float) -> None:
-        """Bring joints to positions (deg) within a second."""
+        """Bring joints to positions (deg) within a second; return once they are there."""
         message = JointTrajectory(joint_names=[f'{name}_joint' for name in degrees])
         positions = [math.radians(angle) for angle in degrees.values()]
         message.points = [JointTrajectoryPoint(positions=positions)]
         message.points[0].time_from_start.sec = 1
         self.topic.publish(message)
+        goal = dict(zip(message.joint_names, positions, strict=True))
+        near = math.radians(1.0)
+        self.live.until(lambda: all(abs(self.at.get(n, 9.0) - p) < near for n, p in goal.items()))
 
 
 class Terminal:
@@ -123,7 +133,6 @@ def play(terminal: Terminal, arm: Arm, answer: Callable[[str], str]) -> list[str
         said = answer(text)
         if not said and 'bring the arm to' in text:
             arm.move(**wanted(text.rpartition('bring the arm to')[2]))
-            time.sleep(1.2)
         terminal.answer(said.strip())
     terminal.process.wait(PATIENCE)
     return asked

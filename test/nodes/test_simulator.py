@@ -50,6 +50,11 @@ class Controller:
         newest = self.joints[-1]
         return float(newest.position[list(newest.name).index(name)])
 
+    def speed(self, name: str) -> float:
+        """Return the newest speed of a joint (rad/s)."""
+        newest = self.joints[-1]
+        return float(newest.velocity[list(newest.name).index(name)])
+
     def move(self, seconds: int, **targets: float) -> None:
         """Send a trajectory of one point; no targets: hold still."""
         message = JointTrajectory(joint_names=list(targets))
@@ -79,9 +84,9 @@ def test_it_follows_a_trajectory_and_holds(live: Live) -> None:
     robot.move(8, turret_joint=1.5)
     live.until(lambda: robot.position('turret_joint') > 0.1)
     robot.move(0)
-    live.spin(0.5)
-    there = robot.position('turret_joint')
-    live.spin(0.5)
+    live.until(lambda: abs(robot.speed('turret_joint')) < 0.01)
+    there, told = robot.position('turret_joint'), len(robot.joints)
+    live.until(lambda: len(robot.joints) > told + 25)
     assert robot.position('turret_joint') == pytest.approx(there, abs=0.01)
     assert there < 1.4
 
