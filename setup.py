@@ -105,6 +105,7 @@ setup(
         f'{NAME}.report': ['templates/*'],
         f'{NAME}.plan': ['templates/*'],
         f'{NAME}.console': ['static/*'],
+        f'{NAME}.nodes': ['loopback.xml'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),

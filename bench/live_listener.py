@@ -1,7 +1,6 @@
 """One way to listen to the load of bench_live.py; prints CPU, latencies and counts as JSON."""
 
 import json
-import signal
 import struct
 import sys
 import time
@@ -12,14 +11,13 @@ from typing import Any
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bench.naive_monitor import NaiveMonitor, best_effort
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.nodes.monitor import Monitor
-from ugv_acceptance.nodes.running import Stop, end, spin
+from ugv_acceptance.nodes.running import end, ros, spin
 
 STAMP = struct.Struct('<iI')
 DEPTH = 1000
@@ -88,26 +86,24 @@ MODES: dict[str, Callable[[Tally], Any]] = {
 def main() -> None:
     """Listen until SIGINT."""
     mode = sys.argv[1]
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    stop, tally = Stop(), Tally()
-    signal.signal(signal.SIGINT, lambda *_: setattr(stop, 'asked', True))
-    node = MODES[mode](tally)
-    if mode == 'naive':
-        executor: Any = SingleThreadedExecutor()
-        executor.add_node(node)
-        while not stop.asked:
-            executor.spin_once(timeout_sec=0.5)
-    else:
-        spin(node, stop)
-    cpu = time.process_time() - tally.cpu
-    # The monitor's first messages cannot have margins: the other input has not come yet.
-    taken = len(tally.latencies)
-    if isinstance(node, Monitor) and node.session is not None:
-        taken = sum(count.taken for count in node.session.counts.values())
-    told = {'cpu': cpu, 'taken': taken, 'latencies': tally.latencies}
-    print(json.dumps(told), flush=True)
-    end(node)
-    rclpy.shutdown()
+    tally = Tally()
+    with ros() as stop:
+        node = MODES[mode](tally)
+        if mode == 'naive':
+            executor: Any = SingleThreadedExecutor()
+            executor.add_node(node)
+            while not stop.asked:
+                executor.spin_once(timeout_sec=0.5)
+        else:
+            spin(node, stop)
+        cpu = time.process_time() - tally.cpu
+        # The monitor's first messages cannot have margins: the other input has not come yet.
+        taken = len(tally.latencies)
+        if isinstance(node, Monitor) and node.session is not None:
+            taken = sum(count.taken for count in node.session.counts.values())
+        told = {'cpu': cpu, 'taken': taken, 'latencies': tally.latencies}
+        print(json.dumps(told), flush=True)
+        end(node)
 
 
 main()

@@ -29,9 +29,13 @@ NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """A change of an alert: when the monitor said so (ns, its stamp), and its values by key."""
+    """A change of an alert: when the monitor said so (ns, its stamp), and when that was heard (ns).
+
+    `values` are the status's, by key.
+    """
 
     time: int
+    heard: int
     message: str
     values: dict[str, str]
 
@@ -72,7 +76,7 @@ class Ears(Node):
         when = message.header.stamp.sec * NS + message.header.stamp.nanosec
         for status in message.status:
             values = {v.key: v.value for v in status.values}
-            self.alerts.append(Heard(when, status.message, values))
+            self.alerts.append(Heard(when, time.time_ns(), status.message, values))
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -85,6 +89,12 @@ class Ears(Node):
     def first(self, how: str, code: str, subject: str = '') -> Heard | None:
         """Return the first change of an alert that says so."""
         return next((heard for heard in self.alerts if heard.says(how, code, subject)), None)
+
+    def open(self, code: str, subject: str) -> Heard | None:
+        """Return the last change of an alert if it raised it: it has not been cleared since."""
+        said = [h for h in self.alerts if h.says('raised', code, subject)]
+        over = [h for h in self.alerts if h.says('cleared', code, subject)]
+        return said[-1] if said and (not over or over[-1].time < said[-1].time) else None
 
 
 def environment() -> dict[str, str]:

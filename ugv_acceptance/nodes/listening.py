@@ -16,7 +16,7 @@ from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointSt
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.player import message_type
-from ugv_acceptance.nodes.running import ros, spin
+from ugv_acceptance.nodes.running import RANGE, ros, spin
 
 # Samples of an input that are kept.
 KEPT = 5000
@@ -68,6 +68,7 @@ class Surroundings:
 
 def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
     """Listen to a robot for `seconds`."""
+    discovery = os.environ.get(RANGE, 'SUBNET')
     with ros(args) as stop:
         node = Node('doctor')
         joints = _subscribe(node, topics.joint_states, Decoder(JOINT_STATE))
@@ -87,7 +88,7 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             _distribution(),
             get_rmw_implementation_identifier(),
             os.environ.get('ROS_DOMAIN_ID', '0'),
-            os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET'),
+            discovery,
             [name for name in node.get_node_names() if name == 'acceptance_monitor'],
             seconds,
             joints,

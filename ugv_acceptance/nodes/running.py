@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import get_rmw_implementation_identifier, ok, try_shutdown
 
 from ugv_acceptance import AcceptanceError
 
@@ -28,6 +28,13 @@ BAD_INPUT = 2
 PATIENCE = 0.5
 # Seconds after which a thread gives the interpreter to one that waits.
 TURN = 0.0002
+# Fast DDS takes its transports from this, or from a file of profiles under its new or old name.
+TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS'
+PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+# A second of a fast robot's messages finds room, if net.core.rmem_max allows it.
+UDP = 'UDPv4?sockets_size=4MB&non_blocking=true'
+LOOPBACK = str(Path(__file__).with_name('loopback.xml'))
 
 
 @dataclass(slots=True)
@@ -61,6 +68,7 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
     """
     if not {'HOME', 'ROS_HOME', 'ROS_LOG_DIR'} & set(os.environ):
         os.environ['ROS_LOG_DIR'] = str(Path(tempfile.gettempdir(), 'ros_log'))
+    choose_transport(os.environ)
     stop = Stop()
 
     def ask(*_: object) -> None:
@@ -75,6 +83,23 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
         # Once asked to end, a second Ctrl-C must not break off what is left of it.
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if stop.asked else handler)
+
+
+def choose_transport(environment: MutableMapping[str, str]) -> None:
+    """Leave Fast DDS's shared memory out, unless somebody chose: docs/decisions/0010-transport.md.
+
+    Its queues are locked between processes: one that stops or dies holds up whoever publishes.
+    """
+    chosen = {environment[name] for name in (TRANSPORT, *PROFILES) if name in environment}
+    if chosen - {UDP, LOOPBACK} or not get_rmw_implementation_identifier().startswith(
+        'rmw_fastrtps'
+    ):
+        return
+    if environment.get(RANGE) == 'LOCALHOST' and not environment.get('ROS_STATIC_PEERS'):
+        # This range brings shared memory of its own, whatever the transports are.
+        environment.update(dict.fromkeys(PROFILES, LOOPBACK), **{RANGE: 'SUBNET'})
+    elif not chosen:
+        environment[TRANSPORT] = UDP
 
 
 def end(node: Node) -> None:
