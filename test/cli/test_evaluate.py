@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -108,6 +109,34 @@ def test_a_silent_imu_is_no_pass(tmp_path: Path) -> None:
     done = evaluate(write_run(tmp_path / 'run', silent=(1.0, 2.0), seconds=4.0))
     assert done.returncode == 3
     assert 'no message from imu' in done.stdout
+
+
+def test_a_recording_that_breaks_off_is_no_pass(repository: Path, tmp_path: Path) -> None:
+    """An eighth of a good run, whether or not metadata.yaml says how much there was."""
+    run = Path(shutil.copytree(repository / 'bags' / 'packbot_pass', tmp_path / 'run'))
+    file = run / 'packbot_pass_0.mcap'
+    file.write_bytes(file.read_bytes()[:60_000])
+    for place in (run, file):
+        done = evaluate(place)
+        assert (done.returncode, 'the recording breaks off' in done.stdout) == (3, True)
+    assert '7374 messages that metadata.yaml tells of are missing' in evaluate(run).stdout
+
+
+def test_a_recording_with_a_part_missing_is_no_pass(repository: Path, tmp_path: Path) -> None:
+    """The files that are there are whole, but metadata.yaml tells of more."""
+    run = write_run(tmp_path / 'run')
+    shutil.copy(repository / 'bags' / 'packbot_pass' / 'metadata.yaml', run)
+    (run / 'run_0.mcap').rename(run / 'packbot_pass_0.mcap')
+    done = evaluate(run)
+    assert done.returncode == 3
+    assert 'messages that metadata.yaml tells of are missing' in done.stdout
+
+
+def test_less_than_a_second_is_no_pass(tmp_path: Path) -> None:
+    """Nothing can be seen to be silent in it."""
+    done = evaluate(write_run(tmp_path / 'run', seconds=0.9))
+    assert done.returncode == 3
+    assert 'duration: 0.89 s; length of the recording at least 1 s' in done.stdout
 
 
 def test_csv_has_one_row_a_message(tmp_path: Path) -> None:

@@ -123,12 +123,13 @@ def test_columns_see_the_leaps_that_messages_show() -> None:
 
 
 def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
-    """Torques that have a limit, tip-over, support and coverage."""
+    """Torques that have a limit, tip-over, support, and what the data have to be."""
     found = default_criteria(replace(settings(), limits=Limits((40.0, math.inf), torque_error=0.9)))
     assert found.version == 1
-    assert [c.name for c in found.criteria] == ['torque lift', 'tip-over', 'support', 'coverage']
+    data = ['coverage', 'duration', 'whole file', 'all messages']
+    assert [c.name for c in found.criteria] == ['torque lift', 'tip-over', 'support', *data]
     limits: list[Any] = [getattr(c.demand, 'limit', None) for c in found.criteria]
-    assert limits == [0.9, Limits(()).tip_error, None, None]
+    assert limits == [0.9, Limits(()).tip_error, *[None] * 5]
 
 
 def test_independent_samples_are_counted_from_neighbours() -> None:

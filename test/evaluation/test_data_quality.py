@@ -8,7 +8,10 @@ from ugv_acceptance.evaluation.data_quality import DATA, measured_of, unit_of
 
 RESULT: dict[str, Any] = {
     'coverage': {'fraction': 0.97, 'duration_s': 61.5},
-    'bag': {'protected': 'all', 'salvaged': None, 'findings': ['one', 'two', 'three']},
+    'bag': {
+        'protected': 'all', 'salvaged': None, 'lost_messages': 7,
+        'findings': ['one', 'two', 'three'],
+    },
     'inputs': {
         'late_messages': 4,
         'joint_states': {
@@ -23,7 +26,7 @@ RESULT: dict[str, Any] = {
 }  # fmt: skip
 OF_RUN = {
     'coverage': 0.97, 'duration': 61.5, 'protected': 1.0, 'salvaged': 0.0, 'findings': 3.0,
-    'late_messages': 4.0,
+    'late_messages': 4.0, 'lost_messages': 7.0,
 }  # fmt: skip
 OF_INPUTS = {
     'messages': (500.0, 900.0), 'rate': (49.5, None), 'gaps': (2.0, 0.0),
@@ -32,7 +35,7 @@ OF_INPUTS = {
 
 
 def test_every_quantity_is_of_the_run_or_of_an_input() -> None:
-    """There are twelve, six of each kind."""
+    """There are thirteen: seven of the run, six of each input."""
     assert {*DATA} == {*OF_RUN, *OF_INPUTS}
 
 

@@ -91,7 +91,8 @@ def test_what_was_not_seen_is_not_demanded() -> None:
     alert = {'name': 'no alert', 'requirement': '', 'measured': {'alerts': []}}
     found = proposed(value('below', None, 9.0, None), alert, rate=None)['criteria']
     assert set(found) == {
-        'no error', 'coverage', 'protected', 'gaps of joint_states', 'rate of imu', 'gaps of imu'
+        'no error', 'coverage', 'whole file', 'all messages', 'protected', 'gaps of joint_states',
+        'rate of imu', 'gaps of imu',
     }  # fmt: skip
 
 

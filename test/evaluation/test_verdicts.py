@@ -64,7 +64,7 @@ def judged(
     data = {
         **result_of(summary, alerts, T0, end - T0),
         'inputs': {'joint_states': source, 'imu': {**source, 'rate_hz': None}, 'late_messages': 0},
-        'bag': {'protected': 'part', 'salvaged': None, 'findings': []},
+        'bag': {'protected': 'part', 'salvaged': None, 'lost_messages': 0, 'findings': []},
     }
     return judge_criteria(Findings(examination, alerts, data, Bounds(TOLD, tuple(sources))))
 

@@ -92,7 +92,7 @@ def judge(
     log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
     data = {
         **result_of(summary, log, bag.start_ns, length, told.sentences()),
-        'bag': _bag_result(bag, reading.facts),
+        'bag': _bag_result(bag, topics, reading.facts),
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
         'model_check': check.result(),
     }
@@ -125,7 +125,9 @@ def _together(batches: Sequence[Batch]) -> Batch:
     )
 
 
-def _bag_result(bag: Bag, facts: Facts) -> dict[str, Any]:
+def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
+    names = (topics.joint_states, topics.imu, topics.payload)
+    held = {name: bag.topics[name].count for name in names if name in bag.topics}
     return {
         'path': [str(path) for path in bag.paths],
         'sha256': bag.sha256(),
@@ -133,6 +135,8 @@ def _bag_result(bag: Bag, facts: Facts) -> dict[str, Any]:
         'messages': {name: topic.count for name, topic in bag.topics.items()},
         'protected': bag.protected,
         'salvaged': bag.salvaged,
+        # Of those read here: a recording without its pictures has all that is judged.
+        'lost_messages': sum(max(0, bag.promised.get(n, 0) - k) for n, k in held.items()),
         'findings': [*bag.findings, *facts.findings],
     }
 

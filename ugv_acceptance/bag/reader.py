@@ -2,6 +2,7 @@
 
 import hashlib
 import tempfile
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,7 +50,8 @@ class Bag:
 
     Log times are ns; `protected` says whether all, part or none of its chunks carry a checksum;
     `salvaged` is a sentence where a file breaks off, else None; `findings` are sentences about
-    what is odd. What only reading finds is in `Reading.facts`.
+    what is odd. What only reading finds is in `Reading.facts`. `promised` are the messages a topic
+    that metadata.yaml tells of, as far as it does.
     """
 
     paths: tuple[Path, ...]
@@ -61,6 +63,7 @@ class Bag:
     findings: tuple[str, ...]
     members: tuple[Member, ...] = field(repr=False)
     _hash: list[str] = field(default_factory=list, repr=False, compare=False)
+    promised: dict[str, int] = field(default_factory=dict)
 
     @property
     def duration_s(self) -> float:
@@ -103,6 +106,7 @@ def open_bag(
         raise BadBag('expected at least one bag, got none')
     members: list[Member] = []
     findings: list[str] = []
+    promised: Counter[str] = Counter()
     for path in given:
         try:
             files, metadata, found = files_of(Path(path))
@@ -110,6 +114,7 @@ def open_bag(
         except OSError as error:
             raise BadBag(f'{path}: cannot be read ({error})') from error
         findings += found + _compared(metadata, part)
+        promised.update(metadata.counts or {})
         members += part
     kinds = sorted({member.storage for member in members})
     if len(kinds) > 1:
@@ -127,6 +132,7 @@ def open_bag(
         '; '.join(salvaged) or None,
         tuple(findings),
         tuple(members),
+        promised=dict(promised),
     )
 
 
@@ -170,10 +176,10 @@ def _unzstd(path: Path) -> 'tempfile._TemporaryFileWrapper[bytes]':
 
 
 def _sha256(path: Path) -> bytes:
-    digest = hashlib.sha256()
-    with path.open('rb') as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
+    digest, block = hashlib.sha256(), memoryview(bytearray(_BLOCK))
+    with path.open('rb', buffering=0) as file:
+        while count := file.readinto(block):
+            digest.update(block[:count])
     return digest.digest()
 
 

@@ -17,6 +17,8 @@ PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
 RSS, WORST_CASE, IGNORED = 'rss', 'worst_case', 'ignored'
 # Less of a window than this evaluated can never be a pass.
 LEAST_COVERAGE = 0.95
+# In less (s) no input can be told to be silent, nor an IMU to contradict itself.
+LEAST_DURATION = 1.0
 ANY = 'any'
 
 Window = tuple[float, float]
@@ -158,6 +160,13 @@ def default_criteria(settings: Settings) -> CriteriaSet:
             DataDemand('coverage', least=LEAST_COVERAGE),
             'the recording could be evaluated',
         ),
+        Criterion(
+            'duration',
+            DataDemand('duration', least=LEAST_DURATION),
+            'the recording is long enough to show anything',
+        ),
+        Criterion('whole file', DataDemand('salvaged', most=0.0), 'no file breaks off'),
+        Criterion('all messages', DataDemand('lost_messages', most=0.0), 'no message is missing'),
     )
     text = json.dumps([_plain(c) for c in criteria], sort_keys=True)
     sha256 = hashlib.sha256(text.encode()).hexdigest()

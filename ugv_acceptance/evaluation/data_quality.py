@@ -30,6 +30,9 @@ DATA = {
         lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum'
     ),
     'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'files that break off'),
+    'lost_messages': Quantity(
+        lambda r: float(r['bag']['lost_messages']), 'messages that metadata.yaml tells of missing'
+    ),
     'findings': Quantity(lambda r: float(len(r['bag']['findings'])), 'oddities of the file'),
     'late_messages': Quantity(
         lambda r: float(r['inputs']['late_messages']), 'messages out of order'

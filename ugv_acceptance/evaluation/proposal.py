@@ -30,6 +30,8 @@ def proposed_criteria(result: Json, name: str) -> str:
             lines += _value(outcome, measured)
     lines += ['  no error:', '    alert: any', '    level: ERROR', '    expect: absent']
     lines += ['  coverage:', '    data: coverage', '    at_least: 0.95']
+    lines += ['  whole file:', '    data: salvaged', '    at_most: 0']
+    lines += ['  all messages:', '    data: lost_messages', '    at_most: 0']
     lines += ['  protected:', '    data: protected', '    at_least: 1'] * _protected(result)
     for key in ('joint_states', 'imu'):
         lines += _input(key, result['inputs'][key])

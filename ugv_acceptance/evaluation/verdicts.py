@@ -125,17 +125,27 @@ def _judge_data(criterion: Criterion, findings: Findings) -> Outcome:
     unmet = {k: x for k, x in found.items() if x is None or not demand.least <= x <= demand.most}
     if not unmet:
         return Outcome(PASS, demand_words(criterion, findings.settings), measured)
+    text = _unmet_words(criterion, demand, unmet, findings)
+    return Outcome(FAIL if demand.fails else INCONCLUSIVE, text, measured)
+
+
+def _unmet_words(
+    criterion: Criterion, demand: DataDemand, unmet: dict[str, float | None], findings: Findings
+) -> str:
+    data = findings.data
     if demand.quantity == 'coverage':
-        text = (
-            f'only {findings.data["coverage"]["fraction"]:.1%} of the recording could be evaluated '
+        return (
+            f'only {data["coverage"]["fraction"]:.1%} of the recording could be evaluated '
             f'({demand.least:.0%} needed)'
         )
-    else:
-        numbers = ', '.join(
-            f'{k} {"unknown" if x is None else f"{x:.4g}"}' for k, x in unmet.items()
-        )
-        text = f'{criterion.name}: {numbers}; {demand_words(criterion, findings.settings)}'
-    return Outcome(FAIL if demand.fails else INCONCLUSIVE, text, measured)
+    if demand.quantity == 'salvaged':
+        return f'the recording breaks off: {data["bag"]["salvaged"]}'
+    if demand.quantity == 'lost_messages':
+        return f'{data["bag"]["lost_messages"]} messages that metadata.yaml tells of are missing'
+    unit = unit_of(demand.quantity)
+    texts = {k: 'unknown' if x is None else f'{x:.4g} {unit}'.strip() for k, x in unmet.items()}
+    numbers = ', '.join(f'{k} {text}'.removeprefix('run ') for k, text in texts.items())
+    return f'{criterion.name}: {numbers}; {demand_words(criterion, findings.settings)}'
 
 
 def _judge_map(criterion: Criterion, findings: Findings) -> Outcome:
