@@ -5,7 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
-from ugv_acceptance.console.hearing import Heartbeat, Kind, Newest, attitude_given, joints_named
+from ugv_acceptance.console.hearing import (
+    Heartbeat,
+    Newest,
+    Pick,
+    newest_attitude,
+    newest_of_joints,
+)
 from ugv_acceptance.evaluation.settings import ImuInput
 
 NOTHING = (0.0, 0.0, 0.0)
@@ -41,7 +47,7 @@ def test_the_newest_joint_state_of_each_set_of_joints_is_kept(drivers: list[str]
     names = {'arm': ('elbow',), 'flipper': ('flipp',), 'both': ('elbow', 'flipper')}
     messages = [joint_state(k, *names[who]) for k, who in enumerate(drivers)]
     taken: list[bytes] = []
-    newest = Newest(taken.append, joints_named())
+    newest = Newest(taken.append, newest_of_joints())
     last = sorted({who: k for k, who in enumerate(drivers)}.values())
     found, replaced = heard(newest, taken, messages)
     assert found == [messages[k] for k in last]
@@ -53,7 +59,7 @@ def test_an_orientation_replaces_an_older_one() -> None:
     """Where IMU messages give the attitude, the newest says all."""
     taken: list[bytes] = []
     messages = [imu(k, LEANING, (0.0,) * 9) for k in range(5)]
-    newest = Newest(taken.append, attitude_given(ImuInput()))
+    newest = Newest(taken.append, newest_attitude(ImuInput()))
     assert heard(newest, taken, messages) == (messages[-1:], 4)
 
 
@@ -72,15 +78,23 @@ def test_what_is_smoothed_is_taken_whole(
     """Where the attitude is the smoothed acceleration's, each message goes on."""
     taken: list[bytes] = []
     messages = [imu(k, orientation, covariance) for k in range(5)]
-    newest = Newest(taken.append, attitude_given(settings))
+    newest = Newest(taken.append, newest_attitude(settings))
     assert heard(newest, taken, messages) == (messages, 0)
 
 
-@pytest.mark.parametrize('kind', [joints_named(), attitude_given(ImuInput())])
-def test_what_cannot_be_read_goes_on(kind: Kind) -> None:
-    """A malformed message is handed on, to be counted where messages are judged."""
+@pytest.mark.parametrize(
+    ('pick', 'fine'),
+    [
+        (newest_of_joints(), joint_state(1, 'elbow')),
+        (newest_attitude(ImuInput()), imu(1, LEANING, (0.0,) * 9)),
+    ],
+)
+def test_what_cannot_be_read_goes_on(pick: Pick, fine: bytes) -> None:
+    """A malformed message is handed on beside others, to be counted where messages are judged."""
     taken: list[bytes] = []
-    assert heard(Newest(taken.append, kind), taken, [b'\0']) == ([b'\0'], 0)
+    newest = Newest(taken.append, pick)
+    assert heard(newest, taken, [b'\0']) == ([b'\0'], 0)
+    assert heard(newest, taken, [fine, b'\0', fine]) == ([b'\0', fine], 1)
 
 
 def test_silence_is_judged_by_the_period_heard() -> None:

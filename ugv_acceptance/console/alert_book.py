@@ -6,9 +6,10 @@ Who joins late misses what was said before: `also` adds what a console itself se
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from ugv_acceptance import BadSample
 from ugv_acceptance.console.snapshot import AlertRow
 from ugv_acceptance.evaluation.alarms import State
-from ugv_acceptance.evaluation.alerts import ERROR, LEVELS
+from ugv_acceptance.evaluation.alerts import ERROR, LEVELS, Alert
 
 _STATES = {state.value: state for state in State}
 
@@ -48,6 +49,13 @@ class AlertBook:
             said or kept,
         )
 
+    def row(self, key: object) -> AlertRow:
+        """Return the row of a key that a client sent. Raises BadSample where there is none."""
+        row = self.rows.get(str(key))
+        if row is None:
+            raise BadSample(f'key: expected that of an alert that is listed, got {key!r:.80}')
+        return row
+
     def clear(self) -> None:
         """Forget all: the monitor has none, or started anew."""
         self.rows.clear()
@@ -56,6 +64,21 @@ class AlertBook:
         """Return all rows, with those of `active` that the book does not have as active."""
         told = {key for key, row in self.rows.items() if row.end is None}
         return (*self.rows.values(), *(row for row in active if row.key not in told))
+
+
+def row_of(alert: Alert, text: str, advice: str) -> AlertRow:
+    """Return an active alert that only the console itself sees."""
+    rule = alert.rule
+    return AlertRow(
+        f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}',
+        rule.code,
+        rule.subject,
+        rule.level,
+        'active, seen by this console only',
+        text,
+        advice,
+        alert.start,
+    )
 
 
 def _whole(text: str | None) -> int | None:

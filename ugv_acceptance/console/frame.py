@@ -6,13 +6,16 @@ that it does not know. `describe_robot` is what does not change from frame to fr
 
 import math
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any
 
-from ugv_acceptance.console.skeleton import Figure, Skeleton, skeleton_of
+from ugv_acceptance.console.skeleton import Figure, Skeleton, plumb_of, skeleton_of
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.evaluation.low_pass import NOWHERE
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 
 # One word a level, and what the page says where nothing is wrong or nothing is known.
@@ -51,7 +54,6 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is that of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
     cause, advice = _cause(snapshot, level)
-    skeleton = skeleton_of(figure, snapshot.q, snapshot.gravity, snapshot.payload)
     return {
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
@@ -62,7 +64,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'left': '' if level == STALE else what_is_left(snapshot, settings),
         'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
         'q': numbers(snapshot.q),
-        'posture': None if skeleton is None else _posture(skeleton),
+        'posture': _posture(snapshot, figure),
         'attitude': _attitude(snapshot),
         'tilt': _tilt(snapshot),
         'state': STATES[snapshot.state],
@@ -161,22 +163,37 @@ def _alert(row: AlertRow, now: int) -> Plain:
     }
 
 
-def _posture(skeleton: Skeleton) -> Plain:
-    def point(p: Sequence[float]) -> list[float]:
-        return [round(x, 4) for x in p]
+def _posture(snapshot: Snapshot, figure: Figure) -> Plain | None:
+    drawn = _drawn(figure, snapshot.q, snapshot.payload)
+    if drawn is None:
+        return None
+    skeleton, plain = drawn
+    plumb = plumb_of(skeleton.cog, snapshot.gravity, skeleton.polygon)
+    return {**plain, 'plumb': None if plumb is None else _point(plumb)}
 
-    return {
+
+# A robot that stands still is drawn once.
+@lru_cache(maxsize=2)
+def _drawn(figure: Figure, q: tuple[float, ...], payload: Payload) -> tuple[Skeleton, Plain] | None:
+    skeleton = skeleton_of(figure, q, NOWHERE, payload)
+    if skeleton is None:
+        return None
+    return skeleton, {
         'limbs': [
-            {'joint': limb.joint, 'from': point(limb.start), 'to': point(limb.end)}
+            {'joint': limb.joint, 'from': _point(limb.start), 'to': _point(limb.end)}
             for limb in skeleton.limbs
         ],
-        'body': [point(corner) for corner in skeleton.body],
-        'contacts': [point(contact) for contact in skeleton.contacts],
-        'polygon': [point(corner) for corner in skeleton.polygon],
-        'cog': point(skeleton.cog),
-        'plumb': None if skeleton.plumb is None else point(skeleton.plumb),
-        'load': None if skeleton.load is None else point(skeleton.load),
+        'body': [_point(corner) for corner in skeleton.body],
+        'contacts': [_point(contact) for contact in skeleton.contacts],
+        'polygon': [_point(corner) for corner in skeleton.polygon],
+        'cog': _point(skeleton.cog),
+        'load': None if skeleton.load is None else _point(skeleton.load),
     }
+
+
+def _point(p: Sequence[float]) -> list[float]:
+    x, y, z = p
+    return [round(x, 4), round(y, 4), round(z, 4)]
 
 
 def _attitude(snapshot: Snapshot) -> Plain | None:

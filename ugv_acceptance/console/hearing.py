@@ -5,15 +5,15 @@ business, which judges every one.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder
 from ugv_acceptance.evaluation.settings import ImuInput
 
-# Which messages of an input replace each other: those of the same kind.
-Kind = Callable[[bytes], Hashable]
+# What is handed on of the messages of an input, in order of arrival; there is at least one.
+Pick = Callable[[Sequence[bytes]], Sequence[bytes]]
 
 
 @dataclass(slots=True)
@@ -36,61 +36,74 @@ class Heartbeat:
 
 @dataclass(slots=True)
 class Newest:
-    """The messages of one input since the last look: of those of the same `kind`, the newest."""
+    """The messages of one input since the last look: those that `pick` leaves are taken."""
 
     take: Callable[[bytes], None]
-    kind: Kind
-    _waiting: dict[Hashable, bytes] = field(default_factory=dict)
-    _replaced: int = 0
+    pick: Pick
+    _waiting: list[bytes] = field(default_factory=list)
 
     def __call__(self, data: bytes) -> None:
-        """Keep a message in place of an older one."""
-        kind = self.kind(data)
-        self._replaced += self._waiting.pop(kind, None) is not None
-        self._waiting[kind] = data
+        """Keep a message until the next look."""
+        self._waiting.append(data)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether anything came since the last look."""
+        return bool(self._waiting)
 
     def hand_on(self) -> int:
-        """Hand on what was kept, in order of arrival; return how many were not kept."""
-        for data in self._waiting.values():
+        """Hand on what is picked of what was kept; return how many were not."""
+        waiting, self._waiting = self._waiting, []
+        picked = self.pick(waiting) if waiting else ()
+        for data in picked:
             self.take(data)
-        self._waiting.clear()
-        replaced, self._replaced = self._replaced, 0
-        return replaced
+        return len(waiting) - len(picked)
 
 
-def joints_named() -> Kind:
-    """Return the kind of a JointState: the names in it, for a driver may tell of some joints only.
+def newest_of_joints() -> Pick:
+    """Pick the newest JointState of each set of names, for a driver may tell of some joints only.
 
-    What cannot be read is of a kind of its own.
+    What cannot be read is of a set of its own.
     """
-    decode = joint_state_decoder().one
+    decode = joint_state_decoder().raw
 
-    def kind(data: bytes) -> Hashable:
-        try:
-            return decode(data)[2]
-        except BadSample:
-            return None
+    def pick(waiting: Sequence[bytes]) -> Sequence[bytes]:
+        newest: dict[Hashable, bytes] = {}
+        for data in waiting:
+            try:
+                names = decode(data)[0].names
+            except BadSample:
+                names = None
+            newest.pop(names, None)
+            newest[names] = data
+        return list(newest.values())
 
-    return kind
+    return pick
 
 
-def attitude_given(imu: ImuInput) -> Kind:
-    """Return the kind of an Imu message: all are alike where the orientation is given and counts.
+def newest_attitude(imu: ImuInput) -> Pick:
+    """Pick the newest Imu message where its orientation is given and counts, else all of them.
 
-    Where the attitude comes from the smoothed acceleration, none replaces another.
+    Where the attitude comes from the smoothed acceleration, none replaces another; nor does one
+    replace what is not as long as itself, and thus no such message.
     """
     decode = imu_decoder().one
     counts = imu.attitude != 'accelerometer' and not imu.specific_force
 
-    def kind(data: bytes) -> Hashable:
+    def given(data: bytes) -> bool:
         try:
             _, _, orientation, _, _, covariance_0, _, _ = decode(data)
         except BadSample:
-            return None
-        given = counts and covariance_0 != -1.0 and any(orientation[:3])
-        return 'given' if given else object()
+            return False
+        return covariance_0 != -1.0 and any(orientation[:3])
 
-    return kind
+    def pick(waiting: Sequence[bytes]) -> Sequence[bytes]:
+        newest = waiting[-1]
+        if len(waiting) == 1 or not counts or not given(newest):
+            return waiting
+        return [*(data for data in waiting if len(data) != len(newest)), newest]
+
+    return pick
 
 
 def hints_of(values: Mapping[str, str]) -> tuple[str, ...]:

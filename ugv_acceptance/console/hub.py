@@ -24,6 +24,7 @@ PATIENCE = 10.0
 MOST_CLIENTS = 32
 # Answers that wait for a client.
 _ANSWERS = 32
+_AS_JSON = json.JSONEncoder(separators=(',', ':'), allow_nan=False).encode
 
 
 @dataclass(slots=True, eq=False)
@@ -160,7 +161,7 @@ class Hub:
 
 def as_json(value: dict[str, Any]) -> str:
     """Return compact JSON that every parser takes: no NaN."""
-    return json.dumps(value, separators=(',', ':'), allow_nan=False)
+    return _AS_JSON(value)
 
 
 def _small(number: object) -> int | None:

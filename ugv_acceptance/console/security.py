@@ -115,7 +115,7 @@ def guarded(app: App, guard: Guard) -> App:
         method = scope.get('method', 'WEBSOCKET')
         refused = guard.refusal(method, dict(scope['headers']), scope.get('query_string', b''))
         if refused is None:
-            await app(scope, receive, _with_headers(send))
+            await app(scope, receive, send if method == 'WEBSOCKET' else _with_headers(send))
         elif scope['type'] == 'websocket':
             # Before it is accepted: the server answers the handshake with 403.
             await _refuse_websocket(scope, receive, send, refused)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ugv_acceptance.model.expressions import add, cross, dot, rotate, scale, subtract
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.support import support_of
@@ -28,10 +29,14 @@ class Limb:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Figure:
-    """What of a drawing does not move: ends of limbs (body, point in its axes), the box (m)."""
+    """A robot's drawing: `joints` of its limbs, `ends` gives them for a posture, the box (m).
+
+    `ends(*q, *cog)` are (start, end) of each limb and, where loads are carried, the load's centre.
+    """
 
     mechanics: Mechanics
-    tips: tuple[tuple[int, Vector], ...]
+    joints: tuple[str, ...]
+    ends: Kernel
     box: tuple[Vector, Vector]
 
 
@@ -56,7 +61,24 @@ class Skeleton:
 def figure_of(robot: Robot) -> Figure:
     """Return the drawing of a robot, to be made once."""
     mechanics = mechanics_of(robot)
-    return Figure(mechanics, _tips(robot, mechanics.tree), _box(robot, mechanics.tree))
+    tree = mechanics.tree
+    tips = _tips(robot, tree)
+    order = [robot.joint_names.index(body.joint) for body in tree.bodies[1:]]
+
+    def formula(*inputs: Any) -> list[Any]:  # noqa: ANN401 - floats, or the kernel's symbols
+        *q, x, y, z = inputs
+        pose = pose_of(tree, [q[j] for j in order])
+        found: list[Any] = [
+            (pose.origin[body], add(pose.origin[body], rotate(pose.rotation[body], tip)))
+            for body, tip in tips
+        ]
+        if robot.payload_link is not None:
+            found.append(point_of(tree, pose, robot.payload_link, (x, y, z))[1])
+        return found
+
+    kernel = compile_kernel(formula, [*robot.joint_names, 'x', 'y', 'z'])
+    joints = tuple(tree.bodies[body].joint for body, _ in tips)
+    return Figure(mechanics, joints, kernel, _box(robot, tree))
 
 
 def skeleton_of(
@@ -71,22 +93,11 @@ def skeleton_of(
     cog: Any = posture.cog
     support = support_of(robot, contacts, cog)
     polygon = tuple(contacts[k] for k in support.polygon)
-    tree = mechanics.tree
-    pose: Any = pose_of(tree, [q[robot.joint_names.index(b.joint)] for b in tree.bodies[1:]])
-    limbs = tuple(
-        Limb(
-            tree.bodies[body].joint,
-            pose.origin[body],
-            _numbers(add(pose.origin[body], rotate(pose.rotation[body], tip))),
-        )
-        for body, tip in figure.tips
-    )
-    load: Any = None
-    if robot.payload_link is not None and payload.mass > 0.0:
-        _, load = point_of(tree, pose, robot.payload_link, payload.cog)
-    return Skeleton(
-        limbs, figure.box, tuple(contacts), polygon, cog, _plumb(cog, gravity, polygon), load
-    )
+    ends = figure.ends.one(*q, *payload.cog)
+    limbs = tuple(Limb(joint, *found) for joint, found in zip(figure.joints, ends, strict=False))
+    load = ends[-1] if robot.payload_link is not None and payload.mass > 0.0 else None
+    plumb = plumb_of(cog, gravity, polygon)
+    return Skeleton(limbs, figure.box, tuple(contacts), polygon, cog, plumb, load)
 
 
 def _tips(robot: Robot, tree: Tree) -> tuple[tuple[int, Vector], ...]:
@@ -122,7 +133,8 @@ def _box(robot: Robot, tree: Tree) -> tuple[Vector, Vector]:
     return (min(x), min(y), low), (max(x), max(y), max(z))
 
 
-def _plumb(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector | None:
+def plumb_of(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector | None:
+    """Return where the line through `cog` along gravity meets the polygon's plane, if it does."""
     if len(polygon) < 3 or not all(map(math.isfinite, gravity)):
         return None
     a, b, c = polygon[:3]

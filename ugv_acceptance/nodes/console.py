@@ -17,13 +17,14 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.config import Config
-from ugv_acceptance.console.alert_book import AlertBook
-from ugv_acceptance.console.hearing import Heartbeat, Newest, attitude_given, hints_of, joints_named
+from ugv_acceptance.console import hearing
+from ugv_acceptance.console.alert_book import AlertBook, row_of
 from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.snapshot import NO_LOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
@@ -35,7 +36,7 @@ from ugv_acceptance.nodes.operating import DOINGS, SHELVED
 from ugv_acceptance.nodes.outputs import LATCHED
 from ugv_acceptance.nodes.receipt import ReceiptClock
 from ugv_acceptance.nodes.running import ros
-from ugv_acceptance.nodes.session import Session
+from ugv_acceptance.nodes.session import INPUTS, Session
 
 MONITOR = 'acceptance_monitor'
 # Seconds without a verdict (it comes each second), and without margins while inputs arrive, after
@@ -44,6 +45,9 @@ VERDICT_SILENCE = 2.5
 MARGIN_SILENCE = 0.5
 # Messages of an input that may wait for the next snapshot.
 _DEPTH = 400
+# Seconds between looks at what the console itself thinks of its inputs. Silence is looked at in
+# each snapshot that nothing new came for.
+_LOOK = 0.2
 
 
 class ConsoleNode(Node):
@@ -55,7 +59,7 @@ class ConsoleNode(Node):
         self.book = AlertBook()
         self.verdict: DiagnosticStatus | None = None
         self.said: dict[str, str] = {}
-        self.heard, self.margins = Heartbeat(), Heartbeat()
+        self.heard, self.margins = hearing.Heartbeat(), hearing.Heartbeat()
         self.session = Session(
             self.settings,
             lambda _stamp, _margins: None,
@@ -65,20 +69,22 @@ class ConsoleNode(Node):
         )
         session = self.session
         self._heard = {
-            'joint_states': Newest(session.take_joint_state, joints_named()),
-            'imu': Newest(session.take_imu, attitude_given(self.settings.imu)),
+            'joint_states': hearing.Newest(session.take_joint_state, hearing.newest_of_joints()),
+            'imu': hearing.Newest(session.take_imu, hearing.newest_attitude(self.settings.imu)),
         }
         session.take_joint_state = self._heard['joint_states']
         session.take_imu = self._heard['imu']
         self._inputs = Inputs(self, config.topics, session, _DEPTH)
-        self._due = 0.0
+        self._due = self._look_due = 0.0
+        self._own: dict[str, AlertRow] = {}
+        self._rows: tuple[InputRow, ...] = ()
         self._load: InertiaStamped | None = None
         self._load_out: Any = None
         self._known_since: float | None = None
         self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
         self.create_subscription(DiagnosticArray, f'{MONITOR}/alerts', self._on_alerts, 50)
         self.create_subscription(
-            JointState, f'{MONITOR}/stability', lambda _: self._beat(), 10, raw=True
+            JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
         self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
         self._executor, self._never = EventsExecutor(), Future()
@@ -96,16 +102,18 @@ class ConsoleNode(Node):
     def snapshot(self) -> Snapshot:
         """Take what has come since the last time, and return what is known now."""
         self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
+        silent = not all(newest.waiting for newest in self._heard.values())
         for name, newest in self._heard.items():
-            replaced = newest.hand_on()
-            self.session.counts[name].taken += replaced
+            self.session.counts[name].taken += newest.hand_on()
         now, clock = time.monotonic(), self.session.clock
         if clock.simulated:
             clock.follow(clock.now(), self.get_clock().now().nanoseconds)
         if now >= self._due:
             self._due = now + 1.0
             self._every_second()
-        self.session.tick()
+        if silent or now >= self._look_due:
+            self._look_due = now + _LOOK
+            self._look_around()
         return self._look(now)
 
     def command(self, do: str, values: dict[str, Any]) -> str:
@@ -120,11 +128,8 @@ class ConsoleNode(Node):
     def _operation(self, do: str, values: dict[str, Any]) -> DiagnosticStatus:
         message = DiagnosticStatus(name=do, message=str(values.get('note') or '')[:200])
         message.hardware_id = str(values.get('by') or 'console')[:40]
-        key = values.get('key')
-        if key is not None:
-            row = self.book.rows.get(str(key))
-            if row is None:
-                raise BadSample(f'{do}: expected an alert that is listed, got {key!r:.80}')
+        if values.get('key') is not None:
+            row = self.book.row(values['key'])
             named = {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]}
             seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
             message.values = key_values(named | {'seconds': seconds})
@@ -161,7 +166,7 @@ class ConsoleNode(Node):
             self._load.header.stamp = self.get_clock().now().to_msg()
             self._load_out.publish(self._load)
 
-    def _beat(self) -> None:
+    def _beat(self, _: bytes) -> None:
         self.margins.beat(time.monotonic())
 
     def _on_verdict(self, status: DiagnosticStatus) -> None:
@@ -188,6 +193,15 @@ class ConsoleNode(Node):
         self.session.measure_rates()
         self._say_load()
 
+    def _look_around(self) -> None:
+        """Let time pass, and see what is active and how the inputs are."""
+        self.session.tick()
+        active = self.session.active
+        say = self.session.faults.sentence
+        rows = [row_of(a, say(a, self.settings), what_to_do(a.rule.code)) for a in active]
+        self._own = {row.key: row for row in rows}
+        self._rows = tuple(self._input(name, active) for name in INPUTS)
+
     def _problem(self, now: float) -> str:
         """Return why nothing may be believed; '' where the monitor is heard."""
         margins = self.session.evaluator.margins
@@ -212,16 +226,13 @@ class ConsoleNode(Node):
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)
         margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
-        own = [*evaluator.watch.active, *self.session.faults.active]
-        inputs = tuple(self._input(name, own) for name in ('joint_states', 'imu', 'payload'))
-        mine = {row.key: row for row in map(self._row, own)}
-        alerts = tuple(self._newest(r, mine) for r in self.book.also(mine.values()))
+        alerts = tuple(map(self._newest, self.book.also(self._own.values())))
         told = () if problem and self.verdict is None else alerts
-        moment = self.session.clock.now()
+        moment, rows = self.session.clock.now(), self._rows
         if margins is None or problem or self.verdict is None:
             q = tuple(joints.q)
             load = evaluator.payload or NO_LOAD
-            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=inputs)
+            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
         return Snapshot(
             moment,
             self.verdict.level[0],
@@ -235,31 +246,18 @@ class ConsoleNode(Node):
             state=int(margins.stability.state),
             payload=evaluator.payload,
             alerts=told,
-            inputs=inputs,
-            hints=hints_of(self.said),
+            inputs=rows,
+            hints=hearing.hints_of(self.said),
             stamp=margins.stamp,
         )
 
-    def _newest(self, row: AlertRow, mine: dict[str, AlertRow]) -> AlertRow:
+    def _newest(self, row: AlertRow) -> AlertRow:
         """Return an active alert with its worst until now, and the newest advice on it."""
         if row.end is not None:
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
-        return replace(row, text=mine.get(row.key, row).text, advice=advice)
-
-    def _row(self, alert: Alert) -> AlertRow:
-        rule = alert.rule
-        return AlertRow(
-            f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}',
-            rule.code,
-            rule.subject,
-            rule.level,
-            'active, seen by this console only',
-            self.session.faults.sentence(alert, self.settings),
-            what_to_do(rule.code),
-            alert.start,
-        )
+        return replace(row, text=self._own.get(row.key, row).text, advice=advice)
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:
         count, now = self.session.counts[name], self.session.clock.now()
