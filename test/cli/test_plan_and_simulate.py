@@ -52,9 +52,11 @@ def test_a_plan_and_its_card_are_written(tmp_path: Path) -> None:
         (('simulate', '--bag', 'x', '--fault', 'broken'), "fault 'broken': expected one of"),
         (('simulate', '--bag', 'x', '--seconds', '-3'), 'seconds: expected a number above 0'),
         (('simulate',), 'expected a folder to record into'),
+        (('simulate', '--bag', 'x', '--seed', '-1'), '--seed'),
+        (('run', '--sim', '--seed', '-1'), '--seed'),
         (('run', 'nowhere.yaml', '--sim'), 'nowhere.yaml: expected a plan'),
         (('run', 'nowhere.yaml'), 'expected one of --sim, --robot, --operator'),
-        (('plan', '--from', 'nowhere.yaml'), 'nowhere.yaml: expected a plan'),
+        (('plan', '--from', 'nowhere.yaml'), 'nowhere.yaml: expected a plan, got: No such file'),
     ],
 )
 def test_what_cannot_be_is_said_and_ends_with_2(arguments: tuple[str, ...], said: str) -> None:

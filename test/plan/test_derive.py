@@ -14,9 +14,9 @@ from ugv_acceptance.evaluation.wording import WORDS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.plan.card import card_of
+from ugv_acceptance.plan.card import MEANINGS, card_of
 from ugv_acceptance.plan.derive import Wanted, derive
-from ugv_acceptance.plan.order import distance, way
+from ugv_acceptance.plan.order import distance, time_text, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
@@ -191,6 +191,20 @@ def test_the_card_shows_every_step_and_loads_nothing() -> None:
     used = {p.split()[1] for s in PLAN.steps for p in s.alerts.must}
     assert used <= set(WORDS)
     assert all(f'<code>{code}</code>' in card for code in used)
+    assert used <= set(MEANINGS)
+
+
+def test_the_card_says_what_every_alert_means() -> None:
+    """Any can come while somebody works with the card."""
+    assert set(MEANINGS) == set(WORDS)
+
+
+@pytest.mark.parametrize(
+    ('seconds', 'text'), [(16.2, '16 s'), (119.0, '119 s'), (1500.0, '25 min'), (22000.0, '6.1 h')]
+)
+def test_a_length_is_told_in_the_unit_that_fits(seconds: float, text: str) -> None:
+    """A short plan is not one of 0 min."""
+    assert time_text(seconds) == text
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 from run.runners import CONFIG, HOME, NEAR, plan_of, results, runner_of
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.run.coverage import coverage_of
 from ugv_acceptance.run.hands import OPERATOR, SIM, Hands
 from ugv_acceptance.run.moving import REFUSED
 from ugv_acceptance.run.offline import Offline
@@ -98,6 +99,23 @@ def test_what_would_pass_a_limit_is_not_asked_of_a_person(tmp_path: Path) -> Non
     (result,) = results(of_person(tmp_path / 'out', person, {'where': 'simulation'}))
     assert (result['verdict'], person.asked) == ('SKIPPED', [])
     assert result['reasons'] == ['would pass a limit: in simulation only']
+
+
+def test_what_is_not_asked_of_a_robot_does_not_count_against_it(tmp_path: Path) -> None:
+    """All it was asked for passed: so does the run, and it says what was not asked."""
+    runner = of_person(tmp_path / 'out', Person(), {}, {'where': 'simulation'})
+    assert [r['verdict'] for r in results(runner)] == ['PASS', 'SKIPPED']
+    whole = runner.folder.finish(CONFIG, coverage_of(CONFIG, []))
+    assert (whole['verdict'], whole['asked']) == ('PASS', 1)
+    report = (tmp_path / 'out' / 'report.txt').read_text()
+    assert '2 steps: 1 SKIPPED, 1 PASS; 1 would pass a limit, for the simulation only' in report
+
+
+def test_a_plan_that_asks_nothing_of_a_robot_shows_nothing(tmp_path: Path) -> None:
+    """Where every step is for the simulation, a run on the robot is inconclusive."""
+    runner = of_person(tmp_path / 'out', Person(), {'where': 'simulation'})
+    assert [r['verdict'] for r in results(runner)] == ['SKIPPED']
+    assert runner.folder.finish(CONFIG, coverage_of(CONFIG, []))['verdict'] == 'INCONCLUSIVE'
 
 
 def test_a_simulated_robot_drives_and_stands_still_again(tmp_path: Path) -> None:

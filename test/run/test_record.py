@@ -59,6 +59,13 @@ def test_rosbags_reads_what_is_recorded(tmp_path: Path) -> None:
     assert counts['/payload'][1] == 3
 
 
+def test_the_load_is_declared_before_anything_else(tmp_path: Path) -> None:
+    """Else the first margins would be those of the load that the configuration assumes."""
+    with AnyReader([recorded(tmp_path / 'run')]) as reader:
+        first = next(iter(reader.messages()))[0].topic
+    assert first == '/payload'
+
+
 def test_every_chunk_has_a_checksum_and_no_more_than_half_a_second(tmp_path: Path) -> None:
     """A damaged or cut file loses little, and says so."""
     path = next(recorded(tmp_path / 'run', seconds=3.0).glob('*.mcap'))

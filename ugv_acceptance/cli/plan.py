@@ -77,7 +77,7 @@ def _print(made: 'Plan') -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ugv_acceptance.plan.order import duration
+    from ugv_acceptance.plan.order import duration, time_text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2))
     for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
@@ -99,6 +99,6 @@ def _print(made: 'Plan') -> None:
     if not console.is_terminal:
         console = Console(highlight=False, width=_WIDE)
     console.print(table)
-    minutes = duration(made) / 60.0
-    console.print(f'{len(made.steps)} steps, {minutes:.0f} min of motion and holding')
+    length = time_text(duration(made))
+    console.print(f'{len(made.steps)} steps, {length} of motion and holding')
     console.print(f'plan {made.plan}, sha256 {made.sha256}', soft_wrap=True)

@@ -49,7 +49,7 @@ def run(
         int,
         typer.Option(min=1, max=100, help='Times a step is tried that messages were missing in.'),
     ] = 5,
-    seed: Annotated[int, typer.Option(help='Seed of the simulated sensors.')] = 1,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the simulated sensors.')] = 1,
     fault: Annotated[
         list[str] | None, typer.Option(help='A fault of the simulated robot, as of simulate.')
     ] = None,

@@ -116,11 +116,10 @@ def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
 
 def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Console) -> None:
     """Print what came of the run: the verdict, what it covered, where it is."""
-    from ugv_acceptance.run.report import approaches
+    from ugv_acceptance.run.report import approaches, counts_of
 
-    counts = ', '.join(f'{count} {word}' for word, count in result['counts'].items() if count)
     verdict, covered = result['verdict'], result['coverage']
-    console.print(f'[bold {COLOURS[verdict]}]{verdict}[/]: {counts}')
+    console.print(f'[bold {COLOURS[verdict]}]{verdict}[/]: {counts_of(result)}', soft_wrap=True)
     console.print(
         '{cells_visited} of {cells_reachable} cells of the failure map visited'.format(**covered)
     )

@@ -20,13 +20,15 @@ def simulate(
         float | None,
         typer.Option('--seconds', '-s', help='Simulated seconds; as it comes if left out.'),
     ] = None,
-    seed: Annotated[int, typer.Option(help='The same seed gives the same messages.')] = 1,
+    seed: Annotated[int, typer.Option(min=0, help='The same seed gives the same messages.')] = 1,
     bag: Annotated[
         Path | None, typer.Option('--bag', '-o', help='New rosbag2 folder to record into.')
     ] = None,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help='KIND[:SUBJECT][=AMOUNT][@START[-END]]; may be given several times.'),
+        typer.Option(
+            help='KIND[:SUBJECT][=AMOUNT][@START[-END]], times in s; may be given several times.'
+        ),
     ] = None,
     config: Annotated[
         Path | None,
@@ -120,7 +122,7 @@ def _print_list() -> None:
         (
             'faults',
             [
-                (name, _fault_text(kind.text, kind.subject, kind.amount))
+                (name, f'{kind.words}; of: {kind.subject}' if kind.subject else kind.words)
                 for name, kind in KINDS.items()
             ],
         ),
@@ -131,11 +133,6 @@ def _print_list() -> None:
         for row in rows:
             table.add_row(*row)
         console.print(table)
-
-
-def _fault_text(text: str, subject: str, amount: float) -> str:
-    usual = f' (usually {amount:g})' if amount else ''
-    return f'{text}{usual}' + (f'; of: {subject}' if subject else '')
 
 
 def _print_outcome(outcome: 'Outcome', bag: Path, speed: float) -> None:

@@ -52,7 +52,7 @@ def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iter
                     if where == ROBOT:
                         rows &= routes.ways(level, load).reachable
                     name = joint.removesuffix('_joint')
-                    text = f'{name} torque {title}, {word} {limit:g} N m'
+                    text = f'{name} torque {title}, limit {word} {limit:g} N m'
                     purpose = f'the torque map says "{title}" at {load:g} kg: is it so?'
                     setup = Setup('torque boundary', load, where=where)
                     yield from _spread(arm, found, rows, points, setup, text, purpose)

@@ -11,7 +11,7 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
 from ugv_acceptance.plan.maps import safe_maps
-from ugv_acceptance.plan.order import duration
+from ugv_acceptance.plan.order import duration, time_text
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
@@ -21,19 +21,37 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 MEANINGS = {
     'TIP_OVER': 'Little tilt is left before the robot tips to the side named.',
     'TORQUE_LIMIT': 'The joint named carries nearly, or more than, what its motor can hold.',
+    'TIP_AHEAD': 'At this rate the robot tips to the side named within a second.',
+    'TORQUE_AHEAD': 'At this rate the joint named is at its limit within a second.',
+    'EFFORT_LIMIT': 'The motor named gives nearly all it has, whatever the model says.',
+    'MOTOR_WEAK': 'The motor named gives less than it should, and cannot hold its posture.',
+    'SLIDE': 'The robot is about to slide down the slope, before it tips.',
     'NO_SUPPORT': 'The robot does not stand on its contact points: it is tipping or hanging.',
     'STATIC_MODEL': 'The joint moves so fast that the margins shown are too good.',
     'INPUT_STALE': 'Messages of a sensor have stopped: no margin is known.',
     'INPUT_INCOMPLETE': 'A joint is missing from the messages: no margin is known.',
     'INPUT_INVALID': 'A sensor sends numbers that cannot be true.',
+    'ENCODER_FROZEN': 'A joint tells no motion while its effort changes: its position may be wrong.',
+    'POSITION_LEAP': 'A position jumps: wrong unit, or two robots tell of one joint.',
+    'IMU_FRAME': 'Another IMU than the one that was set up: tilt cannot be trusted.',
+    'IMU_ORIENTATION': 'The IMU tells an orientation it does not know.',
+    'IMU_GRAVITY': 'The IMU does not feel gravity as it should: tilt cannot be trusted.',
     'IMU_INCONSISTENT': 'The IMU contradicts itself: tilt cannot be trusted.',
     'PAYLOAD_INVALID': 'The load that was declared cannot be used.',
     'CLOCK': 'Clocks disagree: times of messages cannot be trusted.',
 }
 LEVELS = (
     ('OK', 'all margins kept', 'go on'),
-    ('WARN', 'a margin is small, no limit passed', 'go on slowly, away from the limit'),
-    ('ERROR', 'a limit is passed', 'stop, unless this step expects it'),
+    (
+        'WARN',
+        'a margin is small or shrinks fast, or an input is odd',
+        'go on slowly, away from the limit',
+    ),
+    (
+        'ERROR',
+        'a limit is passed, or an input cannot be used',
+        'stop, unless this step expects it',
+    ),
     ('STALE', 'margins are not known', 'stop: nothing protects the robot now'),
 )
 # Lines of a step's preparation that say ground and load, which stand in their own rows.
@@ -87,7 +105,7 @@ def card_of(plan: Plan, config: Config) -> str:
         levels=LEVELS,
         meanings=[(code, text, advice(code)) for code, text in MEANINGS.items()],
         maps=safe_maps(arm, plan),
-        minutes=round(duration(plan) / 60.0),
+        length=time_text(duration(plan)),
         home=_text(plan.home_deg),
     )
 

@@ -155,7 +155,8 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
     try:
         text = path.read_text('utf-8')
     except (OSError, UnicodeDecodeError) as error:
-        raise BadConfig(f'{path}: expected a plan, got: {error}') from None
+        got = error.strerror if isinstance(error, OSError) else error
+        raise BadConfig(f'{path}: expected a plan, got: {got}') from None
     document = read_document(text, str(path))
     try:
         plan = Plan.model_validate(document.data)

@@ -29,7 +29,12 @@ def names() -> dict[str, str]:
     """Return every name with what happens, in the order in which people should read them."""
     fixed = {name: _sentence(make.__doc__) for name, make in SCENARIOS.items()}
     drawn = {name: f'{_sentence(make.__doc__)} (drawn by --seed)' for name, make in KINDS.items()}
-    faulty = {f'{FAULT_PREFIX}{name}': f'gentle, but {kind.text}' for name, kind in FAULTS.items()}
+    faulty = {
+        f'{FAULT_PREFIX}{name}': 'gentle, but '
+        + ('' if name in PHYSICAL else f'from {SETS_IN:g} s on ')
+        + kind.words
+        for name, kind in FAULTS.items()
+    }
     return fixed | drawn | faulty
 
 

@@ -1,7 +1,7 @@
 """A simulated run as the messages a driver would publish, faults of the sensors included."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -86,11 +86,10 @@ def messages(
         ('/imu/data', 'imu', driver.imu(recording.imu)),
         ('/payload', 'payload', payload_messages(driver, recording, factor)),
     )
-    calm = replace(corruption, faults=())
     for topic, source, sent in sources:
-        road = calm if source == 'payload' else corruption
         for time, cdr in sent:
-            arrivals = road.arrivals(source, time, rng)
+            # A load is declared before anything is measured with it.
+            arrivals = [time] if source == 'payload' else corruption.arrivals(source, time, rng)
             found += [(topic, driver.nanoseconds(due), cdr) for due in arrivals]
     return sorted(found, key=lambda message: message[1])
 

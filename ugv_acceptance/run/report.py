@@ -43,7 +43,7 @@ def report_of(result: dict[str, Any]) -> str:
             result['verdict'], result['plan']['name'], result['robot']['name'], result['mode']
         ),
         f'plan sha256 {result["plan"]["sha256"]}',
-        ', '.join(f'{count} {verdict}' for verdict, count in result['counts'].items() if count),
+        counts_of(result),
         '',
         *(line for step in result['steps'] for line in _step_lines(step)),
         '',
@@ -52,6 +52,16 @@ def report_of(result: dict[str, Any]) -> str:
         *approaches(coverage),
     ]
     return '\n'.join(lines) + '\n'
+
+
+def counts_of(result: Mapping[str, Any]) -> str:
+    """Return how many steps came to what, and how many were asked of nobody."""
+    counts = ', '.join(f'{count} {verdict}' for verdict, count in result['counts'].items() if count)
+    steps, spared = len(result['steps']), len(result['steps']) - result['asked']
+    text = f'{steps} steps: {counts}'
+    if spared:
+        text += f'; {spared} would pass a limit, for the simulation only: they do not count'
+    return text
 
 
 def approaches(coverage: Mapping[str, Any]) -> list[str]:

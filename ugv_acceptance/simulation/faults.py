@@ -18,7 +18,8 @@ INPUTS = ('joint_states', 'imu')
 class Kind:
     """A kind of fault: what it does, whether to a joint, an input or neither, and how much.
 
-    `subject` is joint, input or empty; `low` to `high` bound the amount, whose unit is in `text`.
+    `subject` is joint, input or empty; `low` to `high` bound the amount, which stands for {} in
+    `text`.
     """
 
     text: str
@@ -27,26 +28,33 @@ class Kind:
     low: float = 0.0
     high: float = 0.0
 
+    @property
+    def words(self) -> str:
+        """Return what it does, with the usual amount."""
+        return self.text.format(f'{self.amount:g}')
+
 
 KINDS: dict[str, Kind] = {
-    'dropped': Kind('a share of the messages is lost', 'input', 0.3, 0.0, 1.0),
-    'late': Kind('messages come late by seconds', 'input', 0.3, 0.0, 60.0),
-    'reordered': Kind('a share of the messages comes after the next ones', 'input', 0.2, 0.0, 1.0),
-    'duplicated': Kind('a share of the messages comes twice', 'input', 0.2, 0.0, 1.0),
-    'dead': Kind('no message at all', 'input'),
-    'nan': Kind('numbers that are none', 'input'),
+    'dropped': Kind('a share of {} of the messages is lost', 'input', 0.3, 0.0, 1.0),
+    'late': Kind('messages come {} s late', 'input', 0.3, 0.0, 60.0),
+    'reordered': Kind(
+        'a share of {} of the messages comes after the next ones', 'input', 0.2, 0.0, 1.0
+    ),
+    'duplicated': Kind('a share of {} of the messages comes twice', 'input', 0.2, 0.0, 1.0),
+    'dead': Kind('no message comes at all', 'input'),
+    'nan': Kind('positions, or orientation and acceleration, are NaN', 'input'),
     'dead-encoder': Kind('a joint is missing from the messages', 'joint'),
-    'frozen-encoder': Kind('a joint tells the same position for ever', 'joint'),
-    'effort-missing': Kind('no efforts in the joint states'),
-    'imu-bias': Kind('acceleration forward is off by m/s2', '', 2.0, -50.0, 50.0),
+    'frozen-encoder': Kind('a joint tells the same position whatever it does', 'joint'),
+    'effort-missing': Kind('joint states tell no efforts'),
+    'imu-bias': Kind('the acceleration forward is {} m/s2 too large', '', 2.0, -50.0, 50.0),
     'wrong-mounting': Kind(
-        'the IMU is turned about its z axis by degrees', '', 90.0, -360.0, 360.0
+        'the IMU is mounted turned by {} deg about its z axis', '', 90.0, -360.0, 360.0
     ),
     'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
-    'clock-jump': Kind('header stamps are off by seconds', 'input', -5.0, -1e8, 1e8),
+    'clock-jump': Kind('header stamps are off by {} s', 'input', -5.0, -1e8, 1e8),
     'second-publisher': Kind('another robot that stands still publishes as well', 'input'),
-    'heavy-payload': Kind('the load is heavier than declared by a factor', '', 2.0, 0.0, 100.0),
-    'weak-motor': Kind('a motor gives a share of its torque', 'joint', 0.6, 0.0, 1.0),
+    'heavy-payload': Kind('the load is {} times as heavy as declared', '', 2.0, 0.0, 100.0),
+    'weak-motor': Kind('a motor gives a share of {} of its torque', 'joint', 0.6, 0.0, 1.0),
 }
 # These are in the robot, not in its messages: from the start to the end.
 PHYSICAL = ('heavy-payload', 'weak-motor')
