@@ -116,7 +116,10 @@ def test_a_wheel_made_from_the_source_archive_is_whole(repository: Path, tmp_pat
     shutil.copytree(
         repository,
         source,
-        ignore=shutil.ignore_patterns('.*', 'out', 'build', 'install', 'log', '*.egg-info'),
+        # Tests beside this one write __pycache__.
+        ignore=shutil.ignore_patterns(
+            '.*', '__pycache__', 'out', 'build', 'install', 'log', '*.egg-info'
+        ),
     )
     subprocess.run([sys.executable, 'setup.py', '-q', 'sdist'], cwd=source, check=True)
     (archive,) = (source / 'dist').glob('*.tar.gz')

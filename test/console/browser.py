@@ -29,7 +29,7 @@ FLAGS = (
     '--remote-debugging-port=0',
 )
 # Seconds in which whatever is waited for comes, on a busy machine too.
-PATIENCE = 30.0
+PATIENCE = 60.0
 KEYS = {
     'Tab': ('Tab', 9, ''),
     'Enter': ('Enter', 13, '\r'),
@@ -174,7 +174,9 @@ class Browser:
         )
         with urllib.request.urlopen(request, timeout=PATIENCE) as answer:  # noqa: S310 - our own
             address = json.load(answer)['webSocketDebuggerUrl']
-        with connect(address, max_size=None, compression=None, ping_interval=None) as socket:
+        with connect(
+            address, max_size=None, compression=None, ping_interval=None, open_timeout=PATIENCE
+        ) as socket:
             page = Page(socket)
             yield page
             page.call('Page.close')

@@ -15,7 +15,7 @@ def silent(url: str) -> socket.socket:
     where = urlsplit(url)
     made = socket.socket()
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, NARROW)
-    made.settimeout(10.0)
+    made.settimeout(60.0)
     made.connect((str(where.hostname), int(where.port or 0)))
     return made
 

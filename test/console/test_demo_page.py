@@ -17,7 +17,7 @@ def test_the_demo_serves_the_console_of_its_run() -> None:
         line = next(line for line in process.stdout or () if 'in a browser' in line)
         url = next(word for word in line.split() if word.startswith('http'))
         with client(url) as opened:
-            assert json.loads(opened.recv(timeout=20))['source'] == 'live'
+            assert json.loads(opened.recv(timeout=60))['source'] == 'live'
             while next_of(opened, 'frame')['level'] == 'STALE':
                 pass
 

@@ -34,14 +34,22 @@ def calm(page: Page, robot: Live) -> None:
     page.run(f'window.hand = setInterval(() => {hand}, 300)')
     page.wait(f'{LEVEL} === "OK" && console_page.frame.alerts.length === 0')
     page.run('clearInterval(hand)')
-
-
-def states(page: Page) -> list[str]:
-    """Return the states of the dangers in the list; lesser alerts come and go with the motion."""
-    found: list[str] = page.run(
-        '[...document.querySelectorAll("#alerts li.ERROR")].map(x => x.dataset.state)'
+    # What the hand did last is done before this is answered: it must not reach into the test.
+    asked = 'JSON.stringify({do: "axes", x: axes[0], y: axes[1], number: -1})'
+    page.run(
+        'new Promise(done => { const axes = console_page.hello.axes;'
+        f' console_page.waiting.set(-1, done); console_page.socket.send({asked}); }}).then(() => 0)'
     )
-    return found
+
+
+def wait_for_both(page: Page, state: str) -> None:
+    """Wait until both dangers of the stretched arm are listed so.
+
+    Before the monitor's word comes, a danger is one that only the console sees.
+    """
+    for danger in ('TIP_OVER-front', 'TORQUE_LIMIT-shoulder_joint'):
+        row = f'document.querySelector("#alerts li[data-key={danger}-ERROR]")'
+        page.wait(f'{row}?.dataset.state === "{state}"')
 
 
 def test_live_numbers_move(shown: Page, robot: Live) -> None:
@@ -59,19 +67,19 @@ def test_an_alert_appears_sounds_and_is_acknowledged(shown: Page, robot: Live) -
     shown.wait('document.body.dataset.sound === "armed"')
     robot.pose(*STRETCHED)
     shown.wait(f'{LEVEL} === "ERROR" && document.body.dataset.sound === "sounding"')
-    shown.wait('document.querySelectorAll("#alerts li.ERROR").length === 2')
-    assert set(states(shown)) == {'active, not acknowledged'}
-    assert shown.run('verdict.classList.contains("flash")')
+    wait_for_both(shown, 'active, not acknowledged')
+    # A late input is NO DATA for a moment, on a busy machine.
+    shown.wait(f'{LEVEL} === "ERROR" && verdict.classList.contains("flash")')
     shown.run('operator.value = "Ada"')
     shown.click('#acknowledge-all')
+    wait_for_both(shown, 'active, acknowledged')
+    # A caution about the motion may come later, and is acknowledged too.
+    shown.run('setInterval(() => document.getElementById("acknowledge-all").click(), 500)')
     shown.wait(
-        '[...document.querySelectorAll("#alerts li.ERROR")]'
-        '.every(x => x.dataset.state === "active, acknowledged")'
+        f'{LEVEL} === "ERROR" && document.body.dataset.sound === "armed"'
+        ' && !verdict.classList.contains("flash")'
     )
-    shown.wait('document.body.dataset.sound === "armed"')
-    assert shown.run(LEVEL) == 'ERROR'
-    assert not shown.run('verdict.classList.contains("flash")')
-    assert 'Ada' in shown.text('#alerts li.ERROR small')
+    assert 'Ada' in shown.text('#alerts li[data-key=TIP_OVER-front-ERROR] small')
 
 
 def test_one_voice_at_a_time(shown: Page, robot: Live) -> None:
@@ -84,7 +92,7 @@ def test_one_voice_at_a_time(shown: Page, robot: Live) -> None:
     )
     shown.click('#arm')
     robot.pose(*STRETCHED)
-    shown.wait('document.querySelectorAll("#alerts li.ERROR").length === 2')
+    wait_for_both(shown, 'active, not acknowledged')
     shown.wait('voices.length >= 24')
     moments = shown.run('voices')
     assert moments == sorted(moments)
@@ -102,12 +110,12 @@ def test_what_is_over_stays_until_it_is_seen(shown: Page, robot: Live) -> None:
     robot.pose(*STRETCHED)
     shown.wait(f'{LEVEL} === "ERROR"')
     robot.pose(*FOLDED)
-    shown.wait(f'{CAUSE}.startsWith("over, not acknowledged")')
-    assert shown.run(LEVEL) == 'WARN'
+    shown.wait(f'{CAUSE}.startsWith("over, not acknowledged") && {LEVEL} === "WARN"')
     shown.wait('!document.getElementById("acknowledge-all").disabled')
     shown.click('#acknowledge-all')
     shown.wait(f'{CAUSE}.startsWith("over, latched until reset")')
-    shown.click('#alerts button[data-deed="reset"]')
+    # There may be two of them: it takes a moment until the arm is back.
+    shown.run('[...alerts.querySelectorAll("button[data-deed=reset]")].forEach(x => x.click())')
     shown.wait(f'{LEVEL} === "OK"')
 
 
@@ -115,11 +123,13 @@ def test_a_caution_can_be_shelved_a_danger_not(shown: Page, robot: Live) -> None
     """The page offers shelving for a caution, which is silent then; for a danger it does not."""
     robot.pose(*CLOSE)
     shown.wait(f'{LEVEL} === "WARN"')
-    shown.wait('!!document.querySelector("#alerts li.WARN button[data-deed=shelve]")')
-    shown.click('#alerts li.WARN button[data-deed="shelve"]')
-    shown.wait('document.querySelector("#alerts li.WARN").dataset.state.endsWith("shelved")')
-    assert not shown.run('document.querySelector("#alerts li.WARN").matches(".unacknowledged")')
-    shown.click('#alerts li.WARN button[data-deed="unshelve"]')
+    # Others come and go with the motion.
+    row = '#alerts li[data-key=TORQUE_LIMIT-shoulder_joint-WARN]'
+    shown.wait(f'!!document.querySelector("{row} button[data-deed=shelve]")')
+    shown.click(f'{row} button[data-deed=shelve]')
+    shown.wait(f'document.querySelector("{row}").dataset.state.endsWith("shelved")')
+    assert not shown.run(f'document.querySelector("{row}").matches(".unacknowledged")')
+    shown.click(f'{row} button[data-deed=unshelve]')
     robot.pose(*STRETCHED)
     shown.wait('!!document.querySelector("#alerts li.ERROR button[data-deed=acknowledge]")')
     assert not shown.run('!!document.querySelector("#alerts li.ERROR button[data-deed=shelve]")')
@@ -163,7 +173,7 @@ def test_no_data_cannot_be_mistaken_for_ok(shown: Page, robot: Live) -> None:
         '[getComputedStyle(verdict).backgroundImage,'
         ' document.getElementById("sign-shape").getAttribute("d")]'
     )
-    fine = shown.run(look)
+    fine = shown.wait(f'{LEVEL} === "OK" && {look}')
     robot.console.send_signal(signal.SIGSTOP)
     try:
         shown.wait(f'{LEVEL} === "STALE"')

@@ -34,7 +34,7 @@ def answer(
 ) -> http.client.HTTPResponse:
     """Return the answer to one request, read."""
     where = urlsplit(url)
-    connection = http.client.HTTPConnection(str(where.hostname), where.port, timeout=10)
+    connection = http.client.HTTPConnection(str(where.hostname), where.port, timeout=60)
     connection.request(method, path, headers={k.replace('_', '-'): v for k, v in headers.items()})
     found = connection.getresponse()
     found.read()
@@ -44,8 +44,9 @@ def answer(
 def live(url: str, query: str = '', origin: str | None = None) -> str:
     """Open the WebSocket as a page of `origin` would; return the kind of its first message."""
     where = url.replace('http', 'ws') + f'live{query}'
-    with connect(where, origin=None if origin is None else Origin(origin)) as socket:
-        return str(json.loads(socket.recv(timeout=10))['kind'])
+    page = None if origin is None else Origin(origin)
+    with connect(where, origin=page, open_timeout=60) as socket:
+        return str(json.loads(socket.recv(timeout=60))['kind'])
 
 
 @pytest.mark.parametrize('host', [EVERYWHERE, '192.168.1.5', '::', 'robot.local', ''])

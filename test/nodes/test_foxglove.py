@@ -90,7 +90,8 @@ def bridge(live: Live) -> Bridge:
 @contextmanager
 def connected(live: Live, bridge: Bridge) -> Iterator[Client]:
     """Give a client of the bridge."""
-    with connect(f'ws://127.0.0.1:{bridge.port}', subprotocols=[PROTOCOL]) as found:
+    where = f'ws://127.0.0.1:{bridge.port}'
+    with connect(where, subprotocols=[PROTOCOL], open_timeout=60) as found:
         yield Client(live, found)
 
 
@@ -150,6 +151,7 @@ def test_a_topic_that_is_gone_is_not_offered(live: Live, bridge: Bridge) -> None
 
 def test_a_client_cannot_publish(live: Live, bridge: Bridge) -> None:
     """Not what it advertises, not without; the robot hears nothing."""
+    live.alone()
     heard: list[JointState] = []
     robot: Node = live.add(Node('robot'))
     robot.create_subscription(JointState, 'joint_states', heard.append, 10)
@@ -196,9 +198,9 @@ def test_a_client_cannot_set_parameters_or_call_services(live: Live, bridge: Bri
 
 def test_only_this_machine_is_heard(bridge: Bridge) -> None:
     """It listens on 127.0.0.1 alone: another address of the same machine is refused."""
-    socket.create_connection(('127.0.0.1', bridge.port), 2.0).close()
+    socket.create_connection(('127.0.0.1', bridge.port), 60.0).close()
     with pytest.raises(OSError, match='refused'):
-        socket.create_connection(('127.0.0.2', bridge.port), 2.0)
+        socket.create_connection(('127.0.0.2', bridge.port), 60.0)
 
 
 def test_a_port_that_is_taken_is_one_line(bridge: Bridge) -> None:

@@ -168,12 +168,12 @@ def test_a_loop_begins_again_and_the_clock_with_it(live: Live, tmp_path: Path) -
         clocks.append(message.clock.sec * NS + message.clock.nanosec)
 
     node.create_subscription(Clock, '/clock', on_clock, 1000)
-    playing = player(live, Play(path, loop=True, clock=True, rate=5.0))
+    playing = player(live, Play(path, loop=True, clock=True))
 
     def third_time(_: float) -> None:
         stop.asked = playing.published >= 2.5 * len(sent)
 
-    playing.wait_for_subscribers(Stop(), 0.0)
+    playing.wait_for_subscribers(Stop())
     playing.run(stop, third_time)
     live.until(lambda: len(heard) == playing.published)
     assert heard[: 2 * len(sent)] == sent * 2

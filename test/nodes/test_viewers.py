@@ -24,9 +24,9 @@ PANELS = {'3D', 'DiagnosticSummary', 'RawMessages', 'StateTransitions', 'Plot'}
 @pytest.fixture
 def robot(live: Live) -> Driver:
     """Return a driver beside a running monitor."""
-    live.monitor()
-    driver = live.driver()
+    monitor, driver = live.monitor(), live.driver()
     live.until(driver.connected)
+    live.until(lambda: {p.topic_name for p in monitor.publishers} <= topics(driver).keys())
     return driver
 
 
