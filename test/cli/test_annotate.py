@@ -114,9 +114,9 @@ def test_margins_are_the_columns_of_the_evaluation(failed: Path) -> None:
         stamp = torque.header.stamp
         assert stamp.sec * 10**9 + stamp.nanosec == int(row['stamp_ns'])
         for k, name in enumerate(torque.name):
-            assert repr(torque.position[k]) == row[f'{name}_position']
-            assert repr(torque.effort[k]) == row[f'{name}_static_torque']
-            assert repr(margin.effort[k]).removeprefix('inf') == row[f'{name}_torque_margin']
+            assert repr(torque.position[k]) == row[f'{name}_position_rad']
+            assert repr(torque.effort[k]) == row[f'{name}_static_torque_nm']
+            assert repr(margin.effort[k]).removeprefix('inf') == row[f'{name}_torque_margin_nm']
         assert tuple(tip.name) == SIDES
         for k, side in enumerate(SIDES):
             assert repr(tip.effort[k]) == row[f'{side}_moment_nm']

@@ -21,6 +21,8 @@ MAIN = 'from ugv_acceptance.cli import main; main()'
 NAMES = ['turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint']
 FOLDED = (0.0, math.radians(120.0), math.radians(-140.0), math.pi)
 STRETCHED = (0.0, 0.0, 0.0, math.pi)
+# What the name of a column of numbers ends with.
+UNITS = ('_s', '_ns', '_rad', '_deg', '_nm', '_j', '_m')
 COVARIANCES = ((1e-4, *(0.0,) * 8),) * 3
 
 
@@ -146,11 +148,12 @@ def test_csv_has_one_row_a_message(tmp_path: Path) -> None:
     rows: list[dict[str, Any]] = list(csv.DictReader(table.read_text().splitlines()))
     assert len(rows) == 300 + 150
     assert rows[0]['state'] == 'unknown'
-    assert rows[0]['shoulder_joint_torque_margin'] == ''
+    assert not {n for n in rows[0] if n != 'state' and not n.endswith(UNITS)}
+    assert rows[0]['shoulder_joint_torque_margin_nm'] == ''
     known = [row for row in rows if row['state'] != 'unknown']
     assert len(known) == len(rows) - 1
     result = json.loads(found.read_text())
-    least = min(float(row['shoulder_joint_torque_margin']) for row in known)
+    least = min(float(row['shoulder_joint_torque_margin_nm']) for row in known)
     assert least == result['torque']['shoulder_joint']['min_margin']
     side = min(float(row[f'{result["stability"]["edge"]}_angle_deg']) for row in known)
     assert side == pytest.approx(result['stability']['min_angle_deg'], rel=1e-12)

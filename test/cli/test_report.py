@@ -241,7 +241,7 @@ def test_parquet_has_the_margins_of_the_csv(papers: Path) -> None:
     with (papers / 'packbot_gap.csv').open() as lines:
         rows = list(csv.DictReader(lines))
     assert table.num_rows == len(rows)
-    name = 'shoulder_joint_static_torque'
+    name = 'shoulder_joint_static_torque_nm'
     told = [float(row[name]) if row[name] else None for row in rows]
     assert table[name].to_pylist() == told
     assert None in told

@@ -13,7 +13,11 @@ import numpy as np
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import SIDES, STATES
+
+# Units of columns, of a joint that turns and of one that slides.
+POSITION, TORQUE = ('rad', 'm'), ('nm', 'n')
 
 
 def write_json(path: Path, result: object) -> None:
@@ -99,14 +103,14 @@ class CsvSink:
         return [] if self._file is None else [self._write]
 
     def _header(self) -> list[str]:
-        names = self._settings.robot.joint_names
+        robot = self._settings.robot
         return [
             'time_s',
             'stamp_ns',
             'state',
-            *(f'{name}_position' for name in names),
-            *(f'{name}_static_torque' for name in names),
-            *(f'{name}_torque_margin' for name in names),
+            *joint_columns(robot, 'position', POSITION),
+            *joint_columns(robot, 'static_torque', TORQUE),
+            *joint_columns(robot, 'torque_margin', TORQUE),
             *(f'{side}_angle_deg' for side in SIDES),
             *(f'{side}_moment_nm' for side in SIDES),
             *(f'{side}_energy_j' for side in SIDES),
@@ -134,6 +138,15 @@ class CsvSink:
                 f'{time:.9f},{stamp},{state},{",".join(map(_cell, numbers))}\n'
                 for time, stamp, state, numbers in lines
             )
+
+
+def joint_columns(robot: Robot, what: str, units: tuple[str, str]) -> list[str]:
+    """Return the name of a column for each joint, with the unit of one that turns or slides."""
+    turns, slides = units
+    return [
+        f'{name}_{what}_{slides if robot.joint(name).kind == "prismatic" else turns}'
+        for name in robot.joint_names
+    ]
 
 
 def _cell(number: Any) -> str:  # noqa: ANN401 - a float

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.result import unwritable
+from ugv_acceptance.bag.result import POSITION, TORQUE, joint_columns, unwritable
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES, STATES
@@ -73,13 +73,13 @@ class ParquetSink:
             raise unwritable(self._path or Path(), error.strerror) from None
 
     def _columns(self, rows: MarginRows) -> dict[str, Any]:
-        names, states = self._settings.robot.joint_names, np.array(STATES)
+        robot, states = self._settings.robot, np.array(STATES)
         numbers = {
-            **_named(rows.q, names, 'position'),
-            **_named(rows.torque, names, 'static_torque'),
-            **_named(rows.angle, SIDES, 'angle_rad'),
-            **_named(rows.moment, SIDES, 'moment_nm'),
-            **_named(rows.energy, SIDES, 'energy_j'),
+            **_named(rows.q, joint_columns(robot, 'position', POSITION)),
+            **_named(rows.torque, joint_columns(robot, 'static_torque', TORQUE)),
+            **_named(rows.angle, [f'{side}_angle_rad' for side in SIDES]),
+            **_named(rows.moment, [f'{side}_moment_nm' for side in SIDES]),
+            **_named(rows.energy, [f'{side}_energy_j' for side in SIDES]),
             'zmp_m': rows.zmp,
         }
         return {
@@ -91,5 +91,5 @@ class ParquetSink:
         }
 
 
-def _named(table: Any, names: tuple[str, ...], what: str) -> dict[str, Any]:  # noqa: ANN401
-    return {f'{name}_{what}': table[:, k] for k, name in enumerate(names)}
+def _named(table: Any, names: list[str]) -> dict[str, Any]:  # noqa: ANN401
+    return {name: table[:, k] for k, name in enumerate(names)}

@@ -20,7 +20,8 @@ WORDS = {
         'stop; check that the robot stands on its tracks',
     ),
     'STATIC_MODEL': (
-        '{subject} moves at {peak:.2f} {rate}; the static model was shown to hold to {limit:.2f}',
+        '{subject} moves at {peak:.2f} {rate}; '
+        'the static model was shown to hold to {limit:.2f} {rate}',
         'move the joint more slowly',
     ),
     'SLIDE': (

@@ -31,7 +31,7 @@ MEANINGS = {
     'INPUT_STALE': 'Messages of a sensor have stopped: no margin is known.',
     'INPUT_INCOMPLETE': 'A joint is missing from the messages: no margin is known.',
     'INPUT_INVALID': 'A sensor sends numbers that cannot be true.',
-    'ENCODER_FROZEN': 'A joint tells no motion while its effort changes: its position may be wrong.',
+    'ENCODER_FROZEN': 'A joint tells no motion while its effort changes: is its position true?',
     'POSITION_LEAP': 'A position jumps: wrong unit, or two robots tell of one joint.',
     'IMU_FRAME': 'Another IMU than the one that was set up: tilt cannot be trusted.',
     'IMU_ORIENTATION': 'The IMU tells an orientation it does not know.',
