@@ -28,6 +28,8 @@ from ugv_acceptance.nodes.status import verdict_of
 PACKBOT = load().settings
 FOLDED = (0.0, 2.0, -2.5, 2.0)
 STRETCHED = (0.0, 0.0, 0.0, 2.0)
+# 3.6 degrees past its tipping point.
+NEARER = (0.0, 0.3, 0.2, 2.0)
 DOWN = (0.0, 0.0, -9.81)
 
 
@@ -76,6 +78,25 @@ def test_advice_comes_without_holding_up_a_message() -> None:
     verdict = verdict_of(session)
     assert verdict.values['do'] == verdict.values['advice_1']
     assert verdict.values['class'] in {'physical / effector', 'human / interaction'}
+
+
+def test_the_verdict_tells_the_margin_of_now() -> None:
+    """A robot that was worse a moment ago is told the same as one that was not."""
+    said = []
+    for before in ((), (STRETCHED,)):
+        session = session_with()
+        for q in (*before, NEARER):
+            # An input that is late for a moment is said first.
+            wait_until(lambda q=q: _tells(session, q), lambda q=q: give(session, q))  # noqa: B023
+        said.append(verdict_of(session).message.split(' (and ')[0])
+    assert said[0] == said[1]
+    assert raised(session, 'TIP_OVER', level=ERROR)[0].peak > math.radians(9.0)
+
+
+def _tells(session: Session, q: tuple[float, ...]) -> bool:
+    margins = session.evaluator.margins
+    there = margins is not None and margins.q == q
+    return there and 'past its tipping point' in verdict_of(session).message
 
 
 def test_a_robot_that_slides_before_it_tips_is_told() -> None:

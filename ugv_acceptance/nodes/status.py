@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ugv_acceptance.evaluation.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, WARN, Alert
@@ -77,13 +77,25 @@ def _worst(
     first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
     do = counsel.do(first)
-    text = f'{session.faults.sentence(first, session.settings)}{more}; {left}; {do}'
+    text = f'{session.faults.sentence(_now(first, session), session.settings)}{more}; {left}; {do}'
     own = {
         **_named(first),
         'do': do,
         'acknowledged': all(map(follower.acknowledged, active)),
     }
     return Status(session.level, '', text, own | values)
+
+
+def _now(alert: Alert, session: Session) -> Alert:
+    """Return an alert with the margin of now in place of its worst: is it getting better?"""
+    code, subject = alert.rule.code, alert.rule.subject
+    margins, names = session.evaluator.margins, session.settings.robot.joint_names
+    peak = math.nan
+    if margins is not None and code == 'TORQUE_LIMIT' and subject in names:
+        peak = abs(margins.torque[names.index(subject)])
+    elif margins is not None and code == 'TIP_OVER' and subject in SIDES:
+        peak = -float(margins.stability.angle[SIDES.index(subject)])
+    return alert if math.isnan(peak) else replace(alert, peak=peak)
 
 
 def _over(session: Session, alarm: Alarm, left: str, values: dict[str, object]) -> Status:
