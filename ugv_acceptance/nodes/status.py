@@ -87,7 +87,7 @@ def _worst(
 
 
 def _now(alert: Alert, session: Session) -> Alert:
-    """Return an alert with the margin of now in place of its worst: is it getting better?"""
+    """Return an alert with the margin of now in place of its worst."""
     code, subject = alert.rule.code, alert.rule.subject
     margins, names = session.evaluator.margins, session.settings.robot.joint_names
     peak = math.nan
