@@ -111,6 +111,9 @@ def test_junit_has_a_case_a_criterion(papers: Path, name: str) -> None:
     assert document.tests == len(verdicts)
     assert document.failures == verdicts.count('FAIL')
     assert document.errors == verdicts.count('INCONCLUSIVE')
+    told = [case.system_out.splitlines() for suite in document for case in suite]
+    assert all(line.startswith('measured: ') for _, line, *_ in told)
+    assert all(len(lines) == len(set(lines)) for lines in told)
 
 
 class Outside(HTMLParser):

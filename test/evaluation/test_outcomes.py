@@ -86,7 +86,13 @@ def test_a_number_of_the_data_may_be_at_its_bound(least: float, most: float, ver
     data = {**COVERED, 'inputs': {'imu': {'rate_hz': 50.0}, 'joint_states': {'rate_hz': None}}}
     found = judged(DataDemand('rate', 'imu', least, most), data=data)['criteria']['results'][0]
     assert found['verdict'] == verdict
-    assert found['measured'] == {'quantity': 'rate', 'unit': 'Hz', 'values': {'imu': 50.0}}
+    assert found['measured'] == {
+        'quantity': 'rate',
+        'unit': 'Hz',
+        'least': least,
+        'most': most if math.isfinite(most) else None,
+        'values': {'imu': 50.0},
+    }
     if verdict != 'PASS':
         assert found['reason'].startswith('it: imu 50 Hz; rate of imu at least ')
     both = judged(DataDemand('rate', least=least), data=data)['criteria']['results'][0]

@@ -11,6 +11,8 @@ from rich.markup import escape
 from rich.progress import Progress, TextColumn
 from rich.table import Table
 
+from ugv_acceptance.report.numbers import doubts_of, missing_text
+
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
@@ -63,6 +65,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    for doubt in doubts_of(result):
+        console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
     if result['criteria']['path'] is not None:
         _print_criteria(result['criteria']['results'], console)
     console.print(_margins(result))
@@ -124,9 +128,12 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
         source = result['inputs'][key]
         rate = source['rate_hz']
         faults = ', '.join([*source['faults'], *_malformed(source)])
+        missing = missing_text(source, coverage['duration_s'])
+        count = source['messages']
         console.print(
-            f'  {escape(str(source["topic"]))}: {source["messages"]} messages'
+            f'  {escape(str(source["topic"]))}: {count} message{"s" * (count != 1)}'
             + (f' at {rate:.0f} Hz' if rate else '')
+            + (f', {missing}' if missing else '')
             + _gaps(source)
             + (f'; {escape(faults)}' if faults else ''),
             soft_wrap=True,

@@ -5,6 +5,7 @@ bound of its uncertainty.
 """
 
 from collections.abc import Callable, Sequence
+from math import isfinite
 
 from ugv_acceptance.evaluation.alerts import LEVELS, Alert
 from ugv_acceptance.evaluation.criteria import (
@@ -120,6 +121,8 @@ def _judge_data(criterion: Criterion, findings: Findings) -> Outcome:
     measured: Json = {
         'quantity': demand.quantity,
         'unit': unit_of(demand.quantity),
+        'least': demand.least if isfinite(demand.least) else None,
+        'most': demand.most if isfinite(demand.most) else None,
         'values': found,
     }
     unmet = {k: x for k, x in found.items() if x is None or not demand.least <= x <= demand.most}

@@ -20,8 +20,7 @@ WORDS = {
         'stop; check that the robot stands on its tracks',
     ),
     'STATIC_MODEL': (
-        '{subject} moves at {peak:.2f} {rate}; '
-        'the static model was shown to hold to {limit:.2f} {rate}',
+        '{subject} moves at {peak:.2f} {rate}; the static model holds to {limit:.2f} {rate}',
         'move the joint more slowly',
     ),
     'SLIDE': (

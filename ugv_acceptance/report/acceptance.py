@@ -10,8 +10,10 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.strips import Strips
 from ugv_acceptance.report.numbers import (
     bound_text,
+    doubts_of,
     interval_text,
     limit_text,
+    missing_text,
     number_text,
     seconds_text,
     worst_text,
@@ -58,11 +60,13 @@ def acceptance_page(
         limit=limit_text,
         bound=bound_text,
         interval=interval_text,
+        missing=missing_text,
     )
     entered = result['identity']
     return environment.get_template('acceptance.html').render(
         result=result,
         marks=MARKS,
+        doubts=doubts_of(result),
         closing=CLOSING[result['verdict']],
         identity=[(words, entered.get(key)) for key, words in parts.items()],
         inputs=[(key, result['inputs'][key]) for key in ('joint_states', 'imu')],

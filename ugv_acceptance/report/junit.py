@@ -6,6 +6,8 @@ from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
+from ugv_acceptance.report.numbers import worst_text
+
 Json = dict[str, Any]
 # What XML 1.0 cannot hold, even escaped.
 _FORBIDDEN = re.compile('[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]')
@@ -42,7 +44,9 @@ def _case(outcome: Json, suite: str) -> TestCase:
         case.result = [Failure(reason, 'FAIL')]
     elif outcome['verdict'] != 'PASS':
         case.result = [Error(reason, outcome['verdict'])]
-    case.system_out = _clean('\n'.join([outcome['demand'], reason, *outcome['evidence']]))
+    measured = f'measured: {worst_text(outcome["measured"])}'
+    lines = dict.fromkeys([outcome['demand'], measured, outcome['reason'], *outcome['evidence']])
+    case.system_out = _clean('\n'.join(lines))
     return case
 
 

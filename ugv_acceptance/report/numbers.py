@@ -6,6 +6,8 @@ Json = dict[str, Any]
 DASH = '\N{EN DASH}'
 # Numbers of the data that are shares of a whole.
 SHARES = ('coverage', 'protected')
+# Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
+MISSING, HEAVIER = 0.05, 0.2
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
@@ -29,18 +31,23 @@ def _in_unit(value: float | None, measured: Json) -> str:
     return f'{value:.{measured.get("digits", 4)}g} {measured["unit"]}'.strip()
 
 
+def _data_text(value: float | None, measured: Json) -> str:
+    if value is None:
+        return DASH
+    if measured['quantity'] in SHARES:
+        return f'{value:.1%}'
+    return f'{value:.4g} {measured["unit"]}'.strip()
+
+
 def worst_text(measured: Json) -> str:
     """Return what a criterion measured: the worst value, or the numbers of its kind."""
     if 'signal' in measured:
         return _in_unit(measured['worst'], measured)
     if 'values' in measured:
         pairs = measured['values'].items()
-        share = measured['quantity'] in SHARES
-        texts = (DASH if x is None else f'{x:.1%}' if share else f'{x:.4g}' for _, x in pairs)
-        named = zip(measured['values'], texts, strict=True)
         several = len(measured['values']) > 1
-        joined = ', '.join(f'{name} {text}' if several else text for name, text in named)
-        return f'{joined} {measured["unit"]}'.strip()
+        texts = ((name, _data_text(x, measured)) for name, x in pairs)
+        return ', '.join(f'{name} {text}' if several else text for name, text in texts)
     if 'share' in measured:
         return f'{measured["visited"]} of {measured["cells"]} cells ({measured["share"]:.1%})'
     count = measured['alerts']
@@ -49,6 +56,11 @@ def worst_text(measured: Json) -> str:
 
 def limit_text(measured: Json) -> str:
     """Return the limit of a value; a dash for other criteria, whose demand is a sentence."""
+    if 'least' in measured or 'most' in measured:
+        pairs = (('at least', measured['least']), ('at most', measured['most']))
+        return ', '.join(
+            f'{words} {_data_text(bound, measured)}' for words, bound in pairs if bound is not None
+        )
     if 'signal' not in measured:
         return DASH
     return f'{measured["must_be"]} {_in_unit(measured["limit"], measured)}'
@@ -58,6 +70,25 @@ def bound_text(measured: Json) -> str:
     """Return the uncertainty of a worst value; a dash where none is known."""
     bound = measured.get('uncertainty')
     return DASH if not bound else _in_unit(bound['bound'], {**measured, 'digits': 2})
+
+
+def missing_text(source: Json, duration: float) -> str:
+    """Return which share of an input's messages is missing by its rate; empty: hardly any."""
+    expected = (source['rate_hz'] or 0.0) * duration
+    share = 1.0 - source['messages'] / expected if expected else 0.0
+    return f'{share:.0%} missing' if share > MISSING else ''
+
+
+def doubts_of(result: Json) -> list[str]:
+    """Return what was measured that speaks against the margins, a sentence each."""
+    load = result['model_check']['payload']
+    if load is None or load['low'] < HEAVIER:
+        return []
+    text = (
+        f'efforts at rest tell of {load["value"]:.2f} kg more in the hand than declared (95 %: '
+        f'{load["low"]:.2f} to {load["high"]:.2f} kg): margins are smaller, or efforts are wrong'
+    )
+    return [text]
 
 
 def interval_text(found: Json | None, unit: str = '') -> str:
