@@ -222,7 +222,9 @@ def test_a_place_without_runs_is_one_line(place: str, text: str, tmp_path: Path)
 
 def test_groups_are_compared(fleet: Path, tmp_path: Path) -> None:
     """Two groups stand beside each other with p and power."""
-    campaign(tmp_path, fleet, '--compare', 'good=*/good_*', '--compare', 'other=*/tips')
+    _, text = campaign(tmp_path, fleet, '--compare', 'good=*/good_*', '--compare', 'other=*/tips')
+    assert 'other over good 0: no difference shown at 80%' in ' '.join(text.split())
+    assert 'MTBF of other over that of good: 0.00' in (tmp_path / 'campaign.html').read_text()
     found = said(tmp_path)['comparison']
     assert [group['failures'] for group in found['groups']] == [0, 1]
     assert 0.0 < found['mtbf']['p'] <= 1.0

@@ -65,9 +65,15 @@ def _check(groups: Sequence[tuple[str, str]], members: Sequence[Sequence[Row]]) 
             raise AcceptanceError(
                 f'--compare {name}={pattern}: expected runs with judged time, got {len(runs)} runs'
             )
-    both = {run.name for run in members[0]} & {run.name for run in members[1]}
-    if both:
-        raise AcceptanceError(f'--compare: expected each run in one group, {min(both)} is in both')
+    second = {run.name for run in members[1]}
+    both = min(
+        (run for run in members[0] if run.name in second), key=lambda r: r.name, default=None
+    )
+    if both is not None:
+        copies = f' (it is also {", ".join(both.also)})' if both.also else ''
+        raise AcceptanceError(
+            f'--compare: expected each run in one group, {both.name}{copies} is in both'
+        )
 
 
 def _json(found: Compared) -> Json:

@@ -40,7 +40,7 @@ def lines(said: Json) -> list[tuple[str, str]]:
     hours, failed, success = said['hours'], said['failures'], said['success']
     verdicts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS)
     found = [
-        ('runs', f'{runs["total"]}: {verdicts}; {runs["copies"]} copies counted once'),
+        ('runs', f'{runs["total"]}: {verdicts}; copies counted once: {runs["copies"]}'),
         ('hours', f'{hours["judged"]:.3f} judged of {hours["recorded"]:.3f} recorded'),
         (
             'failures',
@@ -58,7 +58,7 @@ def lines(said: Json) -> list[tuple[str, str]]:
     if said['requirement']:
         found.append(('requirement', requirement_text(said['requirement'], share)))
     if said['comparison']:
-        found += comparison_lines(said['comparison'])
+        found += comparison_lines(said['comparison'], said['confidence'])
     return found
 
 
@@ -111,26 +111,31 @@ def requirement_text(found: Json, share: str) -> str:
     )
 
 
-def comparison_lines(found: Json) -> list[tuple[str, str]]:
-    """Return two groups beside each other."""
-    sides = ' against '.join(
-        f'{g["name"]} {g["failures"]} failures in {g["hours"]:.3f} h, {g["passed"]} of {g["runs"]}'
-        ' passed'
-        for g in found['groups']
-    )
-    rows = [('comparison', sides)]
-    for name, key in (('MTBF ratio', 'mtbf'), ('success', 'success')):
+def comparison_lines(found: Json, confidence: float) -> list[tuple[str, str]]:
+    """Return two groups beside each other, and whether a difference was shown."""
+    first, second = found['groups']
+    rows = [('comparison', _group_text(first)), ('', _group_text(second))]
+    order = f'{second["name"]} over {first["name"]}'
+    for name, key in (('MTBF', 'mtbf'), ('odds of a pass', 'success')):
         test = found[key]
         ratio = 'unknown' if test['ratio'] is None else f'{test["ratio"]:.3g}'
-        rows.append((f'  {name}', f'ratio {ratio}, p {test["p"]:.3f}; power {test["power"]:.0%}'))
+        shown = 'a difference' if test['p'] < 1.0 - confidence else 'no difference shown'
+        text = f'{order} {ratio}: {shown} at {confidence:.0%} (p {test["p"]:.3f}; power '
+        rows.append((f'  {name}', f'{text}{test["power"]:.0%})'))
     return rows
+
+
+def _group_text(group: Json) -> str:
+    return (
+        f'{group["name"]}: {group["failures"]} failures in {group["hours"]:.3f} h,'
+        f' {group["passed"]} of {group["runs"]} passed'
+    )
 
 
 def print_effort(effort: 'Effort', runs: int, seconds: float) -> None:
     """Print how fast the runs were judged, and how many were found judged."""
     rate = 3600.0 / max(seconds, 1e-9)
-    Console(highlight=False).print(
-        f'    {effort.judged} of {runs} judged anew in {seconds:.1f} s:'
-        f' {effort.judged * rate:.0f} bags/h, {effort.size / 1e9 * rate:.2f} GB/h',
-        soft_wrap=True,
-    )
+    text = f'    {effort.judged} of {runs} judged anew in {seconds:.1f} s'
+    if effort.judged:
+        text += f': {effort.judged * rate:.0f} bags/h, {effort.size / 1e9 * rate:.2f} GB/h'
+    Console(highlight=False).print(text, soft_wrap=True)
