@@ -242,7 +242,7 @@ def test_a_monitor_killed_after_a_critical_alert_leaves_the_recording(
             lambda: list(tmp_path.glob('*/*.mcap')), lambda: driver.send((0.0, 0.0, 0.0, 2.0))
         )
         live.until(
-            lambda: next(tmp_path.glob('*/*.mcap')).stat().st_size > 10_000,
+            lambda: next(tmp_path.glob('*/*.mcap')).stat().st_size > 40_000,
             lambda: driver.send((0.0, 0.0, 0.0, 2.0)),
         )
     finally:

@@ -191,7 +191,9 @@ def test_near_misses_are_in_the_verdict(live: Live) -> None:
 
 def test_a_critical_alert_leaves_a_recording(live: Live, tmp_path: Path) -> None:
     """The black box holds both inputs and the alert, and is read as any recording."""
-    _, driver = live.running(black_box=str(tmp_path))
+    monitor, driver = live.running(black_box=str(tmp_path))
+    counts = session_of(monitor).counts
+    live.until(lambda: min(counts['imu'].taken, counts['joint_states'].taken) > 5, driver.send)
     live.until(lambda: list(tmp_path.iterdir()), lambda: driver.send(STRETCHED))
     assert change(live, Transition.TRANSITION_DEACTIVATE)
     (folder,) = tmp_path.iterdir()
