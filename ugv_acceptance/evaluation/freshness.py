@@ -56,18 +56,22 @@ class Freshness:
 
     def clocks(self, times: Times, stamps: Times) -> NDArray[np.float64]:
         """Return `clock` of many messages, to be asked before `messages`."""
-        wrong = np.abs(times - stamps) > CLOCK_SLACK
         if not len(times):
             return np.zeros(0)
-        first = times[0] if self.last is None else self.last
-        before = stamps[0] if self.last is None else self.stamp
-        step = np.diff(stamps, prepend=before) - np.diff(times, prepend=first)
-        new = np.diff(stamps, prepend=before) != 0
-        new[0] |= self.last is None
-        moved = np.maximum.accumulate(np.where(new, times, self.moved))
-        self.stamp, self.moved = int(stamps[-1]), int(moved[-1])
-        stands = times - moved > STANDSTILL
-        return np.where(wrong | stands | (np.abs(step) > CLOCK_SLACK), 1.0, 0.0)
+        ahead = times - stamps
+        wrong = np.abs(ahead) > CLOCK_SLACK
+        wrong[1:] |= np.abs(ahead[1:] - ahead[:-1]) > CLOCK_SLACK
+        if self.last is not None:
+            wrong[0] |= abs(int(ahead[0]) - (self.last - self.stamp)) > CLOCK_SLACK
+        new = np.append(self.last is None or stamps[0] != self.stamp, stamps[1:] != stamps[:-1])
+        if not new.all():
+            moved = np.maximum.accumulate(np.where(new, times, self.moved))
+            wrong |= times - moved > STANDSTILL
+            self.moved = int(moved[-1])
+        else:
+            self.moved = int(times[-1])
+        self.stamp = int(stamps[-1])
+        return np.where(wrong, 1.0, 0.0)
 
     def message(self, now: int) -> None:
         """Take the receipt time (ns) of a message."""

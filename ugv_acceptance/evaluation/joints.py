@@ -192,6 +192,9 @@ class JointMerger:
             self._fill(tables[:, :, rows], named[:, rows], segment)
             of[rows] = numbers[segment.names]
             first = rows.stop
+        for j, limits in enumerate(self._range):
+            _believe(tables[0, j], limits)
+        _believe(tables[1], (-ABSURD, ABSURD))
         if len(useful) > 1 and (np.diff(time) < 0).any():
             order = np.argsort(time, kind='stable')
             time, stamp = time[order], stamp[order]
@@ -249,15 +252,14 @@ class JointMerger:
             named[:] = False
         for j, k in layout:
             joint = self.settings.joints[j]
+            scale = joint.effort_sign * joint.effort_scale
             with np.errstate(all='ignore'):
-                q = joint.sign * segment.position[:, k] + joint.offset
-                tables[0, j] = _within(q, self._range[j])
+                q, qd, effort = tables[:, j]
+                np.add(joint.sign * segment.position[:, k], joint.offset, out=q)
                 if segment.velocity.shape[1]:
-                    qd = joint.sign * segment.velocity[:, k]
-                    tables[1, j] = _within(qd, (-ABSURD, ABSURD))
+                    np.multiply(joint.sign, segment.velocity[:, k], out=qd)
                 if segment.effort.shape[1]:
-                    scale = joint.effort_sign * joint.effort_scale
-                    tables[2, j] = scale * segment.effort[:, k]
+                    np.multiply(scale, segment.effort[:, k], out=effort)
             named[j] = True
 
     def _carry(self, time: Times, stamp: Times, tables: Floats, named: Mask) -> JointRows:
@@ -286,13 +288,11 @@ class JointMerger:
         return np.where(known, time[newest], self.seen[j])
 
 
-def _within(values: Floats, limits: tuple[float, float]) -> Floats:
-    """Return the values, NaN in place of those that cannot be believed."""
-    lower, upper = limits
-    outside = ~((values >= lower) & (values <= upper))
-    if outside.any():
-        values[outside] = np.nan
-    return values
+def _believe(values: Floats, limits: tuple[float, float]) -> None:
+    """Put NaN in place of values that cannot be believed."""
+    inside = (values >= limits[0]) & (values <= limits[1])
+    if not inside.all():
+        values[~inside] = np.nan
 
 
 def _believable(joint: Joint) -> tuple[float, float]:

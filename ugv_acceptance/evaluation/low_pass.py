@@ -68,8 +68,11 @@ class LowPass:
             since = elapsed[first] if fresh else elapsed[first] - decay[first]
             keep = np.exp(since - elapsed[first:end])
             w[:, 0] = 0.0 if fresh else last - part[:, 0]
-            w[:, 1:] = (part[:, :-1] - part[:, 1:]) / keep[:-1]
-            y[:, first:end] = part + keep * np.cumsum(w, axis=1)
+            np.subtract(part[:, :-1], part[:, 1:], out=w[:, 1:])
+            w[:, 1:] /= keep[:-1]
+            np.cumsum(w, axis=1, out=w)
+            w *= keep
+            w += part
             last = y[:, end - 1]
         self.smooth = (float(last[0]), float(last[1]), float(last[2]))
         return y

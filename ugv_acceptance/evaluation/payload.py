@@ -55,10 +55,11 @@ class PayloadHistory:
 
         What was in force before the last of `times` is forgotten.
         """
-        place = np.searchsorted(np.array(self._since), times, side='right') - 1
-        first, last = int(place[0]), int(place[-1])
+        since = np.array(self._since)
+        first, last = (np.searchsorted(since, times[[0, -1]], side='right') - 1).tolist()
         table = [(p.mass, *p.cog) for p in self._declared[first : last + 1]]
         del self._since[:last], self._declared[:last]
         if len(table) == 1:
             return table[0]
+        place = np.searchsorted(since, times, side='right') - 1
         return tuple(np.array(table)[place - first].T)

@@ -139,7 +139,7 @@ def _faces_under(tolerance: float, points: Values, place: Values, count: int) ->
     for _ in range(_TRIES):
         if not left.size:
             return patterns
-        some, at = pick((points, place), left)
+        some, at = pick((points, place), ALL if left.size == count else left)
         triple = triple_under(*sample((some, at), left.size // 2))
         if triple is None:
             break
