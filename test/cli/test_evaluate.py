@@ -34,7 +34,7 @@ def evaluate(*arguments: object) -> 'subprocess.CompletedProcess[str]':
 
 def write_run(
     folder: Path, posture: Iterable[float] = FOLDED, seconds: float = 3.0,
-    silent: tuple[float, float] = (0.0, 0.0),
+    silent: tuple[float, float] = (0.0, 0.0), names: list[str] = NAMES,
 ) -> Path:  # fmt: skip
     """Record a PackBot that stands still: joints at 50 Hz, IMU at 100 Hz but for its silence."""
     with BagWriter(folder) as bag:
@@ -47,7 +47,7 @@ def write_run(
                 still = ((0.0, 0.0, 0.7071068, 0.7071068), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
                 bag.write('/imu/data', now, imu_cdr(now, 'imu_link', *still, COVARIANCES))
             if k % 2 == 0:
-                body = joint_state_cdr(now, '', NAMES, q, [0.0] * 4, [])
+                body = joint_state_cdr(now, '', names, q, [0.0] * 4, [])
                 bag.write('/joint_states', now + MS, body)
     return folder
 
@@ -139,6 +139,14 @@ def test_less_than_a_second_is_no_pass(tmp_path: Path) -> None:
     done = evaluate(write_run(tmp_path / 'run', seconds=0.9))
     assert done.returncode == 3
     assert 'duration: 0.89 s; length of the recording at least 1 s' in done.stdout
+
+
+def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
+    """They came: who is told only of silence looks for a dead driver."""
+    done = evaluate(write_run(tmp_path / 'run', names=['a', 'b', 'c', 'd']))
+    assert done.returncode == 3
+    assert '/joint_states: 150 messages' in done.stdout
+    assert 'none tells of a joint of this robot' in done.stdout
 
 
 def test_csv_has_one_row_a_message(tmp_path: Path) -> None:

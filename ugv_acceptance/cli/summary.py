@@ -17,6 +17,8 @@ COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yello
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
 _MOST_EFFORTS = 11
+# Of so many messages a rate is told, if they can be used.
+_FEW = 100
 # Less payload (kg) than minus this is none: the arm is held up by something.
 _LIGHT = 0.1
 # What robot failures and lost data come to, the least first.
@@ -135,6 +137,7 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
             + (f' at {rate:.0f} Hz' if rate else '')
             + (f', {missing}' if missing else '')
             + _gaps(source)
+            + ('; none tells of a joint of this robot' if _foreign(key, source) else '')
             + (f'; {escape(faults)}' if faults else ''),
             soft_wrap=True,
         )
@@ -142,6 +145,11 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
         console.print(f'  salvaged: {escape(bag["salvaged"])}', soft_wrap=True)
     for finding in bag['findings'][:5]:
         console.print(f'  {escape(finding)}', soft_wrap=True)
+
+
+def _foreign(key: str, source: dict[str, Any]) -> bool:
+    """Return whether joint states came, but none that could be used: none of them had a rate."""
+    return bool(key == 'joint_states' and source['messages'] > _FEW and not source['rate_hz'])
 
 
 def _gaps(source: dict[str, Any]) -> str:
