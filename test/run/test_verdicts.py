@@ -214,4 +214,8 @@ def test_the_result_names_the_plan_and_every_step(tmp_path: Path) -> None:
     assert [s['id'] for s in result['steps']] == [s.id for s in PLAN.steps]
     assert result['verdict'] == 'INCONCLUSIVE'
     for name in ('report.txt', 'report.html'):
-        assert PLAN.sha256 in (folder.path / name).read_text()
+        text = (folder.path / name).read_text()
+        assert PLAN.sha256 in text
+        assert f'robot files sha256 {CONFIG.sha256}' in text
+        assert 'robot serial number not entered\nugv_acceptance ' in text
+    assert 'gripper empty: no limit is near, on level ground' in text

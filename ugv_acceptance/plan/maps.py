@@ -83,8 +83,7 @@ def _drawn(
             box = {'facecolor': 'white', 'edgecolor': 'black', 'pad': 1.0, 'linewidth': 0.5}
             axes.text(x, y, word, fontsize=6, ha='center', va='center', bbox=box)
     legend(made, loc='outside lower center', ncols=3)
-    caption = f'{load:g} kg in the gripper' if load else 'gripper empty: safe everywhere'
-    worst = min(float(margin.min()) - levels.caution for margin, levels in fields)
-    if not load and worst < 0.0:
-        caption = 'gripper empty'
+    caption = f'{load:g} kg in the gripper' if load else 'gripper empty'
+    if min(float(margin.min()) - levels.caution for margin, levels in fields) >= 0.0:
+        caption += ': no limit is near, on level ground'
     return {'svg': svg_of(made, f'map{load:g}'.replace('.', '_')), 'caption': caption}

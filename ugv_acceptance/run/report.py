@@ -43,6 +43,9 @@ def report_of(result: dict[str, Any]) -> str:
             result['verdict'], result['plan']['name'], result['robot']['name'], result['mode']
         ),
         f'plan sha256 {result["plan"]["sha256"]}',
+        f'robot files sha256 {result["robot"]["sha256"]}',
+        f'robot serial number {result["robot"]["serial"] or "not entered"}',
+        f'ugv_acceptance {result["software"]}',
         counts_of(result),
         '',
         *(line for step in result['steps'] for line in _step_lines(step)),
