@@ -47,7 +47,7 @@ MARGIN_SILENCE = 0.5
 _DEPTH = 400
 # Seconds between looks at what the console itself thinks of its inputs. Silence is looked at in
 # each snapshot that nothing new came for.
-_LOOK = 0.2
+_LOOK = 0.5
 
 
 class ConsoleNode(Node):

@@ -1,5 +1,5 @@
 // The list of alerts; an alert keeps its place in the document, so that a finger or the focus stays on its button.
-import { $, text, element, fixed } from './dom.js';
+import { $, text, element, fixed, say } from './dom.js';
 
 const DEEDS = { acknowledge: 'Acknowledge', shelve: 'Shelve 5 min', unshelve: 'Unshelve', reset: 'Reset' };
 const MOST = 8;
@@ -16,7 +16,7 @@ export class Alerts {
   }
 
   send(deed, key) {
-    this.ask({ do: deed, key, by: $('operator').value, note: $('note').value, for_s: 300 });
+    this.ask({ do: deed, key, by: $('operator').value, note: $('note').value, for_s: 300 }, say('alert-answer'));
   }
 
   show(frame) {
@@ -50,8 +50,9 @@ export class Alerts {
     row.dataset.state = alert.state;
     text(tag, alert.level === 'STALE' ? 'NO DATA' : alert.word);
     text(what, alert.text);
-    text(todo, alert.advice);
-    text(small, `${alert.state}, ${fixed(alert.age_s, 0)} s ago, ${alert.code} ${alert.subject}${alert.note ? `, note: ${alert.note}` : ''}`);
+    // What is over asks for its button alone.
+    text(todo, alert.active ? alert.advice : '');
+    text(small, `${alert.state}, ${fixed(alert.age_s, 0)} s ago, ${alert.code} ${alert.subject}${alert.note ? `, by ${alert.note}` : ''}`);
     const wanted = alert.offers.join(' ');
     if (buttons.dataset.offers !== wanted) {
       buttons.dataset.offers = wanted;

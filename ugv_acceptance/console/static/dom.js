@@ -12,6 +12,13 @@ export function element(tag, className, content) {
   return node;
 }
 
+// What the server answered, where it was asked, for a while.
+export const say = (id) => (answer) => {
+  const said = answer.ok ? answer.text : `refused: ${answer.text}`;
+  text($(id), said);
+  setTimeout(() => { if ($(id).textContent === said) text($(id), ''); }, 8000);
+};
+
 export const degrees = (radians) => (radians * 180) / Math.PI;
 export const fixed = (value, digits = 1) => (value === null || value === undefined ? '–' : value.toFixed(digits));
 export const nice = (name) => name.replace(/_joint$/, '').replaceAll('_', ' ');

@@ -1,5 +1,5 @@
 // The page: one WebSocket, the newest frame drawn once a screen refresh, and a watchdog of its own.
-import { $, text, nice, fixed } from './dom.js';
+import { $, text, fixed, say } from './dom.js';
 import { showVerdict, showTilt, showTorques, showInputs, showLoad } from './panels.js';
 import { Alerts } from './alerts.js';
 import { Views } from './views.js';
@@ -21,7 +21,7 @@ const playback = new Playback(ask);
 window.console_page = page; // for tests: what is known, nothing to be changed
 
 function ask(values, then) {
-  if (!page.socket || page.socket.readyState !== WebSocket.OPEN) return answer({ ok: false, text: 'not connected' });
+  if (!page.socket || page.socket.readyState !== WebSocket.OPEN) return then?.({ ok: false, text: 'not connected' });
   const number = ++page.asked;
   if (then) page.waiting.set(number, then);
   page.socket.send(JSON.stringify({ ...values, number }));
@@ -30,8 +30,7 @@ function ask(values, then) {
 function answer(message) {
   const then = page.waiting.get(message.number);
   page.waiting.delete(message.number);
-  if (then) then(message);
-  if (message.text) text($('answer'), message.ok ? message.text : `refused: ${message.text}`);
+  then?.(message);
 }
 
 function hello(message) {
@@ -120,7 +119,7 @@ $('arm').addEventListener('click', () => sound.toggle());
 $('load-form').addEventListener('submit', (event) => {
   event.preventDefault();
   const [mass_kg, x, y, z] = ['mass', 'x', 'y', 'z'].map((k) => Number($(`load-${k}`).value));
-  ask({ do: 'payload', mass_kg, cog_m: [x, y, z] });
+  ask({ do: 'payload', mass_kg, cog_m: [x, y, z] }, say('load-answer'));
 });
 connect();
 everyScreen();

@@ -38,7 +38,7 @@ export class Strips {
     }
     c.setLineDash([]); c.fillStyle = '#111';
     c.fillText(`${high}${unit}`, left - 4, top + 10); c.fillText(`${low}${unit}`, left - 4, bottom);
-    let at = left;
+    let at = 4;
     names.forEach((name, k) => {
       if (name === null) return;
       const [colour, dash] = LINES[k % LINES.length];
