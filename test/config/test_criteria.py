@@ -144,6 +144,12 @@ REFUSED = [
     ('alert: TIP_OVER', 'expected "expect: raised" or "expect: absent"'),
     ('data: coverage', 'expected at_least, at_most or both'),
     ('data: coverage, at_least: 1, between_s: [0, 1]', 'between_s: .* the whole recording'),
+    ('data: coverage, at_least: 95', 'at_least: expected a share from 0 to 1, got 95'),
+    ('data: protected, at_most: -1', 'at_most: expected a share from 0 to 1, got -1'),
+    (
+        'map: [shoulder_joint, elbow_joint], cell_deg: 3, at_least: 5',
+        'at_least: expected a share from 0 to 1, got 5',
+    ),
     ('data: rate, of: imus, at_least: 1', 'of: .* did you mean imu'),
     ('map: [shoulder_joint], at_least: 1, cell_deg: 3', 'map: expected the names of two joints'),
     ('map: [shoulder_joint, elbow_joint], cell_deg: 3', 'expected at_least'),

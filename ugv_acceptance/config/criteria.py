@@ -245,10 +245,19 @@ def _data(reading: _Reading, section: CriterionSection) -> Demand:
         reading.known('of', section.of, INPUTS if DATA[quantity].each_input else ('run',))
     if section.at_least is None and section.at_most is None:
         raise reading.refuse('', 'expected at_least, at_most or both')
+    if DATA[quantity].share:
+        _check_shares(reading, section)
     least = -math.inf if section.at_least is None else section.at_least
     most = math.inf if section.at_most is None else section.at_most
     of = section.of if DATA[quantity].each_input else None
     return DataDemand(quantity, of, least, most, section.otherwise == 'FAIL')
+
+
+def _check_shares(reading: _Reading, section: CriterionSection) -> None:
+    """Refuse 90 for 90 %: nothing would ever meet it."""
+    for key, value in (('at_least', section.at_least), ('at_most', section.at_most)):
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise reading.refuse(key, f'expected a share from 0 to 1, got {value:g}')
 
 
 def _map(reading: _Reading, section: CriterionSection) -> Demand:
@@ -259,6 +268,7 @@ def _map(reading: _Reading, section: CriterionSection) -> Demand:
     joints = [robot.joint(reading.known('map', name, robot.joint_names)) for name in names]
     if section.at_least is None:
         raise reading.refuse('', 'expected at_least, the share of the cells to visit')
+    _check_shares(reading, section)
     if len({joint.kind == 'prismatic' for joint in joints}) > 1 or section.cell is None:
         raise reading.refuse('cell', 'expected one cell size, for two joints of one kind')
     x, y = (_range(reading, joint) for joint in joints)

@@ -11,12 +11,13 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number of the whole run (`of` None), or one of each input."""
+    """A number of the whole run (`of` None), or one of each input; a `share` is from 0 to 1."""
 
     of: Callable[[Json], float | None]
     words: str
     unit: str = ''
     each_input: bool = False
+    share: bool = False
 
 
 def _shares(protected: str) -> float:
@@ -24,10 +25,12 @@ def _shares(protected: str) -> float:
 
 
 DATA = {
-    'coverage': Quantity(lambda r: r['coverage']['fraction'], 'share of the recording evaluated'),
+    'coverage': Quantity(
+        lambda r: r['coverage']['fraction'], 'share of the recording evaluated', share=True
+    ),
     'duration': Quantity(lambda r: r['coverage']['duration_s'], 'length of the recording', 's'),
     'protected': Quantity(
-        lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum'
+        lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum', share=True
     ),
     'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'files that break off'),
     'lost_messages': Quantity(
