@@ -101,7 +101,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'only efforts above ten are held to the largest of the run',
     ('evaluation/comparison.py', '_sign', 'scale.value[0] > 0.0 -> scale.value[0] >= 0.0'):
         'a scale of zero is unknown before',
-    ('evaluation/advice.py', '_load', 'mass <= 0.0 -> mass < 0.0'):
+    ('evaluation/advice.py', '_loads',
+     'cases[0].payload.mass <= 0.0 -> cases[0].payload.mass < 0.0'):
         'an empty hand gains nothing by being emptied',
 }  # fmt: skip
 
