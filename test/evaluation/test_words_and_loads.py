@@ -53,7 +53,7 @@ BELOW = 'static torque (magnitude) of lift below 30 N m'
         (AlertDemand(raised=False), 'no alert'),
         (AlertDemand(raised=False, level='ERROR'), 'no ERROR alert'),
         (AlertDemand(raised=True), 'any alert raised'),
-        (DataDemand('coverage', least=0.9), 'at least 0.9'),
+        (DataDemand('coverage', least=0.9), 'at least 90%'),
         (DataDemand('rate', of='imu', least=10.0, most=90.0),
          'rate of imu at least 10 and at most 90 Hz'),
         (DataDemand('longest_gap', most=0.2), 'at most 0.2 s'),

@@ -73,11 +73,11 @@ def _alert_words(demand: AlertDemand) -> str:
 
 def _data_words(demand: DataDemand) -> str:
     quantity = DATA[demand.quantity]
-    bounds = []
-    if demand.least > -math.inf:
-        bounds.append(f'at least {demand.least:g}')
-    if demand.most < math.inf:
-        bounds.append(f'at most {demand.most:g}')
+    bounds = [
+        f'{word} {100.0 * bound:g}%' if quantity.share else f'{word} {bound:g}'
+        for word, bound in (('at least', demand.least), ('at most', demand.most))
+        if math.isfinite(bound)
+    ]
     of = f' of {demand.of}' if demand.of else ''
     return f'{quantity.words}{of} {" and ".join(bounds)} {quantity.unit}'.strip()
 
