@@ -1,6 +1,7 @@
 """Run a node until it is interrupted: a bounded loop on the events executor, a clean end.
 
-EventsExecutor.spin() without a timeout burns a core and hears no signal, so it is given one.
+EventsExecutor hears a signal only when a callback runs, so a timer has one run twice a second. Each
+call of it leaks some bytes: it is called once an hour.
 """
 
 import gc
@@ -15,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -26,6 +29,8 @@ from ugv_acceptance import AcceptanceError
 BAD_INPUT = 2
 # Seconds after which a signal is heard at the latest.
 PATIENCE = 0.5
+# Seconds that the executor is given; without a limit it never ends.
+LONG = 3600.0
 # Seconds after which a thread gives the interpreter to one that waits.
 TURN = 0.0002
 # Fast DDS takes its transports from this, or from a file of profiles under its new or old name.
@@ -109,17 +114,24 @@ def end(node: Node) -> None:
 
 def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
     """Spin until the process is asked to stop, or `until` says so (asked twice a second)."""
-    executor = EventsExecutor()
+    executor, over = EventsExecutor(), Future()
+
+    def look() -> None:
+        if stop.asked or not ok() or until():
+            over.set_result(None)
+
+    # Steady: a frozen /clock must not keep the process from ending.
+    timer = node.create_timer(PATIENCE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
     executor.add_node(node)
     # What is there now stays: the garbage collector need not look through it between messages.
     gc.collect()
     gc.freeze()
     # A message must not wait the usual 5 ms for a thread that works out advice.
     sys.setswitchinterval(TURN)
-    never: Future = Future()
     try:
-        while ok() and not stop.asked and not until():
-            executor.spin_until_future_complete(never, timeout_sec=PATIENCE)
+        while not over.done():
+            executor.spin_until_future_complete(over, timeout_sec=LONG)
     finally:
         executor.remove_node(node)
         executor.shutdown()
+        node.destroy_timer(timer)
