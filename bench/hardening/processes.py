@@ -29,5 +29,8 @@ def mutation(share: float) -> Iterable[Outcome]:
     if found is None:
         yield Outcome(f'broke off: {done.stderr.strip().splitlines()[-1:]}', held=False)
         return
+    # Those that live are to be read.
+    for line in re.findall(r'^survived.*', done.stderr, re.MULTILINE):
+        print(line, file=sys.stderr, flush=True)
     dead, tried = map(int, found.groups())
     yield Outcome(f'{dead} of {tried} killed ({dead / tried:.0%})', dead / tried >= 0.85)
