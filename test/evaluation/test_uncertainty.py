@@ -182,3 +182,13 @@ def test_a_joints_offset_moves_its_own_position_and_nothing_else_does(
         expected = [0.0] * len(q)
     found = effects_of(SETTINGS, [source], q, GRAVITY, PAYLOAD).position
     assert found[0] == pytest.approx(expected)
+
+
+@each_posture
+@each_source
+def test_an_imu_that_is_off_tilts_and_nothing_else_does(
+    source: Source, q: tuple[float, ...]
+) -> None:
+    """By its own angle, in every posture."""
+    expected = source.value if source.subject == 'imu' else 0.0
+    assert effects_of(SETTINGS, [source], q, GRAVITY, PAYLOAD).tilt[0] == expected
