@@ -96,9 +96,8 @@ def choose_transport(environment: MutableMapping[str, str]) -> None:
     Its queues are locked between processes: one that stops or dies holds up whoever publishes.
     """
     chosen = {environment[name] for name in (TRANSPORT, *PROFILES) if name in environment}
-    if chosen - {UDP, LOOPBACK} or not get_rmw_implementation_identifier().startswith(
-        'rmw_fastrtps'
-    ):
+    fast_dds = get_rmw_implementation_identifier().startswith('rmw_fastrtps')
+    if chosen - {UDP, LOOPBACK} or not fast_dds:
         return
     if environment.get(RANGE) == 'LOCALHOST' and not environment.get('ROS_STATIC_PEERS'):
         # This range brings shared memory of its own, whatever the transports are.

@@ -2,10 +2,10 @@
 
 from typing import Any
 
+from ugv_acceptance.evaluation.data_quality import DATA
+
 Json = dict[str, Any]
 DASH = '\N{EN DASH}'
-# Numbers of the data that are shares of a whole.
-SHARES = ('coverage', 'protected')
 # Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
 MISSING, HEAVIER = 0.05, 0.2
 
@@ -34,7 +34,7 @@ def _in_unit(value: float | None, measured: Json) -> str:
 def _data_text(value: float | None, measured: Json) -> str:
     if value is None:
         return DASH
-    if measured['quantity'] in SHARES:
+    if DATA[measured['quantity']].share:
         return f'{value:.1%}'
     return f'{value:.4g} {measured["unit"]}'.strip()
 
