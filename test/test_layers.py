@@ -93,7 +93,7 @@ IMPURE_MODULES = {
 }
 IMPURE_CALLS = {'open', 'print', 'input'}
 
-LONGEST_MODULE = 300
+LONGEST_MODULE = 400
 LONGEST_FUNCTION = 40
 # 'module' or 'module:function' -> the reason why it is longer.
 LONGER: dict[str, str] = {}
@@ -237,7 +237,7 @@ def test_the_pure_part_reads_no_clock_file_or_logger(path: Path) -> None:
 
 @each_module
 def test_a_module_is_short(path: Path) -> None:
-    """A module has at most 300 lines, unless LONGER gives the reason."""
+    """A module has at most 400 lines, unless LONGER gives the reason."""
     lines = len(path.read_text(encoding='utf-8').splitlines())
     assert lines <= LONGEST_MODULE or name_of(path) in LONGER, f'{name_of(path)}: {lines} lines'
 
