@@ -30,6 +30,11 @@ def generate_launch_description() -> LaunchDescription:
                 default_value='true',
                 description='configure and activate at once; false: a lifecycle manager does',
             ),
+            DeclareLaunchArgument(
+                'lock_parameters',
+                default_value='false',
+                description='true: no limit or delay can be set while the monitor is active',
+            ),
             LifecycleNode(
                 package='ugv_acceptance',
                 executable='acceptance_monitor',
@@ -45,6 +50,9 @@ def generate_launch_description() -> LaunchDescription:
                         ),
                         'autostart': ParameterValue(
                             LaunchConfiguration('autostart'), value_type=bool
+                        ),
+                        'lock_parameters': ParameterValue(
+                            LaunchConfiguration('lock_parameters'), value_type=bool
                         ),
                     }
                 ],

@@ -12,6 +12,7 @@ from ugv_acceptance.evaluation.comparison import ModelCheck
 from ugv_acceptance.evaluation.criteria import CriteriaSet, default_criteria
 from ugv_acceptance.evaluation.examination import Examination
 from ugv_acceptance.evaluation.outcomes import Findings
+from ugv_acceptance.evaluation.permitted import limits_hash, relaxed
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.samples import Batch
@@ -98,8 +99,15 @@ def judge(
     }
     findings = Findings(asked, ordered(log), data, Bounds(settings, terms.sources))
     margin_bounds(data, limits, findings.bounds)
-    result = {'version': RESULT_VERSION, **judge_criteria(findings), **data}
+    result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
     return Judgement(result, evaluator, reading.facts, asked)
+
+
+def _limits(settings: Settings) -> dict[str, Any]:
+    """Return by what limits was judged, and which of them are wider than permitted, and why."""
+    found = [breach.words for breach in relaxed(settings)]
+    told = {'reason': settings.unsafe, 'limits': found} if found else None
+    return {'limits_hash': limits_hash(settings), 'limits_relaxed': told}
 
 
 def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:

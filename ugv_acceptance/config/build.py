@@ -13,6 +13,7 @@ from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.evaluation.permitted import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 
@@ -72,13 +73,25 @@ def settings_from(build: Build) -> Settings:
     measured = _measured(build)
     robot = _robot(build, tuple(measured))
     joints = {name: robot.joint(name) for name in measured}
-    return Settings(
+    settings = Settings(
         robot,
         tuple(_input(build, joints[name], section) for name, section in measured.items()),
         _imu(build.file),
         _limits(build, [(joints[name], section) for name, section in measured.items()]),
         Delays(**build.file.delays.model_dump()),
+        build.file.unsafe_limits or '',
     )
+    _check_ranges(build, settings)
+    return settings
+
+
+def _check_ranges(build: Build, settings: Settings) -> None:
+    """Refuse a limit that would disarm a rule; with a reason, warn of it."""
+    wrong = refused(settings)
+    if wrong is not None:
+        raise build.refuse(wrong.path, wrong.refusal)
+    for found in relaxed(settings):
+        build.warn(found.path, f'relaxed: {found.words}; reason: {settings.unsafe}')
 
 
 def _measured(build: Build) -> dict[str, JointSection]:
@@ -214,8 +227,10 @@ def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:
             ('limits', 'tip_warn'),
             f'expected at least tip_error, got {math.degrees(limits.tip_warn):g} deg',
         )
+    torque = tuple(_limit(build, joint, section) for joint, section in joints)
     return Limits(
-        torque=tuple(_limit(build, joint, section) for joint, section in joints),
+        torque=torque,
+        rated=torque,
         speed=tuple(_speed(build, joint, section) for joint, section in joints),
         **limits.model_dump(exclude_none=True),
     )

@@ -6,10 +6,11 @@ Values come out in SI and radians. A default that is not here is that of evaluat
 from difflib import get_close_matches
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from ugv_acceptance.config.units import Given, Measure, parse, shown, split_key
+from ugv_acceptance.evaluation.permitted import checked_reason
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 from ugv_acceptance.model.robot import Robot
 
@@ -58,6 +59,7 @@ Place = Annotated[Given, _given('angle', 'length')]
 Effort = Annotated[Given | None, _given('torque', 'force')]
 Rate = Annotated[Given | None, _given('angular rate', 'rate')]
 Name = Annotated[str, Field(min_length=1, strict=True)]
+Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
 
 
 class Section(BaseModel):
@@ -234,5 +236,6 @@ class File(Section):
     payload: PayloadSection | None = None
     limits: LimitsSection = LimitsSection()
     delays: DelaysSection = DelaysSection()
+    unsafe_limits: Reason | None = None
     gravity: Annotated[Positive, _number('acceleration')] = _ROBOT.gravity
     uncertainty: dict[str, Annotated[NotNegative, _number()]] = {}

@@ -210,14 +210,14 @@ def _largest(values: Floats, over: int) -> Floats:
 def foresight_of(settings: Settings, signal: SignalOf) -> Foresight:
     """Return the rules of a robot; `signal` makes one of code, subject, (on, off) and delay (s)."""
     names, limits, delays = settings.robot.joint_names, settings.limits, settings.delays
-    ahead, deadband = (-SOON, -LATER), limits.torque_deadband
-    levels = [limits.torque_warn * limit for limit in limits.torque]
+    ahead, levels = (-SOON, -LATER), [limits.torque_warn * limit for limit in limits.torque]
+    at = [(level, level - min(limits.torque_deadband, level / 2.0)) for level in levels]
     return Foresight(
         [signal('TIP_AHEAD', side, ahead, delays.tip_on) for side in SIDES],
         [signal('TORQUE_AHEAD', name, ahead, delays.torque_on) for name in names],
         [
-            signal('EFFORT_LIMIT', name, (level, level - deadband), delays.torque_on)
-            for name, level in zip(names, levels, strict=True)
+            signal('EFFORT_LIMIT', name, effort, delays.torque_on)
+            for name, effort in zip(names, at, strict=True)
         ],
         [signal('MOTOR_WEAK', name, (WEAK, WEAK), 0.0) for name in names],
         [signal('ENCODER_FROZEN', name, (CHANGED, CHANGED), delays.torque_on) for name in names],

@@ -1,5 +1,6 @@
 """Is an input alive? Judged by when its messages were received, never by their header stamps."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +13,8 @@ Times = NDArray[np.int64]
 # Messages over which a period is learnt; until then the start-up limit holds.
 WINDOW = 32
 STARTUP = 500_000_000
+# Silence (s) that is stale whatever an input's period is: an operator must know within that time.
+LONGEST_SILENCE = 2.0
 # Time (ns) by which two clocks may differ, or a stamp may jump, before it is worth a warning.
 CLOCK_SLACK = 1_000_000_000
 # Time (ns) for which messages may come with one and the same stamp.
@@ -73,6 +76,12 @@ class Freshness:
         self.stamp = int(stamps[-1])
         return np.where(wrong, 1.0, 0.0)
 
+    def judge_by(self, delays: Delays) -> None:
+        """Take other delays from now on; what was learnt of the period counts at once."""
+        self.delays = delays
+        if not math.isnan(self.period):
+            self.limit = self._silence(self.period)
+
     def message(self, now: int) -> None:
         """Take the receipt time (ns) of a message."""
         if self.last is not None:
@@ -106,8 +115,9 @@ class Freshness:
         self._intervals.clear()
 
     def _silences(self, periods: NDArray[np.float64]) -> Times:
-        longest = np.maximum(periods * self.delays.stale_periods, self.delays.stale_after * 1e9)
-        return longest.astype(np.int64)
+        own = np.minimum(periods * self.delays.stale_periods, LONGEST_SILENCE * 1e9)
+        return np.maximum(own, self.delays.stale_after * 1e9).astype(np.int64)
 
     def _silence(self, period: float) -> int:
-        return int(max(period * self.delays.stale_periods, self.delays.stale_after * 1e9))
+        own = min(period * self.delays.stale_periods, LONGEST_SILENCE * 1e9)
+        return int(max(own, self.delays.stale_after * 1e9))

@@ -54,6 +54,7 @@ class LiveEvaluator:
     _posture: Posture | None = None
     _stance: Stance | None = None
     _gravity: Vector = NOWHERE
+    _began: int | None = None
 
     def __post_init__(self) -> None:
         self.watch = Watch(self.settings)
@@ -68,6 +69,7 @@ class LiveEvaluator:
         """Say when listening began: an input that never comes is stale from then on."""
         for fresh in self._fresh:
             fresh.started = now
+        self._began = now
 
     def joint_state(
         self,
@@ -146,7 +148,7 @@ class LiveEvaluator:
         for signal, other in zip(self.watch.signals(), Watch(settings).signals(), strict=True):
             signal.judge_by(other.rule)
         for fresh in self._fresh:
-            fresh.delays = settings.delays
+            fresh.judge_by(settings.delays)
 
     def tick(self, now: int) -> None:
         """Let time pass without a message: silence and delays are judged."""
@@ -154,6 +156,8 @@ class LiveEvaluator:
             due = fresh.deadline
             if due is not None and now > due:
                 signals.stale.set(due, 1.0)
+        self.watch.relax(now if self._began is None else self._began)
+        self._began = None
         self.watch.foresee()
         for signal in self.watch.signals():
             signal.advance(now)

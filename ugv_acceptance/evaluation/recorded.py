@@ -87,6 +87,7 @@ class RecordedEvaluator:
         """Say when the recording began: an input that never comes is stale from then on."""
         for fresh in self.fresh:
             fresh.started = now
+        self.watch.relax(now)
 
     def finish(self, now: int) -> None:
         """Say when the recording ended: what fell due until then is judged."""

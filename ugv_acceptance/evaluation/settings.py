@@ -52,7 +52,8 @@ class Limits:
     `torque` limit of each joint (N m or N; infinite: not judged); `torque_warn` and `torque_error`
     are utilisations |tau| / limit. Tip angles are the tilt left (rad). `speed` is the joint rate
     (rad/s or m/s) to which the static model was shown valid; infinite: not judged. `friction` is
-    that of the tracks on the ground; infinite: not known.
+    that of the tracks on the ground; infinite: not known. `rated` are the joints' limits as
+    configured, beyond which `torque` is relaxed (empty: not known).
     """
 
     torque: tuple[float, ...]
@@ -64,6 +65,7 @@ class Limits:
     tip_deadband: float = 0.017453292519943295
     speed: tuple[float, ...] = ()
     friction: float = float('inf')
+    rated: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +73,8 @@ class Delays:
     """Seconds a level must last before an alert is raised (on) and must be gone to clear it (off).
 
     A tilt is noisy and swings, so tip-over has an `off` of its own (bench/bench_chatter.py says how
-    long it must be). An input is stale when `stale_periods` of its own periods, but at least
-    `stale_after`, have passed without a message; silence is judged every `tick`.
+    long it must be). An input is stale when `stale_periods` of its own periods (at most 2 s), but
+    at least `stale_after`, have passed without a message; silence is judged every `tick`.
     """
 
     tip_on: float = 0.1
@@ -87,10 +89,14 @@ class Delays:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything an evaluation needs beside the messages. `joints` follows `robot.joint_names`."""
+    """Everything an evaluation needs beside the messages. `joints` follows `robot.joint_names`.
+
+    `unsafe` is why limits are wider than permitted.py says; empty: none is.
+    """
 
     robot: Robot
     joints: tuple[JointInput, ...]
     imu: ImuInput
     limits: Limits
     delays: Delays = Delays()
+    unsafe: str = ''

@@ -50,4 +50,5 @@ FIRST_SUSPECT = {
     'IMU_GRAVITY': FailureSource.SENSOR,
     'IMU_INCONSISTENT': FailureSource.SENSOR,
     'PAYLOAD_INVALID': FailureSource.INTERACTION,
+    'LIMITS_RELAXED': FailureSource.INTERACTION,
 }

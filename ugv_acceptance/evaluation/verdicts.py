@@ -21,6 +21,7 @@ from ugv_acceptance.evaluation.criteria import (
 from ugv_acceptance.evaluation.data_quality import measured_of, unit_of
 from ugv_acceptance.evaluation.examination import KnownTime, MapMeasure
 from ugv_acceptance.evaluation.outcomes import Findings, Json, Outcome, alert_words, short_of_data
+from ugv_acceptance.evaluation.permitted import relaxed_words
 from ugv_acceptance.evaluation.statements import demand_words, missing_reasons
 from ugv_acceptance.evaluation.value_outcome import judge_value
 
@@ -54,7 +55,8 @@ def _overall(outcomes: Sequence[Outcome], findings: Findings) -> tuple[str, list
             return word, reasons
     share = findings.data['coverage']['fraction']
     text = 'all margins kept' if findings.examination.criteria.path is None else 'all criteria met'
-    return PASS, [f'{text}, {share:.1%} of the recording evaluated']
+    wider = relaxed_words(findings.settings)
+    return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
 
 
 def _json(criterion: Criterion, outcome: Outcome, findings: Findings) -> Json:

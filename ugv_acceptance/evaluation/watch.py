@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from ugv_acceptance.evaluation.alerts import ERROR, STALE, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.foresight import Foresight, foresight_of
 from ugv_acceptance.evaluation.imu import AttitudeSignals
+from ugv_acceptance.evaluation.permitted import names_of, relaxed
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
@@ -38,6 +39,8 @@ class Watch:
     attitude: AttitudeSignals = field(init=False)
     foresight: Foresight = field(init=False)
     slide: Signal = field(init=False)
+    relaxed: dict[str, Signal] = field(init=False)
+    _told: Settings | None = None
 
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
@@ -66,6 +69,15 @@ class Watch:
         self.attitude = self._attitude()
         self.foresight = foresight_of(self.settings, self._warning)
         self.slide = self._slide()
+        self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
+
+    def relax(self, now: int) -> None:
+        """Say which limits are relaxed at `now` (ns): a standing warning of each."""
+        if self._told is not self.settings:
+            self._told = self.settings
+            found = {breach.name for breach in relaxed(self.settings)}
+            for name, signal in self.relaxed.items():
+                signal.step(now, 1.0 if name in found else 0.0)
 
     def foresee(self) -> None:
         """Judge what live samples gave the foresight; before time passes."""
@@ -86,7 +98,7 @@ class Watch:
         return Signal(Rule(code, subject, level, *at, int(on_delay * 1e9), off), self.log)
 
     def _torque(self, joint: str, level: int, limit: float) -> Signal:
-        at = (limit, limit - self.settings.limits.torque_deadband)
+        at = (limit, limit - min(self.settings.limits.torque_deadband, limit / 2.0))
         return self._signal('TORQUE_LIMIT', joint, level, at, self.settings.delays.torque_on)
 
     def _tip(self, side: str, level: int, angle: float) -> Signal:
@@ -105,6 +117,10 @@ class Watch:
         """A fault is watched as 1 (there) or 0 (not there)."""
         delay = self.settings.delays.fault_on if on_delay is None else on_delay
         return self._signal(code, subject, level, (0.5, 0.5), delay)
+
+    def _relaxed(self, name: str) -> Signal:
+        """It stands as long as the limit is in force: no delay, whatever the delays are."""
+        return Signal(Rule('LIMITS_RELAXED', name, WARN, 0.5, 0.5, 0, 0), self.log)
 
     def _leap(self, joint: str) -> Signal:
         limit = LEAP * self.settings.robot.joint(joint).velocity
@@ -152,6 +168,7 @@ class Watch:
             *faults,
             self.slide,
             *self.foresight.signals(),
+            *self.relaxed.values(),
         ]
 
 

@@ -3,6 +3,7 @@
 import math
 
 from ugv_acceptance.evaluation.alerts import WARN, Alert
+from ugv_acceptance.evaluation.permitted import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 
 # Code -> (what happened, what to do). {subject} is the joint, input or robot, {peak} the worst.
@@ -87,6 +88,10 @@ WORDS = {
         'a declared payload cannot be used',
         'give a mass in kg that is not negative, in the frame of the payload link',
     ),
+    'LIMITS_RELAXED': (
+        '{relaxed}',
+        'keep people away; set it back into its range as soon as the reason is gone',
+    ),
 }
 
 
@@ -112,7 +117,16 @@ def describe(alert: Alert, settings: Settings) -> str:
         seconds=-rule.on,
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
+        relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
     )
+
+
+def _relaxed(name: str, settings: Settings) -> str:
+    """Return why a limit is wider than permitted, as it is now."""
+    found = next((b for b in relaxed(settings) if b.name == name), None)
+    if found is None:
+        return f'{name} was wider than permitted'
+    return f'{found.words}; reason: {settings.unsafe}'
 
 
 def _torque(subject: str, settings: Settings) -> float:

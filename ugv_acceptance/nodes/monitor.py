@@ -6,6 +6,7 @@ subscribed as raw bytes on activation, so an inactive monitor costs nothing.
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +30,11 @@ from ugv_acceptance.nodes.markers import MarkerOutput
 from ugv_acceptance.nodes.operating import all_reset, black_box_of, by_service, operate
 from ugv_acceptance.nodes.outputs import MarginOutput, StatusOutput
 from ugv_acceptance.nodes.parameters import (
+    FREE,
     Knob,
     changed,
     check_at_rest,
+    check_locked,
     declare_all,
     knobs_of,
     unknown,
@@ -180,6 +183,7 @@ class Monitor(LifecycleNode):
         if session.clock.simulated:
             session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
+        self._tell_load()
         self._tell(session.follower.alarms.advance(now := session.clock.now()))
         if self._box is not None:
             self._box.advance(now)
@@ -267,8 +271,10 @@ class Monitor(LifecycleNode):
         try:
             if self.session is not None:
                 check_at_rest(values)
+                if self._value('lock_parameters'):
+                    check_locked(values, self.knobs)
             if self._settings is not None:
-                changed(self._settings, self.knobs, values)
+                changed(self._in_force(self._settings), self.knobs, values)
         except (BadConfig, TypeError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -276,10 +282,25 @@ class Monitor(LifecycleNode):
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         values = {parameter.name: parameter.value for parameter in parameters}
         if self._settings is not None:
-            self._settings = changed(self._settings, self.knobs, values)
+            self._settings = changed(self._in_force(self._settings), self.knobs, values)
             if self.session is not None:
                 self.session.adopt(self._settings)
         self._take_rates()
+
+    def _in_force(self, settings: Settings) -> Settings:
+        """Return settings with the load that a message may have declared."""
+        load = settings.robot.payload if self.session is None else self.session.evaluator.payload
+        return replace(settings, robot=replace(settings.robot, payload=load))
+
+    def _tell_load(self) -> None:
+        """Let the parameters of the load say what is in force when a message has changed it."""
+        if self._settings is None or self._in_force(self._settings) == self._settings:
+            return
+        self._settings = self._in_force(self._settings)
+        told = [
+            Parameter(k.name, value=k.get(self._settings)) for k in self.knobs if k.name in FREE
+        ]
+        self.set_parameters_atomically(told)
 
     def _take_rates(self) -> None:
         rate = self._value('publish_rate')

@@ -14,6 +14,14 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.evaluation.permitted import (
+    RANGES,
+    UNSAFE,
+    Permitted,
+    checked_reason,
+    refused,
+    torque_name,
+)
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
@@ -24,7 +32,11 @@ NOT_JUDGED = 0.0
 
 @dataclass(frozen=True, slots=True)
 class Knob:
-    """A parameter: how it is read from settings and put into them; its range."""
+    """A parameter: how it is read from settings and put into them; its range.
+
+    `permitted` is what is expected without a reason, and with one; such a range is checked by
+    evaluation/permitted.py, so that the answer says so.
+    """
 
     name: str
     what: str
@@ -32,10 +44,13 @@ class Knob:
     put: Callable[[Settings, Any], Settings]
     lower: float | None = None
     upper: float | None = None
+    permitted: str = ''
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what ROS tools show of it, and check."""
-        return described(self.what, self.lower, self.upper)
+        if not self.permitted:
+            return described(self.what, self.lower, self.upper)
+        return ParameterDescriptor(description=self.what, additional_constraints=self.permitted)
 
 
 def described(
@@ -55,7 +70,10 @@ def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
 
 
 # Parameters that are read on configuration or activation and stay as they are until the next.
-AT_REST = ('config', 'urdf', 'depth', 'black_box')
+AT_REST = ('config', 'urdf', 'depth', 'black_box', 'lock_parameters')
+# What an operator declares: never locked.
+FREE = ('payload.mass_kg', 'payload.cog_m')
+ALLOWED = 'allowed_publishers'
 
 
 def check_at_rest(values: Mapping[str, Any]) -> None:
@@ -63,6 +81,14 @@ def check_at_rest(values: Mapping[str, Any]) -> None:
     fixed = [name for name in AT_REST if name in values]
     if fixed:
         raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
+
+
+def check_locked(values: Mapping[str, Any], knobs: Sequence[Knob]) -> None:
+    """Raise BadConfig where one of these parameters decides what is told: all but the load."""
+    locked = {knob.name for knob in knobs if knob.name not in FREE} | {ALLOWED}
+    found = [name for name in values if name in locked]
+    if found:
+        raise BadConfig(f'{found[0]}: locked by lock_parameters while active: deactivate first')
 
 
 def declare_all(node: Node) -> None:
@@ -77,71 +103,30 @@ def declare_all(node: Node) -> None:
     what = 'margin messages a second; 0: one for every input message'
     declare('publish_rate', 25.0, described(what, 0.0, 10_000.0))
     what = 'nodes that may publish the inputs, such as /driver; empty: any, but only one'
-    declare('allowed_publishers', [''], described(what))
+    declare(ALLOWED, [''], described(what))
     what = 'folder for a recording of each critical alert; empty: none is made'
     declare('black_box', '', described(what))
-
-
-# Parameter -> (part of Settings, field, factor of its unit, range, what it is).
-_TABLE: dict[str, tuple[str, str, float, float, float, str]] = {
-    'limits.torque_warn': ('limits', 'torque_warn', 1.0, 0.01, 10.0, 'share of the limit for WARN'),
-    'limits.torque_error': (
-        'limits', 'torque_error', 1.0, 0.01, 10.0, 'share of the limit for ERROR',
-    ),
-    'limits.torque_deadband_nm': (
-        'limits', 'torque_deadband', 1.0, 0.0, 1e6, 'torque below the limit that clears, N m',
-    ),
-    'limits.tip_warn_deg': (
-        'limits', 'tip_warn', math.pi / 180, -90.0, 90.0, 'tilt left for WARN, deg',
-    ),
-    'limits.tip_error_deg': (
-        'limits', 'tip_error', math.pi / 180, -90.0, 90.0, 'tilt left for ERROR, deg',
-    ),
-    'limits.tip_deadband_deg': (
-        'limits', 'tip_deadband', math.pi / 180, 0.0, 90.0, 'tilt above the limit that clears, deg',
-    ),
-    'delays.tip_on_s': ('delays', 'tip_on', 1.0, 0.0, 10.0, 'how long before a tip-over alert'),
-    'delays.torque_on_s': ('delays', 'torque_on', 1.0, 0.0, 10.0, 'how long before a torque alert'),
-    'delays.fault_on_s': ('delays', 'fault_on', 1.0, 0.0, 10.0, 'how long before an input alert'),
-    'delays.off_s': ('delays', 'off', 1.0, 0.0, 60.0, 'how long good before an alert clears, s'),
-    'delays.tip_off_s': (
-        'delays', 'tip_off', 1.0, 0.0, 60.0, 'how long good before a tip-over alert clears, s',
-    ),
-    'delays.stale_after_s': (
-        'delays', 'stale_after', 1.0, 0.001, 60.0, 'shortest silence that is stale, s',
-    ),
-    'delays.stale_periods': (
-        'delays', 'stale_periods', 1.0, 1.0, 1000.0, 'own periods of silence that are stale',
-    ),
-    'imu.agreement_deg': (
-        'imu', 'agreement', math.pi / 180, 0.1, 180.0, 'orientation may differ from gravity, deg',
-    ),
-}  # fmt: skip
+    what = 'no limit, delay or threshold can be set while the monitor is active'
+    declare('lock_parameters', False, described(what))
 
 
 def knobs_of(settings: Settings) -> tuple[Knob, ...]:
     """Return the parameters of a robot."""
     torque = tuple(_torque_knob(settings, j) for j in range(len(settings.robot.joint_names)))
-    return (*(_field_knob(name, *row) for name, row in _TABLE.items()), *torque, *_CHOICES)
+    return (*(_field_knob(of) for of in RANGES if of.live), *torque, *_CHOICES)
 
 
-def _field_knob(
-    name: str, part: str, key: str, unit: float, lower: float, upper: float, what: str
-) -> Knob:
-    def get(settings: Settings) -> float:
-        return float(getattr(getattr(settings, part), key) / unit)
-
+def _field_knob(of: Permitted) -> Knob:
     def put(settings: Settings, value: float) -> Settings:
-        section = getattr(settings, part)
-        changed: Settings = replace(settings, **{part: replace(section, **{key: value * unit})})
+        section = getattr(settings, of.part)
+        part = replace(section, **{of.key: value * of.factor})
+        changed: Settings = replace(settings, **{of.part: part})
         return changed
 
-    return Knob(name, what, get, put, lower, upper)
+    return Knob(of.name, of.what, of.value, put, of.floor, of.ceiling, of.words)
 
 
 def _torque_knob(settings: Settings, j: int) -> Knob:
-    joint = settings.robot.joint_names[j]
-    unit = ('n', 'N') if settings.robot.joint(joint).kind == 'prismatic' else ('nm', 'N m')
 
     def get(current: Settings) -> float:
         limit = current.limits.torque[j]
@@ -152,8 +137,10 @@ def _torque_knob(settings: Settings, j: int) -> Knob:
         limits[j] = value if value > 0 else math.inf
         return replace(current, limits=replace(current.limits, torque=tuple(limits)))
 
-    what = f'limit, {unit[1]}; 0: not known, so not judged'
-    return Knob(f'joints.{joint}.limit_{unit[0]}', what, get, put, 0.0, 1e9)
+    name = torque_name(settings, j)
+    unit = 'N' if name.endswith('_n') else 'N m'
+    what = f'limit, {unit}; 0: not known, so not judged'
+    return Knob(name, what, get, put, 0.0, 1e9)
 
 
 def _with_payload(settings: Settings, mass: float, cog: Sequence[float]) -> Settings:
@@ -169,7 +156,20 @@ def _with_attitude(settings: Settings, value: str) -> Settings:
     return replace(settings, imu=replace(settings.imu, attitude=value))
 
 
+def _with_reason(settings: Settings, value: str) -> Settings:
+    try:
+        return replace(settings, unsafe=checked_reason(value) if value else '')
+    except ValueError as error:
+        raise BadConfig(f'{UNSAFE}: {error}') from None
+
+
 _CHOICES = (
+    Knob(
+        UNSAFE,
+        'why limits may be wider than permitted; empty: they may not',
+        lambda s: s.unsafe,
+        _with_reason,
+    ),
     Knob(
         'payload.mass_kg',
         'mass of the load carried, kg, until the payload topic says otherwise',
@@ -221,7 +221,8 @@ def changed(settings: Settings, knobs: Sequence[Knob], values: Mapping[str, Any]
         if isinstance(value, float) and not math.isfinite(value):
             raise BadConfig(f'{knob.name}: expected a finite number, got {value}')
         lower, upper = knob.lower, knob.upper
-        if lower is not None and upper is not None and not lower <= value <= upper:
+        ranged = lower is not None and upper is not None and not knob.permitted
+        if ranged and not lower <= value <= upper:
             raise BadConfig(f'{knob.name}: expected {lower:g} to {upper:g}, got {value}')
         settings = knob.put(settings, value)
     _check(settings)
@@ -234,7 +235,9 @@ def list_of(value: Any) -> Any:  # noqa: ANN401 - a parameter's value
 
 
 def _check(settings: Settings) -> None:
-    limits = settings.limits
+    limits, wrong = settings.limits, refused(settings)
+    if wrong is not None:
+        raise BadConfig(f'{wrong.name}: {wrong.refusal}')
     if limits.torque_warn > limits.torque_error:
         raise BadConfig(
             f'limits.torque_warn: expected at most limits.torque_error ({limits.torque_error:g}), '

@@ -15,6 +15,7 @@ from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_dec
 from ugv_acceptance.evaluation.alerts import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.outlook import Outlook
+from ugv_acceptance.evaluation.permitted import limits_hash
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.nodes.counsel import Counsel
 from ugv_acceptance.nodes.faults import Faults
@@ -67,11 +68,13 @@ class Session:
     outlook: Outlook = field(init=False)
     counsel: Counsel = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
+    limits_hash: str = field(init=False)
     _known: bool = False
     _counted: tuple[int, dict[str, int]] = field(default_factory=lambda: (0, {}))
 
     def __post_init__(self) -> None:
         self.evaluator = LiveEvaluator(self.settings)
+        self.limits_hash = limits_hash(self.settings)
         log = self.evaluator.watch.log
         self.faults, self.follower = Faults(log), Follower(log)
         self.outlook = Outlook(self.settings)
@@ -125,7 +128,9 @@ class Session:
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; what was learnt and is active stays."""
         self.settings = self.outlook.settings = settings
+        self.limits_hash = limits_hash(settings)
         self.evaluator.adopt(settings)
+        self.tick()
 
     def _look(self) -> None:
         known = self.evaluator.margins is not None

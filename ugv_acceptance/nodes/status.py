@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from ugv_acceptance.evaluation.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.permitted import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.nodes.faults import suspect_of
@@ -56,6 +57,7 @@ def verdict_of(session: Session) -> Status:
         'left': left,
         'alerts_active': len(active),
         'alerts_unacknowledged': unseen,
+        **_limits(session),
     }
     known = session.counsel.values(now)
     left = '; '.join([left, *session.counsel.hints(now)])
@@ -75,6 +77,9 @@ def _worst(
     """Return the verdict while alerts are active: the most severe one speaks."""
     follower, counsel = session.follower, session.counsel
     first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
+    words = relaxed_words(session.settings)
+    if words and first.rule.code != 'LIMITS_RELAXED':  # else it says so itself
+        left = f'{left}; {words}'
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
     do = counsel.do(first)
     text = f'{session.faults.sentence(_now(first, session), session.settings)}{more}; {left}; {do}'
@@ -84,6 +89,16 @@ def _worst(
         'acknowledged': all(map(follower.acknowledged, active)),
     }
     return Status(session.level, '', text, own | values)
+
+
+def _limits(session: Session) -> dict[str, object]:
+    """Return by what limits is judged, and which of them are wider than permitted, and why."""
+    values: dict[str, object] = {'limits_hash': session.limits_hash}
+    found = relaxed(session.settings)
+    if found:
+        names = ', '.join(breach.name for breach in found)
+        values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
+    return values
 
 
 def _now(alert: Alert, session: Session) -> Alert:
@@ -139,6 +154,7 @@ def alert_status(change: Change, session: Session) -> Status:
         'time_ns': change.time,
         'who': change.who,
         'note': change.note,
+        'limits_hash': session.limits_hash,
     }
     level = OK if change.how in {'cleared', 'reset'} else rule.level
     sentence = session.faults.sentence(alert, session.settings)

@@ -38,6 +38,7 @@ MEANINGS = {
     'IMU_GRAVITY': 'The IMU does not feel gravity as it should: tilt cannot be trusted.',
     'IMU_INCONSISTENT': 'The IMU contradicts itself: tilt cannot be trusted.',
     'PAYLOAD_INVALID': 'The load that was declared cannot be used.',
+    'LIMITS_RELAXED': 'Somebody made the limit named wider than is safe, and said why.',
     'CLOCK': 'Clocks disagree: times of messages cannot be trusted.',
 }
 LEVELS = (

@@ -80,15 +80,18 @@ def missing_text(source: Json, duration: float) -> str:
 
 
 def doubts_of(result: Json) -> list[str]:
-    """Return what was measured that speaks against the margins, a sentence each."""
+    """Return what speaks against the margins or their limits, a sentence each."""
+    doubts, wider = [], result.get('limits_relaxed')
+    if wider:
+        doubts = [f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}']
     load = result['model_check']['payload']
     if load is None or load['low'] < HEAVIER:
-        return []
+        return doubts
     text = (
         f'efforts at rest tell of {load["value"]:.2f} kg more in the hand than declared (95 %: '
         f'{load["low"]:.2f} to {load["high"]:.2f} kg): margins are smaller, or efforts are wrong'
     )
-    return [text]
+    return [*doubts, text]
 
 
 def interval_text(found: Json | None, unit: str = '') -> str:

@@ -1,0 +1,252 @@
+"""What limits, delays and thresholds may be, and which of them are wider: one table for all.
+
+A value outside its range would disarm a rule: it is refused, in a file and as a parameter alike,
+unless a reason is given (`unsafe_limits`). Then it is taken, and told as long as it is in force.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from ugv_acceptance.evaluation.freshness import LONGEST_SILENCE
+from ugv_acceptance.evaluation.settings import Settings
+
+# The unit a value is shown in -> its size in SI.
+UNITS = {'deg': math.pi / 180.0}
+# Rounding of a unit's conversion, as a share of the bound.
+SLACK = 1e-9
+# Letters of a reason at most: it is told in every verdict.
+LONGEST_REASON = 200
+UNSAFE = 'unsafe_limits'
+
+
+@dataclass(frozen=True, slots=True)
+class Permitted:
+    """A setting's range, in its `unit` ('': none): `least` to `most`, with a reason `floor` on.
+
+    `part` and `key` are its fields in Settings, `name` its parameter, `path` its keys in a file.
+    `live`: it can be set while the monitor runs; `what` says what it is.
+    """
+
+    part: str
+    key: str
+    unit: str
+    least: float
+    most: float
+    floor: float
+    ceiling: float
+    what: str
+    live: bool = True
+    written: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """Its keys in a YAML file, without the unit."""
+        return self.written or (self.part, self.key)
+
+    @property
+    def name(self) -> str:
+        """Its name as a parameter: the keys of the file with the unit."""
+        return '.'.join(self.path) + (f'_{self.unit}' if self.unit else '')
+
+    @property
+    def factor(self) -> float:
+        """What a value in `unit` is multiplied by for SI."""
+        return UNITS.get(self.unit, 1.0)
+
+    @property
+    def words(self) -> str:
+        """What is expected of a value."""
+        return (
+            f'{self.least:g} to {self.most:g}, or with {UNSAFE} and a reason '
+            f'{self.floor:g} to {self.ceiling:g}'
+        )
+
+    def value(self, settings: Settings) -> float:
+        """Return the value in force, in `unit`."""
+        return float(getattr(getattr(settings, self.part), self.key)) / self.factor
+
+
+# Part, key, unit, least, most, floor, ceiling: a bound is where a rule would begin to be silent
+# (or, as a deadband, never to end). The other side is only kept from what cannot be meant.
+RANGES = (
+    Permitted(
+        'limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for WARN'
+    ),
+    Permitted(
+        'limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for ERROR'
+    ),
+    Permitted(
+        'limits', 'torque_deadband', 'nm', 0.0, 1e3, 0.0, 1e6,
+        'torque below the limit that clears, N m; at most half of the limit counts',
+    ),
+    Permitted('limits', 'tip_warn', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for WARN, deg'),
+    Permitted('limits', 'tip_error', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for ERROR, deg'),
+    Permitted(
+        'limits', 'tip_deadband', 'deg', 0.0, 10.0, 0.0, 90.0,
+        'tilt above the limit that clears, deg',
+    ),
+    Permitted('limits', 'friction', '', 0.01, 2.0, 0.01, 10.0, 'friction on the ground',
+        live=False,
+    ),
+    Permitted('delays', 'tip_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a tip-over alert, s'),
+    Permitted('delays', 'torque_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a torque alert, s'),
+    Permitted('delays', 'fault_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before an input alert, s'),
+    Permitted('delays', 'off', 's', 0.0, 60.0, 0.0, 3600.0, 'how long good before a clear, s'),
+    Permitted(
+        'delays', 'tip_off', 's', 0.0, 60.0, 0.0, 3600.0,
+        'how long good before a tip-over alert clears, s',
+    ),
+    Permitted(
+        'delays', 'stale_after', 's', 0.001, LONGEST_SILENCE, 0.001, 60.0,
+        'shortest silence that is stale, s',
+    ),
+    Permitted(
+        'delays', 'stale_periods', '', 1.0, 100.0, 1.0, 1000.0,
+        f'own periods of silence that are stale; at most {LONGEST_SILENCE:g} s in all',
+    ),
+    Permitted(
+        'delays', 'tick', 's', 0.001, 1.0, 0.001, 60.0, 'how often silence is judged, s', live=False,
+    ),
+    Permitted(
+        'imu', 'agreement', 'deg', 0.1, 10.0, 0.1, 180.0,
+        'orientation may differ from gravity, deg',
+    ),
+    Permitted(
+        'imu', 'agreement_delay', 's', 0.0, 5.0, 0.0, 60.0, 'how long they may differ, s', live=False,
+    ),
+    Permitted(
+        'imu', 'low_pass', 's', 1e-4, 2.0, 1e-4, 60.0, 'time constant of the filter, s', live=False,
+    ),
+    Permitted(
+        'imu', 'rest_acceleration', 'mps2', 0.05, 5.0, 1e-3, 100.0, 'what counts as rest', live=False,
+    ),
+    Permitted('imu', 'rest_rate', 'radps', 0.005, 1.0, 1e-4, 100.0, 'what counts as rest',
+        live=False,
+    ),
+    Permitted(
+        'robot', 'contact_tolerance', 'm', 0.0, 0.05, 0.0, 1.0,
+        'how near to the ground a point stands on it', live=False,
+        written=('ground', 'tolerance'),
+    ),
+    Permitted(
+        'robot', 'gravity', 'mps2', 9.7, 9.9, 0.01, 100.0, 'gravity', live=False,
+        written=('gravity',)
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Breach:
+    """A value outside its range: its parameter's name, keys in a file, value and what is expected.
+
+    `never`: no reason helps.
+    """
+
+    name: str
+    path: tuple[str, ...]
+    value: float
+    expected: str
+    never: bool = False
+
+    @property
+    def refusal(self) -> str:
+        """Say what was expected and what came, without the name."""
+        return f'expected {self.expected}, got {self.value:g}'
+
+    @property
+    def words(self) -> str:
+        """Say what is in force, and what it may be."""
+        return f'{self.name} is {self.value:g} ({self.expected.partition(",")[0]} is permitted)'
+
+
+def torque_name(settings: Settings, j: int) -> str:
+    """Return the parameter of a joint's limit."""
+    joint = settings.robot.joint_names[j]
+    unit = 'n' if settings.robot.joint(joint).kind == 'prismatic' else 'nm'
+    return f'joints.{joint}.limit_{unit}'
+
+
+def names_of(settings: Settings) -> tuple[str, ...]:
+    """Return the names of all that has a range, of the joints' limits too."""
+    joints = range(len(settings.robot.joint_names))
+    return (*(p.name for p in RANGES), *(torque_name(settings, j) for j in joints))
+
+
+def breaches(settings: Settings) -> Iterator[Breach]:
+    """Yield every value that is outside its range, whether there is a reason or not."""
+    for of in RANGES:
+        value = of.value(settings)
+        if of.key == 'friction' and math.isinf(value):  # not known, so not judged
+            continue
+        if not _within(value, of.least, of.most):
+            never = not _within(value, of.floor, of.ceiling)
+            yield Breach(of.name, of.path, value, of.words, never)
+    rated = settings.limits.rated
+    for j, (limit, most) in enumerate(zip(settings.limits.torque, rated, strict=False)):
+        if limit > most * (1.0 + SLACK):
+            name = torque_name(settings, j)
+            expected = f'above 0 to {most:g} as configured, or with {UNSAFE} and a reason any'
+            path = ('joints', settings.robot.joint_names[j], 'limit')
+            yield Breach(name, path, limit if math.isfinite(limit) else 0.0, expected)
+
+
+def _within(value: float, least: float, most: float) -> bool:
+    return least - SLACK * abs(least) <= value <= most + SLACK * abs(most)
+
+
+def refused(settings: Settings) -> Breach | None:
+    """Return the first value that cannot be taken; None: all can."""
+    found = (b for b in breaches(settings) if b.never or not settings.unsafe)
+    return next(found, None)
+
+
+def relaxed(settings: Settings) -> list[Breach]:
+    """Return the values that only a reason permits, in force now."""
+    return list(breaches(settings))
+
+
+def relaxed_words(settings: Settings) -> str:
+    """Return which limits are relaxed and why, as one sentence; empty: none is."""
+    found = relaxed(settings)
+    if not found:
+        return ''
+    return f'limits are relaxed ({settings.unsafe}): {", ".join(b.words for b in found)}'
+
+
+def checked_reason(text: str) -> str:
+    """Return a reason for relaxed limits. Raises ValueError where it says nothing, or too much."""
+    reason = text.strip()
+    if not reason or len(reason) > LONGEST_REASON or not reason.isprintable():
+        raise ValueError(
+            f'expected a reason of 1 to {LONGEST_REASON} letters on one line, '
+            f'got {text[:60]!r}{"..." if len(text) > 60 else ""}'
+        )
+    return reason
+
+
+def limits_hash(settings: Settings) -> str:
+    """Return 16 hex digits of what alerts are judged by: limits, delays, the IMU's thresholds.
+
+    Nine digits of each number count, so that no rounding of a unit's conversion changes it.
+    """
+    limits, imu = asdict(settings.limits), asdict(settings.imu)
+    names = settings.robot.joint_names
+    for key in ('torque', 'speed'):
+        limits[key] = dict(zip(names, limits[key] or (math.inf,) * len(names), strict=True))
+    for key in ('mounting', 'position', 'frame'):  # where it sits, not what is judged
+        del imu[key]
+    del limits['rated']
+    told = {'limits': limits, 'delays': asdict(settings.delays), 'imu': imu}
+    text = json.dumps(_canonical(told), sort_keys=True, separators=(',', ':'))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _canonical(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return f'{value + 0.0:.9g}'
