@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
-from ugv_acceptance.evaluation.freshness import LONGEST_SILENCE
 from ugv_acceptance.evaluation.settings import Settings
 
 # The unit a value is shown in -> its size in SI.
@@ -69,73 +68,40 @@ class Permitted:
         return float(getattr(getattr(settings, self.part), self.key)) / self.factor
 
 
-# Part, key, unit, least, most, floor, ceiling: a bound is where a rule would begin to be silent
-# (or, as a deadband, never to end). The other side is only kept from what cannot be meant.
+# Part, key, unit, least, most, floor, ceiling, what. A range ends where a rule would begin to be
+# silent (or, as with a deadband, never to end); its other end keeps out what cannot be meant.
+_LIVE = (
+    ('limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for WARN'),
+    ('limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for ERROR'),
+    ('limits', 'torque_deadband', 'nm', 0.0, 1e3, 0.0, 1e6, 'torque below it that clears, N m'),
+    ('limits', 'tip_warn', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for WARN, deg'),
+    ('limits', 'tip_error', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for ERROR, deg'),
+    ('limits', 'tip_deadband', 'deg', 0.0, 10.0, 0.0, 90.0, 'tilt above it that clears, deg'),
+    ('delays', 'tip_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a tip-over alert, s'),
+    ('delays', 'torque_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a torque alert, s'),
+    ('delays', 'fault_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before an input alert, s'),
+    ('delays', 'off', 's', 0.0, 60.0, 0.0, 3600.0, 'how long good before an alert clears, s'),
+    ('delays', 'tip_off', 's', 0.0, 60.0, 0.0, 3600.0, 'the same of a tip-over alert, s'),
+    ('delays', 'stale_after', 's', 0.001, 2.0, 0.001, 60.0, 'shortest silence that is stale, s'),
+    ('delays', 'stale_periods', '', 1.0, 100.0, 1.0, 1000.0, 'own periods of silence, stale'),
+    ('imu', 'agreement', 'deg', 0.1, 10.0, 0.1, 180.0, 'orientation may differ from gravity, deg'),
+)
+_AT_REST = (
+    ('limits', 'friction', '', 0.01, 2.0, 0.01, 10.0, 'friction on the ground'),
+    ('delays', 'tick', 's', 0.001, 1.0, 0.001, 60.0, 'how often silence is judged, s'),
+    ('imu', 'agreement_delay', 's', 0.0, 5.0, 0.0, 60.0, 'how long they may differ, s'),
+    ('imu', 'low_pass', 's', 1e-4, 2.0, 1e-4, 60.0, 'time constant of the filter, s'),
+    ('imu', 'rest_acceleration', 'mps2', 0.05, 5.0, 1e-3, 100.0, 'what counts as rest'),
+    ('imu', 'rest_rate', 'radps', 0.005, 1.0, 1e-4, 100.0, 'what counts as rest'),
+    ('robot', 'contact_tolerance', 'm', 1e-9, 0.05, 1e-9, 1.0, 'how near the ground is on it'),
+    ('robot', 'gravity', 'mps2', 9.7, 9.9, 0.01, 100.0, 'gravity, m/s2'),
+)
+# Where a file has other keys than Settings.
+_WRITTEN = {'contact_tolerance': ('ground', 'tolerance'), 'gravity': ('gravity',)}
 RANGES = (
-    Permitted(
-        'limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for WARN'
-    ),
-    Permitted(
-        'limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for ERROR'
-    ),
-    Permitted(
-        'limits', 'torque_deadband', 'nm', 0.0, 1e3, 0.0, 1e6,
-        'torque below the limit that clears, N m; at most half of the limit counts',
-    ),
-    Permitted('limits', 'tip_warn', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for WARN, deg'),
-    Permitted('limits', 'tip_error', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for ERROR, deg'),
-    Permitted(
-        'limits', 'tip_deadband', 'deg', 0.0, 10.0, 0.0, 90.0,
-        'tilt above the limit that clears, deg',
-    ),
-    Permitted('limits', 'friction', '', 0.01, 2.0, 0.01, 10.0, 'friction on the ground',
-        live=False,
-    ),
-    Permitted('delays', 'tip_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a tip-over alert, s'),
-    Permitted('delays', 'torque_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a torque alert, s'),
-    Permitted('delays', 'fault_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before an input alert, s'),
-    Permitted('delays', 'off', 's', 0.0, 60.0, 0.0, 3600.0, 'how long good before a clear, s'),
-    Permitted(
-        'delays', 'tip_off', 's', 0.0, 60.0, 0.0, 3600.0,
-        'how long good before a tip-over alert clears, s',
-    ),
-    Permitted(
-        'delays', 'stale_after', 's', 0.001, LONGEST_SILENCE, 0.001, 60.0,
-        'shortest silence that is stale, s',
-    ),
-    Permitted(
-        'delays', 'stale_periods', '', 1.0, 100.0, 1.0, 1000.0,
-        f'own periods of silence that are stale; at most {LONGEST_SILENCE:g} s in all',
-    ),
-    Permitted(
-        'delays', 'tick', 's', 0.001, 1.0, 0.001, 60.0, 'how often silence is judged, s', live=False,
-    ),
-    Permitted(
-        'imu', 'agreement', 'deg', 0.1, 10.0, 0.1, 180.0,
-        'orientation may differ from gravity, deg',
-    ),
-    Permitted(
-        'imu', 'agreement_delay', 's', 0.0, 5.0, 0.0, 60.0, 'how long they may differ, s', live=False,
-    ),
-    Permitted(
-        'imu', 'low_pass', 's', 1e-4, 2.0, 1e-4, 60.0, 'time constant of the filter, s', live=False,
-    ),
-    Permitted(
-        'imu', 'rest_acceleration', 'mps2', 0.05, 5.0, 1e-3, 100.0, 'what counts as rest', live=False,
-    ),
-    Permitted('imu', 'rest_rate', 'radps', 0.005, 1.0, 1e-4, 100.0, 'what counts as rest',
-        live=False,
-    ),
-    Permitted(
-        'robot', 'contact_tolerance', 'm', 0.0, 0.05, 0.0, 1.0,
-        'how near to the ground a point stands on it', live=False,
-        written=('ground', 'tolerance'),
-    ),
-    Permitted(
-        'robot', 'gravity', 'mps2', 9.7, 9.9, 0.01, 100.0, 'gravity', live=False,
-        written=('gravity',)
-    ),
-)  # fmt: skip
+    *(Permitted(*row) for row in _LIVE),
+    *(Permitted(*row, live=False, written=_WRITTEN.get(row[1], ())) for row in _AT_REST),
+)
 
 
 @dataclass(frozen=True, slots=True)
