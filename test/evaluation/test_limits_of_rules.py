@@ -51,7 +51,9 @@ def test_a_stamp_may_stand_for_half_a_second(after: int, wrong: float) -> None:
     assert Freshness(Delays()).clocks(times, np.array([T0, T0])).tolist() == [0.0, wrong]
 
 
-@pytest.mark.parametrize(('period', 'limit'), [(10, 100), (33, 100), (40, 120), (600, 1800), (1000, 2000)])
+@pytest.mark.parametrize(
+    ('period', 'limit'), [(10, 100), (33, 100), (40, 120), (600, 1800), (1000, 2000)]
+)
 def test_silence_is_three_periods_but_at_least_a_tenth(period: int, limit: int) -> None:
     """Half a second until 32 intervals were seen, and never more than 2 s; ms."""
     fresh, columns = Freshness(Delays()), Freshness(Delays())

@@ -247,14 +247,14 @@ def test_a_heavier_payload_counts_at_once(live: Live) -> None:
 @pytest.mark.parametrize(
     ('values', 'reason'),
     [
-        ({'limits__torque_warn': 1.5}, 'torque_error'),
+        ({'limits__torque_warn': 1.0, 'limits__torque_error': 0.9}, 'torque_error'),
         ({'limits__tip_warn_deg': 1.0}, 'tip_error_deg'),
         ({'payload__mass_kg': -1.0}, ''),
         ({'payload__cog_m': [0.0, 0.0]}, 'three'),
         ({'imu__attitude': 'magnetometer'}, 'accelerometer'),
         ({'delays__off_s': float('nan')}, ''),
         ({'config': 'other.yaml'}, 'deactivate'),
-        ({'limits__tip_error_deg': 4.0, 'limits__torque_warn': 2.0}, 'torque_error'),
+        ({'limits__tip_error_deg': 4.0, 'limits__torque_error': 0.5}, 'torque_error'),
     ],
 )
 def test_a_set_that_cannot_be_taken_changes_nothing(

@@ -1,4 +1,4 @@
-"""What can be set on a running monitor, and what would disarm it: over DDS, as `ros2 param` does."""
+"""What can be set on a running monitor, and what would disarm it: over DDS, as ros2 param does."""
 
 import json
 import math
@@ -34,17 +34,21 @@ JOINT = 'joints.shoulder_joint.limit_nm'
 S = 1_000_000_000
 
 
+def messages(values: dict[str, Any]) -> list[Any]:
+    """Return parameters as they go over DDS."""
+    made: list[Any] = [parameter(k, v) for k, v in values.items()]
+    return [one.to_parameter_msg() for one in made]
+
+
 def put(live: Live, **values: Any) -> list[Any]:
     """Set parameters one by one, as `ros2 param set` does; `__` stands for a dot."""
-    wanted = [parameter(k, v).to_parameter_msg() for k, v in values.items()]
-    request = SetParameters.Request(parameters=wanted)
+    request = SetParameters.Request(parameters=messages(values))
     return list(live.call(SetParameters, f'{AT}/set_parameters', request).results)
 
 
 def put_at_once(live: Live, values: dict[str, Any]) -> Any:
     """Set parameters in one set."""
-    wanted = [parameter(k, v).to_parameter_msg() for k, v in values.items()]
-    request = SetParametersAtomically.Request(parameters=wanted)
+    request = SetParametersAtomically.Request(parameters=messages(values))
     name = f'{AT}/set_parameters_atomically'
     return live.call(SetParametersAtomically, name, request).result
 
@@ -121,7 +125,8 @@ def test_a_reason_that_says_nothing_is_refused(one: tuple[Live, Any], reason: st
 def test_a_monitor_does_not_start_with_a_value_beyond_its_range(live: Live, of: Permitted) -> None:
     """Given at the start it is refused as well, with the same words."""
     value = of.ceiling if of.ceiling > of.most else of.floor
-    monitor = live.monitor(up=False, **{of.name: value})
+    given: dict[str, Any] = {of.name: value}
+    monitor = live.monitor(up=False, **given)
     with pytest.raises(BadConfig, match='unsafe_limits'):
         monitor.bring_up()
 
@@ -233,7 +238,7 @@ def test_each_alert_carries_the_hash_into_the_black_box(live: Live) -> None:
     assert {values_of(alert)['limits_hash'] for alert in driver.alerts} == {expected}
 
 
-LOCKED = [
+LOCKED: list[dict[str, Any]] = [
     *({of.name: of.least} for of in LIVE_RANGES),
     {'unsafe_limits': WHY},
     {JOINT: 40.0},
