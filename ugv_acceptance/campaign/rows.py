@@ -8,8 +8,8 @@ from ugv_acceptance.campaign.failures import Failure, from_alerts
 
 Json = dict[str, Any]
 
-BROKEN = 'BROKEN'
-VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', BROKEN)
+BROKEN, NOT_JUDGED = 'BROKEN', 'NOT_JUDGED'
+VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', BROKEN, NOT_JUDGED)
 # Reasons kept of a run; its own result has all.
 _REASONS = 3
 
@@ -18,6 +18,7 @@ _REASONS = 3
 class Row:
     """A run: times in s, its start in ns. One that could not be read is BROKEN, with the reason.
 
+    One is NOT_JUDGED where that was prevented by something else than itself, with the reason.
     `judged_s` is the time in which the margins were known: only that can count as operated without
     a failure. `also` names other copies of the same recording.
     """
@@ -72,16 +73,21 @@ def broken_row(name: str, error: str) -> Row:
     return Row(name, BROKEN, (error,))
 
 
+def unjudged_row(name: str, why: str) -> Row:
+    """Return the line of a run that was not judged, by no fault of its own."""
+    return Row(name, NOT_JUDGED, (why,))
+
+
 def in_order(rows: Iterable[Row]) -> list[Row]:
-    """Return runs by their start, each recording once; broken ones last, by name."""
+    """Return runs by their start, each recording once; those without a result last, by name."""
     first: dict[str, Row] = {}
     copies: dict[str, list[str]] = {}
     for row in sorted(rows, key=lambda r: r.name):
-        key = row.sha256 or f'broken {row.name}'
+        key = row.sha256 or f'unread {row.name}'
         copies.setdefault(key, []).append(row.name)
         first.setdefault(key, row)
     single = [_with_copies(row, copies[key][1:]) for key, row in first.items()]
-    return sorted(single, key=lambda r: (r.verdict == BROKEN, r.start_ns, r.sha256, r.name))
+    return sorted(single, key=lambda r: (not r.sha256, r.start_ns, r.sha256, r.name))
 
 
 def _with_copies(row: Row, names: Sequence[str]) -> Row:

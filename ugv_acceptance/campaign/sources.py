@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag
+from ugv_acceptance.campaign.trouble import words
 
 METADATA = 'metadata.yaml'
 SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
@@ -97,7 +98,7 @@ def _remote_files(url: str) -> list[str]:
     try:
         listed = [path] if system.isfile(path) else system.find(path)
     except Exception as error:  # noqa: BLE001 - every protocol has its own errors
-        raise AcceptanceError(f'{url}: cannot be listed ({_words(error)})') from None
+        raise AcceptanceError(f'{url}: cannot be listed ({words(error)})') from None
     return [str(system.unstrip_protocol(file)) for file in listed]
 
 
@@ -113,15 +114,16 @@ def _opened(url: str) -> tuple[Any, str]:
             f"{url}: expected {name} for this URL (pip install 'ugv_acceptance[cluster]')"
         ) from None
     except Exception as error:  # noqa: BLE001 - every protocol has its own errors
-        raise AcceptanceError(
-            f'{url}: expected a URL that fsspec knows ({_words(error)})'
-        ) from None
+        raise AcceptanceError(f'{url}: expected a URL that fsspec knows ({words(error)})') from None
     return system, path
 
 
 @contextmanager
 def local_paths(source: Source) -> Iterator[Path | list[Path]]:
-    """Give what `open_bag` takes; remote files are copied into a folder that goes afterwards."""
+    """Give what `open_bag` takes; remote files are copied into a folder that goes afterwards.
+
+    BadBag where a remote file is not there; AcceptanceError where it cannot be fetched.
+    """
     if not source.remote:
         yield _openable(source, [Path(file) for file in source.files])
         return
@@ -138,15 +140,15 @@ def _copied(source: Source, folder: Path) -> list[Path]:
         copy = run / posixpath.basename(url)
         try:
             system.get_file(path, str(copy))
+        except FileNotFoundError as error:
+            if run.is_dir():
+                raise BadBag(f'{url}: cannot be read ({words(error)})') from None
+            raise AcceptanceError(f'{url}: cannot be copied ({words(error)})') from None
         except Exception as error:  # noqa: BLE001 - every protocol has its own errors
-            raise BadBag(f'{url}: cannot be read ({_words(error)})') from None
+            raise AcceptanceError(f'{url}: cannot be fetched ({words(error)})') from None
         copies.append(copy)
     return copies
 
 
 def _openable(source: Source, files: list[Path]) -> Path | list[Path]:
     return files[0].parent if source.files[-1].endswith(f'/{METADATA}') else files
-
-
-def _words(error: Exception) -> str:
-    return ' '.join(str(error).split())[:200] or type(error).__name__

@@ -1,7 +1,8 @@
 """The statement of a campaign: what its hours and failures show, ready for JSON.
 
 The same runs give the same statement whoever computed them in which order. Hours are those that
-could be judged; runs that are INCONCLUSIVE or BROKEN are counted, as no success.
+could be judged; runs that are INCONCLUSIVE or BROKEN are counted, as no success. While a run is
+NOT_JUDGED nobody knows what it would say: nothing is stated then but what was seen so far.
 """
 
 import math
@@ -13,7 +14,7 @@ from typing import Any
 from ugv_acceptance import __version__
 from ugv_acceptance.campaign.failures import Failure, counts
 from ugv_acceptance.campaign.groups import comparison
-from ugv_acceptance.campaign.rows import VERDICTS, Row
+from ugv_acceptance.campaign.rows import NOT_JUDGED, VERDICTS, Row
 from ugv_acceptance.studies.reliability import (
     Bounded,
     availability,
@@ -28,7 +29,17 @@ from ugv_acceptance.studies.reliability import (
 Json = dict[str, Any]
 
 # Version of the layout; changes where a reader of campaigns must change.
-CAMPAIGN_VERSION = 1
+CAMPAIGN_VERSION = 2
+# What a campaign states; None while it cannot.
+STATED = (
+    'mtbf_h',
+    'endurance',
+    'availability',
+    'success',
+    'trend',
+    'requirement',
+    'comparison',
+)
 # A failure at the very start is dated here (s): the power law has no rate at zero.
 _EARLIEST = 1.0
 
@@ -59,20 +70,23 @@ class Origin:
 def statement(
     rows: Sequence[Row], failures: Sequence[Failure], question: Question, origin: Origin
 ) -> Json:
-    """Return the campaign of `rows` (in order) and their failures, those of a log included."""
+    """Return the campaign of `rows` (in order) and their failures, those of a log included.
+
+    While a run is NOT_JUDGED, `no_statement` says so and what would be stated is None.
+    """
     judged, recorded = (
         sum(getattr(r, f) for r in rows) / 3600.0 for f in ('judged_s', 'duration_s')
     )
     times = failure_times(rows, failures)
     by_failure = question.failure_terminated and bool(times)
     hours = times[-1] if by_failure else judged
-    found = mtbf(hours, len(times), question.confidence, failure_terminated=by_failure)
     said: Json = {
         'version': CAMPAIGN_VERSION,
         'software': __version__,
         **asdict(origin),
         'confidence': question.confidence,
         'runs': _runs(rows),
+        'no_statement': no_statement(rows),
         'hours': {'recorded': recorded, 'judged': judged, 'counted': hours},
         'failures': {
             'chargeable': len(times),
@@ -80,16 +94,28 @@ def statement(
             **counts(failures),
             'each': [f.json() for f in failures],
         },
-        'mtbf_h': {**bounded(found), 'ended_by': 'failure' if by_failure else 'time'},
-        'endurance': _endurance(rows, question.confidence),
-        'availability': _availability(judged, failures, question.confidence),
-        'success': _success(rows, question.confidence),
-        'trend': _trend(times, hours, question.confidence, by_failure=by_failure),
-        'requirement': _requirement(question, hours, len(times), found),
-        'comparison': comparison(rows, failures, question.groups, question.confidence),
+        **dict.fromkeys(STATED),
         'each_run': [row.json() for row in rows],
     }
+    if said['no_statement'] is None:
+        shown = mtbf(hours, len(times), question.confidence, failure_terminated=by_failure)
+        said |= {
+            'mtbf_h': {**bounded(shown), 'ended_by': 'failure' if by_failure else 'time'},
+            'endurance': _endurance(rows, question.confidence),
+            'availability': _availability(judged, failures, question.confidence),
+            'success': _success(rows, question.confidence),
+            'trend': _trend(times, hours, question.confidence, by_failure=by_failure),
+            'requirement': _requirement(question, hours, len(times), shown),
+            'comparison': comparison(rows, failures, question.groups, question.confidence),
+        }
     return said
+
+
+def no_statement(rows: Sequence[Row]) -> str | None:
+    """Return why nothing can be stated, None where it can."""
+    count = sum(row.verdict == NOT_JUDGED for row in rows)
+    were = 'run was' if count == 1 else 'runs were'
+    return f'{count} {were} not judged: no statement' if count else None
 
 
 def failure_times(rows: Sequence[Row], failures: Sequence[Failure]) -> list[float]:

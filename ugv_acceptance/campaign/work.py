@@ -7,12 +7,13 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from ugv_acceptance import AcceptanceError, __version__
+from ugv_acceptance import AcceptanceError, BadBag, __version__
 from ugv_acceptance.bag.judge import RESULT_VERSION, Terms, judge
 from ugv_acceptance.bag.reader import Bag, choose_topics, open_bag
 from ugv_acceptance.bag.result import json_text
 from ugv_acceptance.campaign.rows import Row, row_of
 from ugv_acceptance.campaign.sources import Source, local_paths
+from ugv_acceptance.campaign.trouble import is_of_the_machine
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.criteria import CriteriaSet
@@ -31,10 +32,11 @@ class Brief:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A run that was looked at: its source, size (bytes), and one of three outcomes.
+    """A run that was looked at: its source, size (bytes), and one of four outcomes.
 
     `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
-    that it could not be read. `cpu` is the CPU time (s) of its process that it took.
+    that it is unreadable (`missing`: a file of it is not there), `lost` that it was not judged for
+    a reason that is not its own. `cpu` is the CPU time (s) of its process that it took.
     """
 
     source: Source
@@ -44,6 +46,8 @@ class Done:
     text: str = ''
     error: str = ''
     cpu: float = 0.0
+    lost: str = ''
+    missing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +66,7 @@ def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
 
 
 def judge_source(source: Source, brief: Brief) -> Done:
-    """Return what came of one run; whatever is wrong with it is said in `error`, never raised."""
+    """Return what came of one run; whatever is wrong is said in `error` or `lost`, never raised."""
     began = time.process_time()
     return replace(_tried(source, brief), cpu=time.process_time() - began)
 
@@ -72,18 +76,30 @@ def _tried(source: Source, brief: Brief) -> Done:
         with local_paths(source) as paths:
             try:
                 found = _judged(open_bag(paths), brief)
-            except AcceptanceError as error:
-                return Done(source, error=_renamed(str(error), source, paths))
             except Exception as error:  # noqa: BLE001 - one broken bag never ends a campaign
-                text = f'{type(error).__name__}: {error}'
-                return Done(source, error=_renamed(text, source, paths))
+                return _failed(source, paths, error)
             if found.result is None:
                 return Done(source, found.key, found.size)
             result = _renamed(found.result, source, paths)
-    except (AcceptanceError, OSError) as error:  # no room for a copy is this run's trouble alone
+    except BadBag as error:
         return Done(source, error=str(error))
+    except (AcceptanceError, OSError) as error:  # not fetched, no room for a copy
+        return Done(source, lost=str(error))
     row = row_of(source.name, found.key, result)
     return Done(source, found.key, found.size, row, json_text(result))
+
+
+def _failed(source: Source, paths: Path | list[Path], error: Exception) -> Done:
+    """Return a run that failed: by its own fault, or by that of the machine."""
+    text = str(error) if isinstance(error, AcceptanceError) else f'{type(error).__name__}: {error}'
+    text = _renamed(text, source, paths)
+    files = [paths] if isinstance(paths, Path) else paths
+    if not source.remote:
+        files = [Path(file) for file in source.files]
+    if is_of_the_machine(error, files):
+        return Done(source, lost=text)
+    missing = not source.remote and not all(file.exists() for file in files)
+    return Done(source, error=text, missing=missing)
 
 
 def _judged(bag: Bag, brief: Brief) -> _Found:

@@ -59,13 +59,19 @@ def campaign(
     scheduler: Annotated[
         str | None, typer.Option(help='Address of a dask.distributed scheduler to work instead.')
     ] = None,
+    cluster_wait: Annotated[
+        float,
+        typer.Option(min=0.0, help='Seconds to wait for a scheduler or workers that are gone.'),
+    ] = 60.0,
 ) -> None:
     """Judge many runs and state what they show: MTBF, availability, success, trend.
 
     Writes campaign.json, campaign.html and a result a run into --out. A run that is INCONCLUSIVE
-    or cannot be read is counted, never dropped. With --require-mtbf the exit code is 0 where it is
-    demonstrated, 1 where it is excluded, 3 where neither; else 0 where every run passed, 1 where
-    one failed, 2 where one could not be read, 3 where one is inconclusive.
+    or cannot be read is counted, never dropped. While a run was not judged (a worker died, a
+    scheduler or a network is gone) nothing is stated and the exit code is 3: the same command
+    again judges what is missing. With --require-mtbf the exit code is 0 where it is demonstrated,
+    1 where it is excluded, 3 where neither; else 0 where every run passed, 1 where one failed, 2
+    where one could not be read, 3 where one is inconclusive.
 
     \b
     Examples:
@@ -88,9 +94,8 @@ def campaign(
     sources = find_sources(places)
     began = time.monotonic()
     with progress_bar(len(sources)) as progress:
-        rows, effort = carry_out(
-            sources, brief, Place(out, workers or cores(), scheduler), progress
-        )
+        place = Place(out, workers or cores(), scheduler, cluster_wait)
+        rows, effort = carry_out(sources, brief, place, progress)
     took = time.monotonic() - began
     said = statement(rows, all_failures(rows, entries), question, origin)
     write(out, said)
@@ -101,7 +106,12 @@ def campaign(
 
 
 def exit_code(said: dict[str, Any]) -> int:
-    """Return the exit code: that of the requirement if there is one, else of the worst run."""
+    """Return the exit code: that of the requirement if there is one, else of the worst run.
+
+    That of INCONCLUSIVE where nothing could be stated.
+    """
+    if said['no_statement'] is not None:
+        return EXIT['INCONCLUSIVE']
     if said['requirement'] is not None:
         return EXIT[said['requirement']['verdict']]
     worst = (('FAIL', 1), ('BROKEN', 2), ('INCONCLUSIVE', 3))
@@ -151,7 +161,7 @@ def write(out: Path, said: dict[str, Any]) -> None:
 
 @contextmanager
 def progress_bar(total: int) -> 'Iterator[Callable[[Done], None]]':
-    """Show how many runs are ready, where a person is watching."""
+    """Show how many runs are ready, and how many not judged, where a person is watching."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 
@@ -164,4 +174,12 @@ def progress_bar(total: int) -> 'Iterator[Callable[[Done], None]]':
         disable=not console.is_terminal,
     ) as bar:
         task = bar.add_task('runs', total=total)
-        yield lambda _: bar.advance(task)
+        lost = 0
+
+        def advance(done: 'Done') -> None:
+            nonlocal lost
+            lost += bool(done.lost)
+            words = f'runs ({lost} not judged)' if lost else 'runs'
+            bar.update(task, advance=1, description=words)
+
+        yield advance

@@ -24,21 +24,23 @@ def print_campaign(said: Json, out: Path, console: Console | None = None) -> Non
     for what, text in lines(said):
         table.add_row(escape(what), escape(text))
     console.print(table)
-    broken = [run for run in said['each_run'] if run['verdict'] == 'BROKEN']
-    for run in broken[:_MOST_BROKEN]:
-        console.print(
-            f'    BROKEN {escape(run["name"])}: {escape(run["reasons"][0])}', soft_wrap=True
-        )
-    if len(broken) > _MOST_BROKEN:
-        console.print(f'    and {len(broken) - _MOST_BROKEN} more that could not be read')
+    for word, what in (('BROKEN', 'could not be read'), ('NOT_JUDGED', 'were not judged')):
+        runs = [run for run in said['each_run'] if run['verdict'] == word]
+        for run in runs[:_MOST_BROKEN]:
+            text = f'    {word} {run["name"]}: {run["reasons"][0]}'
+            console.print(escape(text), soft_wrap=True)
+        if len(runs) > _MOST_BROKEN:
+            console.print(f'    and {len(runs) - _MOST_BROKEN} more that {what}')
     console.print(f'    {escape(str(out / "campaign.json"))}, campaign.html', soft_wrap=True)
 
 
 def lines(said: Json) -> list[tuple[str, str]]:
     """Return the statement as pairs of what and how much."""
     runs, share = said['runs'], f'{said["confidence"]:.0%}'
-    hours, failed, success = said['hours'], said['failures'], said['success']
+    hours, failed = said['hours'], said['failures']
     verdicts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS)
+    if runs['NOT_JUDGED']:
+        verdicts += f', {runs["NOT_JUDGED"]} NOT_JUDGED'
     found = [
         ('runs', f'{runs["total"]}: {verdicts}; copies counted once: {runs["copies"]}'),
         ('hours', f'{hours["judged"]:.3f} judged of {hours["recorded"]:.3f} recorded'),
@@ -47,8 +49,16 @@ def lines(said: Json) -> list[tuple[str, str]]:
             f'{failed["chargeable"]} chargeable'
             + ''.join(f'; {count} {name}' for name, count in failed['class'].items()),
         ),
+    ]
+    if said['no_statement']:
+        again = 'the same command again judges what is missing'
+        return [*found, ('statement', f'{said["no_statement"]}; {again}')]
+    found += [
         ('MTBF', mtbf_text(said['mtbf_h'], share)),
-        ('success', f'{interval_percent(success)} at {share} (what is unclear is no success)'),
+        (
+            'success',
+            f'{interval_percent(said["success"])} at {share} (what is unclear is no success)',
+        ),
         ('trend', trend_text(said['trend'])),
     ]
     if said['availability']['repairs_known']:

@@ -15,7 +15,7 @@ Json = dict[str, Any]
 # Runs listed one by one; campaign.json has all.
 MOST_RUNS = 400
 MOST_FAILURES = 400
-MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?', 'BROKEN': '!'}
+MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?', 'BROKEN': '!', 'NOT_JUDGED': '∅'}
 
 
 def campaign_page(said: Json) -> str:
@@ -41,6 +41,8 @@ def campaign_page(said: Json) -> str:
 
 def closing(said: Json) -> str:
     """Return the sentence the report ends on."""
+    if said['no_statement'] is not None:
+        return f'{said["no_statement"]}. The same command again judges what is missing.'
     found = said['requirement']
     if found is None:
         return 'No reliability was required of this campaign; it states what was observed.'
@@ -54,6 +56,8 @@ def closing(said: Json) -> str:
 
 def trend_figure(said: Json) -> Figure | None:
     """Return failures over judged hours: the count, a constant rate, the power law; None: none."""
+    if said['trend'] is None:
+        return None
     times, hours = said['trend']['failure_times_h'], said['hours']['counted']
     if not times or hours <= 0.0:
         return None

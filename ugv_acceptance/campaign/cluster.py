@@ -1,0 +1,259 @@
+"""Runs given to the workers of a dask.distributed scheduler, any of which may die or go away.
+
+Every batch is given to one worker by its address, a few ahead: so it is known what was lost with a
+worker. Of several runs that were, each is tried once more by itself, after all others: a run that
+kills its worker takes none with it. Where the scheduler goes away, a new connection is tried.
+"""
+
+import time
+from asyncio import CancelledError
+from collections import Counter, deque
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.campaign.batches import AHEAD, DIED, Runs, Work, batches, each
+from ugv_acceptance.campaign.sources import Source
+from ugv_acceptance.campaign.trouble import words
+from ugv_acceptance.campaign.work import Done
+
+# How long (s) a scheduler or workers that are gone are waited for.
+WAIT_S = 60.0
+# Workers a run may fail on while it has them for itself; and how often it may be lost at all.
+_FAULTS, _LOSSES = 2, 8
+# Times (s): between looks at who works, to connect, for an answer of the scheduler, for a result.
+_LOOK_S, _CONNECT_S, _ANSWER_S, _FETCH_S = 0.5, 5.0, 30.0, 10.0
+# dask lets through what its parts raise: OSError, ValueError, RuntimeError, its own cancellation.
+_ANY = (Exception, CancelledError)
+
+
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """A batch given to a worker, by its address; `alone` as the only one it has."""
+
+    future: Any
+    worker: str
+    runs: Runs
+    alone: bool
+
+
+def on_cluster(
+    work: Work, sources: Sequence[Source], address: str, wait_s: float = WAIT_S
+) -> Iterator[Done]:
+    """Yield the outcome of `work` for every source, done by the workers of a dask scheduler.
+
+    The workers need this package, and see paths as their own: shared disks, or URLs. Without a
+    scheduler or a worker for `wait_s` the rest is not judged. AcceptanceError where there is no
+    scheduler to begin with, or no dask.
+    """
+    distributed = _distributed()
+    try:
+        client = _connected(distributed, address)
+    except (OSError, ValueError) as error:
+        raise AcceptanceError(
+            f'--scheduler {address}: expected a dask scheduler, got: {words(error)}'
+        ) from None
+    given_out = _GivenOut(distributed, work, address, wait_s, list(sources), client)
+    try:
+        yield from given_out.judged()
+    finally:
+        given_out.disconnect()
+
+
+def _connected(distributed: Any, address: str) -> Any:  # noqa: ANN401 - a module of an extra
+    return distributed.Client(address, timeout=f'{_CONNECT_S}s', set_as_default=False)
+
+
+@dataclass(slots=True)
+class _GivenOut:
+    """The state of a campaign on a cluster: what waits, what is given out, what came back."""
+
+    distributed: Any
+    work: Work
+    address: str
+    wait_s: float
+    unsorted: list[Source]
+    client: Any
+    waiting: deque[Runs] = field(default_factory=deque)
+    suspects: deque[Source] = field(default_factory=deque)
+    given: dict[str, _Given] = field(default_factory=dict)
+    ready: 'SimpleQueue[str]' = field(default_factory=SimpleQueue)
+    ended: list[Done] = field(default_factory=list)
+    losses: Counter[Source] = field(default_factory=Counter)
+    faults: Counter[Source] = field(default_factory=Counter)
+    workers: dict[str, int] = field(default_factory=dict)
+    next_look: float = 0.0
+    trouble: str = ''
+    call: Any = None
+
+    def judged(self) -> Iterator[Done]:
+        """Yield what came of every run, at last of those that nobody was left to judge."""
+        gone_since: float | None = None
+        while self.unsorted or self.waiting or self.suspects or self.given:
+            self.look()
+            if self.workers:
+                gone_since = None
+            else:
+                gone_since = gone_since or time.monotonic()
+                if time.monotonic() - gone_since > self.wait_s:
+                    break
+            self.take_back()
+            self.give()
+            yield from self.collected()
+            yield from self.ended
+            self.ended.clear()
+        left = [run for given in self.given.values() for run in given.runs]
+        left += [*self.unsorted, *self.suspects, *(run for runs in self.waiting for run in runs)]
+        yield from (Done(run, lost=f'{self.trouble} for {self.wait_s:g} s') for run in left)
+
+    def look(self) -> None:
+        """See who works now, at most every so often; connect again where that is needed."""
+        if time.monotonic() < self.next_look:
+            return
+        try:
+            if self.client is None:
+                self.client = _connected(self.distributed, self.address)
+            if self.client.status != 'running':
+                raise ConnectionError(self.client.status)
+            found: Mapping[str, int] = self.client.sync(
+                self.client.scheduler.ncores, callback_timeout=_ANSWER_S
+            )
+            self.workers = {worker: max(1, threads) for worker, threads in found.items()}
+            self.trouble = f'the dask scheduler at {self.address} had no workers'
+            # A cluster that grows by need grows for this call.
+            self.call = None if found else self.call or self.client.submit(int, pure=False)
+        except _ANY:
+            self.trouble = f'no dask scheduler answered at {self.address}'
+            self.disconnect()
+        self.next_look = time.monotonic() + _LOOK_S
+
+    def disconnect(self) -> None:
+        """Close the connection, whatever is left of it; what was given out waits again."""
+        client, self.client, self.call, self.workers = self.client, None, None, {}
+        for key in list(self.given):
+            self.back(key, self.trouble, blamed=False)
+        if client is not None:
+            with suppress(*_ANY):
+                client.close(timeout=_CONNECT_S)
+
+    def take_back(self) -> None:
+        """Take back what was given to workers that are gone."""
+        lost: dict[str, list[str]] = {}
+        for key, given in self.given.items():
+            if given.worker not in self.workers:
+                lost.setdefault(given.worker, []).append(key)
+        for keys in lost.values():
+            for key in keys:
+                self.back(key, DIED, blamed=len(keys) == 1, suspect=True)
+
+    def back(self, key: str, why: str, *, blamed: bool, suspect: bool = False) -> None:
+        """Let runs that were given out wait again; end those that were lost too often.
+
+        `blamed`, by a single run; as a `suspect` it is tried by itself.
+        """
+        given = self.given.pop(key)
+        with suppress(*_ANY):
+            given.future.release()
+        self.losses.update(given.runs)
+        if blamed and len(given.runs) == 1:
+            self.faults.update(given.runs)
+        left = []
+        for run in given.runs:
+            if self.faults[run] >= _FAULTS or self.losses[run] >= _LOSSES:
+                self.ended.append(Done(run, lost=f'{why}; given out {self.losses[run]} times'))
+            else:
+                left.append(run)
+        if suspect or given.alone:
+            # Whoever failed alone comes last.
+            self.suspects = deque(sorted((*self.suspects, *left), key=lambda one: self.faults[one]))
+        elif left:
+            self.waiting.appendleft(left)
+
+    def give(self) -> None:
+        """Give workers something ahead; a suspect to one that has nothing else, at the end."""
+        if self.unsorted and self.workers:
+            self.waiting.extend(batches(self.unsorted, sum(self.workers.values())))
+            self.unsorted = []
+        load = Counter(given.worker for given in self.given.values())
+        while self.waiting and self.workers:
+            worker = min(self.workers, key=lambda one: load[one] / self.workers[one])
+            if load[worker] >= AHEAD * self.workers[worker]:
+                return
+            self.submit(worker, self.waiting.popleft(), alone=False)
+            load[worker] += 1
+        for worker in list(self.workers):
+            if self.suspects and not load[worker]:
+                self.submit(worker, [self.suspects.popleft()], alone=True)
+
+    def submit(self, worker: str, runs: Runs, *, alone: bool) -> None:
+        """Give runs to a worker, with all they need: what is kept on a worker dies with it."""
+        try:
+            future = self.client.submit(each, self.work, runs, workers=[worker], pure=False)
+        except _ANY:
+            # The connection is closed: the next look will find that out.
+            self.workers, self.next_look = {}, 0.0
+            if alone:
+                self.suspects.extend(runs)
+            else:
+                self.waiting.appendleft(runs)
+            return
+        self.given[future.key] = _Given(future, worker, runs, alone)
+        future.add_done_callback(lambda done: self.ready.put(done.key))
+
+    def collected(self) -> Iterator[Done]:
+        """Yield what is ready; wait for something, but not for long."""
+        with suppress(Empty):
+            yield from self.outcome(self.ready.get(timeout=_LOOK_S))
+            while True:
+                yield from self.outcome(self.ready.get_nowait())
+
+    def outcome(self, key: str) -> list[Done]:
+        """Return what came of a batch, nothing where it is lost: then its runs wait again."""
+        given = self.given.get(key)
+        if given is None:
+            return []
+        why, blamed = 'what became of it was lost with its worker', False
+        try:
+            if given.future.status == 'finished':
+                found: list[Done] = given.future.result(timeout=_FETCH_S)
+                del self.given[key]
+                given.future.release()
+                return [_seen_here(done) for done in found]
+            if given.future.status == 'error':
+                error = given.future.exception(timeout=_FETCH_S)
+                killed = isinstance(error, self.distributed.KilledWorker)
+                why = DIED if killed else f'its worker could not: {words(error)}'
+                blamed = not killed or self.only(given.worker)
+            else:
+                # Cancelled: mostly since the scheduler is another one.
+                why, self.workers, self.next_look = 'the dask scheduler lost it', {}, 0.0
+        except _ANY:
+            self.next_look = 0.0
+        self.back(key, why, blamed=blamed, suspect=given.future.status != 'cancelled')
+        return []
+
+    def only(self, worker: str) -> bool:
+        """Return whether a worker has been given one batch alone."""
+        return sum(given.worker == worker for given in self.given.values()) == 1
+
+
+def _seen_here(done: Done) -> Done:
+    """Return what came of a run; of one whose worker lacks files that are here, that."""
+    if done.missing and all(Path(file).exists() for file in done.source.files):
+        why = 'its worker does not see this path, which is here'
+        return replace(done, error='', lost=f'{why}: {done.error}')
+    return done
+
+
+def _distributed() -> Any:  # noqa: ANN401 - a module of an extra
+    try:
+        import distributed  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise AcceptanceError(
+            "--scheduler: expected dask.distributed (pip install 'ugv_acceptance[cluster]')"
+        ) from None
+    return distributed

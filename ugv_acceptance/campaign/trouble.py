@@ -1,0 +1,42 @@
+"""What keeps a run from being judged, told apart from a recording that is itself unreadable.
+
+No memory, no room, no network, no right to read: that is no fault of the run, and says nothing
+about it. A file that is not there, or holds something else, is.
+"""
+
+import errno
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+# Of the machine, its network and rights, as far as this system has them. EIO is not among them: so
+# answers a bad sector.
+_NAMES = (
+    *('ENOMEM', 'ENOSPC', 'EDQUOT', 'EROFS', 'EFBIG', 'EMFILE', 'ENFILE', 'EAGAIN', 'EBUSY'),
+    *('EINTR', 'ENOLCK', 'EACCES', 'EPERM', 'ESTALE', 'EREMOTEIO', 'ECOMM', 'ENONET', 'ENOLINK'),
+    *('EPROTO', 'ENETDOWN', 'ENETUNREACH', 'ENETRESET', 'EHOSTDOWN', 'EHOSTUNREACH', 'EPIPE'),
+    *('ENOTCONN', 'ENOBUFS', 'ESHUTDOWN', 'ECONNABORTED', 'ECONNREFUSED', 'ECONNRESET'),
+    'ETIMEDOUT',
+)
+_MACHINE = frozenset(getattr(errno, name) for name in _NAMES if hasattr(errno, name))
+
+
+def is_of_the_machine(error: BaseException, files: Iterable[Path]) -> bool:
+    """Return whether an error met while judging `files` is of the machine, not of these files."""
+    return any(
+        isinstance(cause, (MemoryError, ConnectionError, TimeoutError, PermissionError))
+        or (isinstance(cause, OSError) and cause.errno in _MACHINE)
+        # What is missing is something else, such as the folder for temporary files.
+        or (isinstance(cause, FileNotFoundError) and all(file.exists() for file in files))
+        for cause in _causes(error)
+    )
+
+
+def words(error: BaseException) -> str:
+    """Return what an error says in one line of at most 200 characters, or its name."""
+    return ' '.join(str(error).split())[:200] or type(error).__name__
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
