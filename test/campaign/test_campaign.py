@@ -36,6 +36,7 @@ def test_every_run_is_counted_once(single: Path) -> None:
         'FAIL': 1,
         'INCONCLUSIVE': 1,
         'BROKEN': 1,
+        'NOT_JUDGED': 0,
         'copies': 1,
     }
 
@@ -108,14 +109,14 @@ def test_a_spoilt_result_is_computed_again(fleet: Path, tmp_path: Path) -> None:
         assert carry_out(sources, brief(), place)[0] == rows
 
 
-def test_no_room_for_a_copy_breaks_that_run_alone(
-    fleet: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where a recording cannot be fetched for want of a place, its run is broken, with why."""
+def test_no_room_for_a_copy_breaks_no_run(fleet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a recording cannot be fetched for want of a place, its run is not judged, with why."""
     pytest.importorskip('fsspec', reason='extra cluster is not installed')
     (source,) = find_sources([f'file://{fleet}/good_a'])
     monkeypatch.setattr(tempfile, 'tempdir', str(fleet / 'gone'))
-    assert 'No such file or directory' in judge_source(source, brief()).error
+    done = judge_source(source, brief())
+    assert 'No such file or directory' in done.lost
+    assert not done.error
 
 
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
@@ -140,11 +141,12 @@ def test_groups_that_cannot_be_compared_are_refused(fleet: Path, tmp_path: Path)
 
 
 def test_a_worker_that_dies_takes_one_run_down() -> None:
-    """The run that killed its process is said to have; all others are done."""
+    """The run that killed its process is not judged, and not broken; all others are done."""
     sources = [Source(name, (name,)) for name in 'abcdef']
     done = {d.source.name: d for d in in_processes(exit_at_b, sources, 2)}
     assert sorted(done) == list('abcdef')
-    assert [name for name, d in done.items() if d.error] == ['b']
+    assert [name for name, d in done.items() if d.lost] == ['b']
+    assert not any(d.error for d in done.values())
 
 
 def test_a_dask_cluster_gives_the_same(fleet: Path, tmp_path: Path, single: Path) -> None:

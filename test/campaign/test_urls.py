@@ -1,11 +1,16 @@
 """Bags at URLs: a real S3 server on loopback, and fsspec's own protocols."""
 
 import json
+import os
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from campaign.fleet import campaign, said
+from campaign.fleet import brief, campaign, said
+
+from ugv_acceptance.campaign.sources import Source, find_sources
+from ugv_acceptance.campaign.work import judge_source
 
 BUCKET = 'acceptance'
 
@@ -67,6 +72,30 @@ def test_a_bucket_that_is_not_there_is_one_line(s3: str, tmp_path: Path) -> None
     """Exit code 2 and one line."""
     code, text = campaign(tmp_path, s3.replace(BUCKET, 'nobody'))
     assert (code, text.count('\n')) == (2, 1)
+
+
+def test_an_object_that_is_gone_is_broken_a_server_that_is_gone_is_not(
+    s3: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file missing after it was listed is the run's; a network that fails says nothing of it."""
+    fsspec = pytest.importorskip('fsspec', reason='extra cluster is not installed')
+
+    def listening_at(url: str) -> None:
+        access = {'endpoint_url': url, 'key': 'nobody', 'secret': 'secret'}
+        monkeypatch.setitem(fsspec.config.conf, 's3', access)
+
+    listening_at(os.environ['FSSPEC_S3_ENDPOINT_URL'])
+    (good,) = find_sources([f'{s3}/good_a'])
+    gone = judge_source(Source(f'{s3}/gone.mcap', (f'{s3}/gone.mcap',), remote=True), brief())
+    assert gone.error.startswith(f'{s3}/gone.mcap: cannot be read')
+    assert not gone.lost
+    with socket.socket() as nobody:  # a port that is taken, at which nobody listens
+        nobody.bind(('127.0.0.1', 0))
+        listening_at(f'http://127.0.0.1:{nobody.getsockname()[1]}')
+        lost = judge_source(good, brief())
+    assert lost.lost.startswith(f'{s3}/good_a/')
+    assert 'cannot be fetched' in lost.lost
+    assert not lost.error
 
 
 def test_file_urls_are_read(fleet: Path, tmp_path: Path) -> None:
