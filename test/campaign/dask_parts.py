@@ -29,27 +29,18 @@ class Cluster:
         """Where the scheduler listens."""
         return f'tcp://127.0.0.1:{self.port}'
 
-    def __enter__(self) -> 'Cluster':
-        """Return it; the first process is up to the test."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Kill what still runs."""
-        self.kill_workers()
-        self.kill_scheduler()
-
-    def start(self, workers: int = 1) -> 'Cluster':
-        """Start the scheduler, if none runs, and so many more workers; wait until they are there."""
+    def start(self, workers: int) -> None:
+        """Start the scheduler, if none runs, and workers until so many live; wait for all."""
         if self.scheduler is None:
             words = ('dask_scheduler', '--host', '127.0.0.1', '--port', str(self.port))
             self.scheduler = self._process(*words, '--no-dashboard', '--no-show')
         options = ('--no-nanny', '--nthreads', '1', '--memory-limit', '0', '--no-dashboard')
-        for _ in range(workers):
+        self.workers = [worker for worker in self.workers if worker.poll() is None]
+        while len(self.workers) < workers:
             self.workers.append(self._process('dask_worker', self.address, *options))
         with distributed.Client(self.address, timeout='60s', set_as_default=False) as client:
-            if self.workers:
-                client.wait_for_workers(len(self.workers), timeout=60)
-        return self
+            if workers:
+                client.wait_for_workers(workers, timeout=60)
 
     def _process(self, module: str, *words: str) -> 'subprocess.Popen[bytes]':
         command = [sys.executable, '-m', f'distributed.cli.{module}', *words]

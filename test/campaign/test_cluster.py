@@ -20,24 +20,27 @@ pytest.importorskip('distributed', reason='extra cluster is not installed')
 
 from campaign.dask_parts import Cluster
 
-RUNS = 12
+RUNS = 8
 
 
 @pytest.fixture(scope='module')
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of twelve good runs."""
+    """The folder of eight good runs."""
     folder = tmp_path_factory.mktemp('runs')
     for k in range(RUNS):
         write_run(folder / f'run_{k:02d}', k)
     return folder
 
 
-@pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[Cluster]:
-    """A cluster that is not started yet, in a folder of its own."""
-    (tmp_path / 'elsewhere').mkdir()
-    with Cluster(tmp_path / 'elsewhere') as found:
+@pytest.fixture(scope='module')
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A cluster for all tests, which start what they need of it and kill what they like."""
+    found = Cluster(tmp_path_factory.mktemp('elsewhere'))
+    try:
         yield found
+    finally:
+        found.kill_workers()
+        found.kill_scheduler()
 
 
 def once(act: Callable[[], object]) -> Callable[[Done], None]:
@@ -105,15 +108,16 @@ def test_what_a_dead_cluster_leaves_is_judged_by_the_next_call(
     assert set(found) == {'PASS', 'NOT_JUDGED'}
     reasons = {row.reasons for row in rows if row.verdict == 'NOT_JUDGED'}
     assert reasons == {(why.format(cluster.address),)}
-    code, text = campaign(tmp_path / 'out', runs, '--workers', '1')
-    assert f'{found["NOT_JUDGED"]} of {RUNS} judged anew' in text
-    assert (code, said(tmp_path / 'out')['runs']['PASS']) == (0, RUNS)
+    again, effort = carry_out(find_sources([str(runs)]), brief(), Place(tmp_path / 'out', 1))
+    assert effort.judged == found['NOT_JUDGED']
+    assert counted(again) == {'PASS': RUNS}
 
 
 def test_no_statement_is_made_of_runs_that_were_not_judged(
     runs: Path, tmp_path: Path, cluster: Cluster, repository: Path
 ) -> None:
     """Exit code 3; text, page and JSON say so, and no number is claimed, whatever was asked."""
+    cluster.kill_workers()
     cluster.start(0)
     options = ('--scheduler', cluster.address, '--cluster-wait', '0', '--require-mtbf', '0.0001')
     code, text = campaign(
@@ -140,7 +144,7 @@ def test_no_statement_is_made_of_runs_that_were_not_judged(
 
 def test_a_run_that_kills_its_workers_takes_no_other_with_it(cluster: Cluster) -> None:
     """It is given up after a few workers, as not judged; all others are done."""
-    cluster.start(4)
+    cluster.start(3)
     sources = [Source(name, (name,)) for name in 'abcdefgh']
     done = {d.source.name: d for d in on_cluster(exit_at_b, sources, cluster.address, 1.0)}
     assert sorted(done) == list('abcdefgh')

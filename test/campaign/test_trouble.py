@@ -31,7 +31,7 @@ def caused(error: Exception) -> BadBag:
     ],
 )
 def test_an_error_is_of_the_machine_or_of_the_recording(
-    error: Exception, machine: bool, tmp_path: Path
+    error: Exception, *, machine: bool, tmp_path: Path
 ) -> None:
     """No memory, room, network or right is the machine's; so it is as the cause of another."""
     assert is_of_the_machine(error, [tmp_path]) is machine

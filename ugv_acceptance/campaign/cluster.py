@@ -5,11 +5,12 @@ worker. Of several runs that were, each is tried once more by itself, after all 
 kills its worker takes none with it. Where the scheduler goes away, a new connection is tried.
 """
 
+import logging
 import time
 from asyncio import CancelledError
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -52,20 +53,35 @@ def on_cluster(
     """
     distributed = _distributed()
     try:
-        client = _connected(distributed, address)
+        client = _connected(distributed, address, _CONNECT_S)
     except (OSError, ValueError) as error:
         raise AcceptanceError(
             f'--scheduler {address}: expected a dask scheduler, got: {words(error)}'
         ) from None
     given_out = _GivenOut(distributed, work, address, wait_s, list(sources), client)
+    with _quiet():
+        try:
+            yield from given_out.judged()
+        finally:
+            given_out.disconnect()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Let dask's own log be silent on what it lost: that is said here, for every run."""
+    logs = [logging.getLogger(name) for name in ('distributed', 'distributed.client')]
+    before = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
     try:
-        yield from given_out.judged()
+        yield
     finally:
-        given_out.disconnect()
+        for log, level in zip(logs, before, strict=True):
+            log.setLevel(level)
 
 
-def _connected(distributed: Any, address: str) -> Any:  # noqa: ANN401 - a module of an extra
-    return distributed.Client(address, timeout=f'{_CONNECT_S}s', set_as_default=False)
+def _connected(distributed: Any, address: str, patience: float) -> Any:  # noqa: ANN401 - an extra
+    return distributed.Client(address, timeout=patience, set_as_default=False)
 
 
 @dataclass(slots=True)
@@ -116,7 +132,8 @@ class _GivenOut:
             return
         try:
             if self.client is None:
-                self.client = _connected(self.distributed, self.address)
+                patience = min(_CONNECT_S, max(1.0, self.wait_s))
+                self.client = _connected(self.distributed, self.address, patience)
             if self.client.status != 'running':
                 raise ConnectionError(self.client.status)
             found: Mapping[str, int] = self.client.sync(
