@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import distributed
 
@@ -38,7 +39,8 @@ class Cluster:
         self.workers = [worker for worker in self.workers if worker.poll() is None]
         while len(self.workers) < workers:
             self.workers.append(self._process('dask_worker', self.address, *options))
-        with distributed.Client(self.address, timeout='60s', set_as_default=False) as client:
+        connect: Any = distributed.Client
+        with connect(self.address, timeout='60s', set_as_default=False) as client:
             if workers:
                 client.wait_for_workers(workers, timeout=60)
 

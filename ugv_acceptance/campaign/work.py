@@ -68,7 +68,11 @@ def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
 def judge_source(source: Source, brief: Brief) -> Done:
     """Return what came of one run; whatever is wrong is said in `error` or `lost`, never raised."""
     began = time.process_time()
-    return replace(_tried(source, brief), cpu=time.process_time() - began)
+    try:
+        done = _tried(source, brief)
+    except MemoryError:
+        done = Done(source, lost='MemoryError: no memory for its result')
+    return replace(done, cpu=time.process_time() - began)
 
 
 def _tried(source: Source, brief: Brief) -> Done:
