@@ -59,7 +59,7 @@ def test_orientation_posture_and_payload_count(tmp_path: Path) -> None:
         'rollover',
         *('--orientation', 'right', '--slope', '25deg', '--payload', '2'),
         *('--posture', 'turret_joint=90deg,flipper_joint=180deg'),
-        *('--x', 'shoulder_joint=0deg:90deg', '--y', 'elbow_joint=-1:1'),
+        *('--x', 'shoulder_joint=0deg:90deg', '--y', 'elbow_joint=-1rad:1rad'),
         *(*SMALL, '--out', str(tmp_path / 'map.npz')),
     )
     robot = load().settings.robot
@@ -111,10 +111,10 @@ def test_a_recorded_run_is_drawn(tmp_path: Path, repository: Path) -> None:
         (('speed',), 'expected torque, rollover, payload, drag, got speed'),
         (('torque', '--x', 'knee'), '--x: expected a measured joint'),
         (('torque', '--x', 'elbow_joint'), '--y: expected another joint than --x'),
-        (('torque', '--x', 'shoulder_joint=2:1'), 'FROM below TO'),
-        (('torque', '--x', 'shoulder_joint=2'), 'expected shoulder_joint=FROM:TO'),
+        (('torque', '--x', 'shoulder_joint=2deg:1deg'), 'FROM below TO'),
+        (('torque', '--x', 'shoulder_joint=2deg'), 'expected shoulder_joint=FROM:TO'),
         (('torque', '--orientation', 'upside'), '--orientation: expected one of level, right'),
-        (('torque', '--slope', '3 kg'), '--slope: expected an angle'),
+        (('torque', '--slope', '3 kg'), '--slope 3 kg: expected an angle'),
         (('torque', '--payload', '-1'), '--payload: expected a mass >= 0 kg'),
         (('torque', '--limit', 'elbow_joint=0'), 'expected a torque > 0 N m'),
         (('torque', '--limit', 'knee=3'), '--limit: expected JOINT=TORQUE'),

@@ -114,7 +114,10 @@ def test_json_has_no_infinity() -> None:
     ('arguments', 'sentence'),
     [
         ({'posture': 'shoulder=30deg'}, '--posture: expected a measured joint .*, got shoulder'),
-        ({'posture': 'shoulder_joint=3 kg'}, '--posture: shoulder_joint: expected an angle'),
+        (
+            {'posture': 'shoulder_joint=3 kg'},
+            '--posture shoulder_joint=3 kg: expected an angle with its unit',
+        ),
         ({'posture': 'shoulder_joint'}, '--posture: expected name=value'),
         ({'tilt': 'yaw=1'}, '--tilt: expected roll or pitch, got yaw'),
         ({'payload': '-1'}, '--payload: expected a mass >= 0 kg, got -1'),

@@ -106,8 +106,8 @@ def test_spreads_as_people_write_them() -> None:
     [
         (('--vary', 'knee.mass=1..2'), '--vary: expected NAME=LOW..HIGH'),
         (('--vary', 'slope'), '--vary: expected NAME=LOW..HIGH'),
-        (('--vary', 'slope=3..1'), '--vary: slope: expected LOW..HIGH or MEAN+-SD'),
-        (('--vary', 'slope=1kg..2kg'), '--vary: slope: expected an angle'),
+        (('--vary', 'slope=3deg..1deg'), '--vary: slope: expected LOW..HIGH or MEAN+-SD'),
+        (('--vary', 'slope=1kg..2kg'), '--vary slope=1kg..2kg: expected an angle'),
         (('--mission', 'absent.json'), 'absent.json: expected a readable file'),
     ],
 )

@@ -14,7 +14,8 @@ from ugv_acceptance.config.units import KEY_ENDINGS, UNITS, Measure, parse, quan
         ('30deg', 'angle', math.pi / 6),
         ('-90 deg', 'angle', -math.pi / 2),
         ('30°', 'angle', math.pi / 6),
-        ('0.5', 'angle', 0.5),
+        ('0.5 rad', 'angle', 0.5),
+        ('0', 'angle', 0.0),
         ('50 N m', 'torque', 50.0),
         ('50 N*m', 'torque', 50.0),
         ('30 lbf*ft', 'torque', 40.67453844994),
@@ -31,7 +32,7 @@ def test_a_text_with_a_unit_becomes_si(text: str, kind: str, value: float) -> No
 
 
 @pytest.mark.parametrize(
-    'text', ['30 N m', 'nan', 'inf', '1e10', '', 'deg', '3 furlongs', '1 2 deg']
+    'text', ['30 N m', '30', '-0.5', 'nan', 'inf', '1e10', '', 'deg', '3 furlongs', '1 2 deg']
 )
 def test_what_is_no_angle_is_refused(text: str) -> None:
     """The error names the field, what was expected and what came."""

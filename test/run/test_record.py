@@ -14,8 +14,9 @@ from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
 from ugv_acceptance.run.catalogue import case_of, names
+from ugv_acceptance.run.fault_text import fault_from
 from ugv_acceptance.run.record import lasting, record
-from ugv_acceptance.simulation.faults import KINDS, fault_from
+from ugv_acceptance.simulation.faults import KINDS
 
 CONFIG = load()
 ROBOT = CONFIG.settings.robot
@@ -135,7 +136,7 @@ def test_a_fault_is_told_or_known_to_be_hidden(tmp_path: Path, kind: str) -> Non
         ('frozen-encoder', 'expected turret_joint, shoulder_joint'),
         ('effort-missing:imu', 'expected no subject'),
         ('dropped=2', 'expected an amount from 0 to 1, got 2'),
-        ('late=fast', 'expected KIND'),
+        ('late=fast', 'expected a number'),
         ('late=1.2.3', 'expected a number'),
         ('dead@5-3', 'expected an end after the start'),
         ('weak-motor:elbow_joint@3', 'expected no times'),

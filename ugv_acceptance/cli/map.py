@@ -32,11 +32,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
         str, typer.Option(help='joint="50 N m",... in place of configured limits.')
     ] = '',
     caution: Annotated[
-        float | None, typer.Option(help="Caution from here on, in the map's unit.")
-    ] = None,
-    failure: Annotated[
-        float | None, typer.Option(help="Failure from here on, in the map's unit.")
-    ] = None,
+        str, typer.Option(help='Caution from here on: 80 (% of torque), 10deg, 4 (kg), 50 (N).')
+    ] = '',
+    failure: Annotated[str, typer.Option(help='Failure from here on: 100, 0deg, 2, 25.')] = '',
     friction: Annotated[float, typer.Option(help='Of the tracks on the ground, for drag.')] = 0.7,
     steps: Annotated[int, typer.Option(min=2, max=5001, help='Cells along each axis.')] = 361,
     from_bag: Annotated[
@@ -54,6 +52,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
+    from ugv_acceptance.cli.robot_description import payload_doubts, warn
     from ugv_acceptance.config import load
     from ugv_acceptance.report.map_data import map_of
     from ugv_acceptance.report.map_figure import assumptions, write_map
@@ -63,6 +62,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     wanted = Wanted(x, y, posture, orientation, slope, payload, limit, friction, steps)
     scene = scene_from(loaded, wanted)
     data = with_levels(map_of(kind, scene), caution, failure)
+    warn(payload_doubts(scene.robot, payload))
     track = _track(loaded, scene, from_bag) if from_bag else None
     typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}')
     found = classes(data.margin, data.levels.caution, data.levels.failure)

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.robot_description import posture_from
+from ugv_acceptance.cli.robot_description import payload_from, posture_from
 from ugv_acceptance.config import Config
-from ugv_acceptance.config.units import quantity
+from ugv_acceptance.config.units import parse, quantity
 from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.model.blocks import Floats
-from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.studies.bilinear import Grid
 from ugv_acceptance.studies.maps import Levels
@@ -45,10 +45,7 @@ def scene_from(loaded: Config, wanted: Wanted) -> Scene:
     if wanted.orientation not in ORIENTATIONS:
         known = ', '.join(ORIENTATIONS)
         raise BadConfig(f'--orientation: expected one of {known}, got {wanted.orientation}')
-    slope = quantity(wanted.slope, 'angle', '--slope')
-    mass = quantity(wanted.payload, 'mass', '--payload') if wanted.payload else robot.payload.mass
-    if mass < 0.0:
-        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
+    slope = quantity(wanted.slope, 'angle', f'--slope {wanted.slope}')
     if wanted.friction <= 0.0:
         raise BadConfig(f'--friction: expected a number > 0, got {wanted.friction:g}')
     q = np.array(posture_from(robot, wanted.posture))
@@ -56,7 +53,7 @@ def scene_from(loaded: Config, wanted: Wanted) -> Scene:
         robot,
         Grid(first, second, x, y, q),
         gravity_of(wanted.orientation, slope, robot.gravity),
-        Payload(mass, robot.payload.cog),
+        payload_from(robot, wanted.payload),
         _limits(robot, loaded.settings.limits, wanted.limit),
         wanted.friction,
     )
@@ -81,7 +78,7 @@ def _axis(
         if not colon:
             raise BadConfig(f'{option}: expected {name}=FROM:TO, got {text}')
         kind = 'length' if slides else 'angle'
-        low, high = (quantity(part, kind, f'{option}: {name}') for part in (start, end))
+        low, high = (quantity(part, kind, f'{option} {text}') for part in (start, end))
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise BadConfig(
             f'{option}: expected {name}=FROM:TO with FROM below TO, got {low:g}:{high:g}'
@@ -103,11 +100,16 @@ def _limits(robot: Robot, limits: Limits, text: str) -> Limits:
     return replace(limits, torque=tuple(torque.values()))
 
 
-def with_levels(data: MapData, caution: float | None, failure: float | None) -> MapData:
-    """Return the map with its thresholds (in its unit) replaced where given."""
+# The kind of quantity a map's thresholds are, and what turns its SI number into the map's unit;
+# those of a map that is not here are per cent.
+_LEVELS = {'rollover': ('angle', 180.0 / math.pi), 'payload': ('mass', 1.0), 'drag': ('force', 1.0)}
+
+
+def with_levels(data: MapData, caution: str, failure: str) -> MapData:
+    """Return the map with its thresholds replaced where given."""
     levels = Levels(
-        data.levels.caution if caution is None else data.sign * caution,
-        data.levels.failure if failure is None else data.sign * failure,
+        _level(data, '--caution', caution, data.levels.caution),
+        _level(data, '--failure', failure, data.levels.failure),
     )
     if levels.caution < levels.failure:
         raise BadConfig(
@@ -115,3 +117,16 @@ def with_levels(data: MapData, caution: float | None, failure: float | None) -> 
             f'{data.unit}), got {data.sign * levels.caution:g} {data.unit}'
         )
     return replace(data, levels=levels)
+
+
+def _level(data: MapData, option: str, text: str, usual: float) -> float:
+    """Return a threshold in the terms of the map's margin."""
+    if not text:
+        return usual
+    if data.kind in _LEVELS:
+        kind, scale = _LEVELS[data.kind]
+        return data.sign * scale * quantity(text, kind, f'{option} {text}')
+    try:
+        return data.sign * parse(text.strip().removesuffix('%'), ()).value
+    except ValueError as error:
+        raise BadConfig(f'{option}: {error}') from None

@@ -32,11 +32,13 @@ def model(
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.robot_description import describe
+    from ugv_acceptance.cli.robot_description import describe, payload_doubts, warn
     from ugv_acceptance.cli.robot_tables import print_tables
     from ugv_acceptance.config import load
 
-    description = describe(load(config, urdf=urdf), posture, tilt, payload)
+    loaded = load(config, urdf=urdf)
+    description = describe(loaded, posture, tilt, payload)
+    warn(payload_doubts(loaded.settings.robot, payload))
     if as_json:
         import json
 

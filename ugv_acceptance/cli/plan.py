@@ -28,8 +28,8 @@ def plan(
         typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
     ] = None,
     tilt: Annotated[
-        float, typer.Option(min=1.0, max=45.0, help='Tilt (deg) of the ramp for the orientations.')
-    ] = 10.0,
+        str, typer.Option(help='Tilt of the ramp for the orientations, 1deg to 45deg.')
+    ] = '10deg',
     points: Annotated[
         int, typer.Option(min=1, max=20, help='Points on each side of a boundary.')
     ] = 1,
@@ -46,10 +46,8 @@ def plan(
     Examples:
       ugv-acceptance plan -o plan.yaml --card card.html
       ugv-acceptance plan --from plan.yaml --card card.html
-      ugv-acceptance plan --config my_robot.yaml --tilt 15 --points 3 -o plan.yaml
+      ugv-acceptance plan --config my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    import math
-
     from ugv_acceptance import AcceptanceError
     from ugv_acceptance.config import load
     from ugv_acceptance.plan.derive import Wanted, derive
@@ -59,7 +57,7 @@ def plan(
     if existing is not None:
         made = read_plan(existing, loaded.settings.robot)
     else:
-        wanted = Wanted(math.radians(tilt), points=points, endurance=hours * 3600.0, short=short)
+        wanted = Wanted(_ramp(tilt), points=points, endurance=hours * 3600.0, short=short)
         made = derive(loaded, wanted)
     _print(made)
     if out is not None:
@@ -71,6 +69,19 @@ def plan(
             card.write_text(card_of(made, loaded), 'utf-8')
         except OSError as error:
             raise AcceptanceError(f'{card}: cannot be written: {error.strerror}') from None
+
+
+def _ramp(tilt: str) -> float:
+    """Return the tilt (rad) of the ramp. Raises BadConfig where no test has such a ramp."""
+    import math
+
+    from ugv_acceptance import BadConfig
+    from ugv_acceptance.config import quantity
+
+    angle = quantity(tilt, 'angle', f'--tilt {tilt}')
+    if not 1.0 <= round(math.degrees(angle), 6) <= 45.0:
+        raise BadConfig(f'--tilt: expected an angle from 1deg to 45deg, got {tilt}')
+    return angle
 
 
 def _print(made: 'Plan') -> None:

@@ -15,7 +15,10 @@ def risk(
     ] = '',
     vary: Annotated[
         list[str] | None,
-        typer.Option(help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal); may be given again.'),
+        typer.Option(
+            help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal), angles as 10deg, rates as 7deg/s; '
+            'may be given again.'
+        ),
     ] = None,
     mission: Annotated[
         Path | None, typer.Option(help='JSON with phases: name, posture, vary, times.')
@@ -44,12 +47,14 @@ def risk(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from ugv_acceptance.cli.risk_study import phases_from
+    from ugv_acceptance.cli.risk_study import doubts, phases_from
     from ugv_acceptance.cli.risk_tables import as_document, mission_lines, phase_lines
+    from ugv_acceptance.cli.robot_description import warn
     from ugv_acceptance.config import load
     from ugv_acceptance.studies.risk import run
 
     phases = phases_from(load(config), posture, vary or [], mission)
+    warn(doubted := doubts(phases))
     count = int(samples)
     columns = (TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn())
     results = []
@@ -65,7 +70,7 @@ def risk(
             )
             results.append(found)
     if as_json:
-        typer.echo(json.dumps(as_document(phases, results), indent=2))
+        typer.echo(json.dumps(as_document(phases, results) | {'warnings': doubted}, indent=2))
         return
     for phase, found in zip(phases, results, strict=True):
         typer.echo('\n'.join(phase_lines(phase, found)))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.robot_description import posture_from
+from ugv_acceptance.cli.robot_description import payload_doubts, posture_from
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import quantity
 from ugv_acceptance.model.mechanics import mechanics_of
@@ -17,7 +17,7 @@ from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.studies.postures import joint_range
 from ugv_acceptance.studies.risk import Study
 from ugv_acceptance.studies.risk_kernel import known_names
-from ugv_acceptance.studies.spread import Spread, normal, uniform
+from ugv_acceptance.studies.spread import NORMAL, Spread, normal, uniform
 
 STEEPEST = math.radians(30.0)
 # The paper's typical operating speed.
@@ -61,6 +61,17 @@ def phases_from(
         name = str(entry.get('name', f'phase {k + 1}'))
         found.append(_phase(config, name, entry.get('posture', '') or posture, both, times))
     return found
+
+
+def doubts(phases: Sequence[Phase]) -> list[str]:
+    """Return a sentence where a payload that is drawn is mostly heavier than its robot."""
+    found = []
+    for phase in phases:
+        spread = phase.study.spreads.get('payload.mass')
+        if spread is not None:
+            mass = spread.low if spread.kind == NORMAL else spread.high
+            found += payload_doubts(phase.study.robot, f'{mass:g}', '--vary payload.mass')
+    return list(dict.fromkeys(found))
 
 
 def _entries(mission: Path) -> list[dict[str, Any]]:
@@ -153,11 +164,11 @@ def spread_from(robot: Robot, text: str) -> tuple[str, Spread]:
     for sign, make in (('..', uniform), ('+-', normal), ('±', normal)):
         first, found, second = value.partition(sign)
         if found:
-            low, high = (quantity(part, kind, f'--vary: {key}') for part in (first, second))
+            low, high = (quantity(part, kind, f'--vary {text}') for part in (first, second))
             if high < (low if make is uniform else 0.0):
                 raise BadConfig(f'--vary: {key}: expected LOW..HIGH or MEAN+-SD, got {value}')
             return key, make(low, high)
-    fixed = quantity(value, kind, f'--vary: {key}')
+    fixed = quantity(value, kind, f'--vary {text}')
     return key, uniform(fixed, fixed)
 
 

@@ -4,7 +4,10 @@ Keys end in their unit; an infinite number (no limit, no edge on that side) and 
 """
 
 import math
+from collections.abc import Iterable
 from typing import Any, SupportsFloat
+
+import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
@@ -36,10 +39,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     roll, pitch = _tilt_from(tilt)
     down = rotation_from_rpy((roll, pitch, 0.0))[2]
     gravity = (-robot.gravity * down[0], -robot.gravity * down[1], -robot.gravity * down[2])
-    mass = quantity(payload, 'mass', '--payload') if payload else robot.payload.mass
-    if mass < 0.0:
-        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
-    load = Payload(mass, robot.payload.cog)
+    load = payload_from(robot, payload)
     mechanics = mechanics_of(robot)
     found = posture_of(mechanics, q, load.mass, load.cog)
     stance = stance_of(mechanics, found)
@@ -60,7 +60,12 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'contacts': _contacts(robot, found, stance),
         **_stability(robot, stance, gravity),
         'uncertainty': dict(config.uncertainty),
-        'warnings': [*config.warnings, *_outside(robot, q), *_overload(config, load)],
+        'warnings': [
+            *config.warnings,
+            *_outside(robot, q),
+            *_overload(config, load),
+            *payload_doubts(robot, payload),
+        ],
     }
 
 
@@ -72,8 +77,32 @@ def posture_from(robot: Robot, text: str) -> list[float]:
             known = ', '.join(q) or 'none'
             raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}')
         kind = 'length' if robot.joint(name).kind == 'prismatic' else 'angle'
-        q[name] = quantity(value, kind, f'--posture: {name}')
+        q[name] = quantity(value, kind, f'--posture {name}={value}')
     return list(q.values())
+
+
+def payload_from(robot: Robot, text: str) -> Payload:
+    """Return the payload of a mass such as '4' (kg) or '10 lb'; the robot's own where left out."""
+    mass = quantity(text, 'mass', '--payload') if text else robot.payload.mass
+    if mass < 0.0:
+        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
+    return Payload(mass, robot.payload.cog)
+
+
+def payload_doubts(robot: Robot, text: str, option: str = '--payload') -> list[str]:
+    """Return a sentence where a mass that was written is more than the robot's; else nothing."""
+    mass = quantity(text, 'mass', option) if text else 0.0
+    if mass <= robot.mass:
+        return []
+    bare = not any(letter.isalpha() for letter in text)
+    question = 'are these grams?' if bare else 'is that the right unit?'
+    return [f'{option} {mass:g} kg: more than the robot weighs ({robot.mass:.1f} kg): {question}']
+
+
+def warn(sentences: Iterable[str]) -> None:
+    """Print warnings to standard error."""
+    for text in sentences:
+        typer.echo(f'ugv-acceptance: warning: {text}', err=True)
 
 
 def _tilt_from(text: str) -> tuple[float, float]:
@@ -82,7 +111,7 @@ def _tilt_from(text: str) -> tuple[float, float]:
     for name, value in _pairs(text, '--tilt'):
         if name not in tilt:
             raise BadConfig(f'--tilt: expected roll or pitch, got {name}')
-        tilt[name] = quantity(value, 'angle', f'--tilt: {name}')
+        tilt[name] = quantity(value, 'angle', f'--tilt {name}={value}')
     return tilt['roll'], tilt['pitch']
 
 

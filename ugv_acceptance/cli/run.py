@@ -51,7 +51,8 @@ def run(
     ] = 5,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the simulated sensors.')] = 1,
     fault: Annotated[
-        list[str] | None, typer.Option(help='A fault of the simulated robot, as of simulate.')
+        list[str] | None,
+        typer.Option(help='A fault of the simulated robot as of simulate, angles as 30deg.'),
     ] = None,
 ) -> None:
     """Do a plan's steps: move, hold, record, and judge each by its recording.

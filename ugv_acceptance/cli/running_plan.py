@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ugv_acceptance.plan.plan import Plan, Step
     from ugv_acceptance.run.folder import RunFolder
     from ugv_acceptance.run.runner import Runner
+    from ugv_acceptance.simulation.faults import Fault
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 INTERRUPTED = 3
@@ -59,6 +60,7 @@ def execute(asked: Asked) -> int:
     config = load(asked.config)
     plan = plan_of(asked, config)
     chosen = steps_of(plan, asked)
+    _faults(asked, config)
     mode = f'{asked.mode}-fast' if asked.fast else asked.mode
     out = folder_of(asked)
     folder = open_folder(out, plan, asked.plan, mode, config, resume=asked.resume)
@@ -168,11 +170,9 @@ def _offline(
     from ugv_acceptance.run.offline import Offline
     from ugv_acceptance.run.runner import Runner
     from ugv_acceptance.run.virtual import VirtualRobot
-    from ugv_acceptance.simulation.faults import fault_from
 
     stopped: list[int] = []
-    faults = tuple(fault_from(text, config.settings.robot) for text in asked.faults)
-    virtual = VirtualRobot(config, asked.seed, faults, _home(config, folder))
+    virtual = VirtualRobot(config, asked.seed, _faults(asked, config), _home(config, folder))
     before = {
         number: signal.signal(number, lambda number, _: stopped.append(number))
         for number in (signal.SIGINT, signal.SIGTERM)
@@ -217,6 +217,13 @@ def own_domain() -> Iterator[None]:
 def _home(config: 'Config', folder: 'RunFolder') -> tuple[float, ...]:
     home = folder.plan.home_deg
     return tuple(math.radians(home.get(n, 0.0)) for n in config.settings.robot.joint_names)
+
+
+def _faults(asked: Asked, config: 'Config') -> tuple['Fault', ...]:
+    """Return the faults asked for. Raises BadConfig where a text is none."""
+    from ugv_acceptance.run.fault_text import fault_from
+
+    return tuple(fault_from(text, config.settings.robot) for text in asked.faults)
 
 
 def _simulated(asked: Asked, config: 'Config', folder: 'RunFolder') -> list[str]:

@@ -27,7 +27,8 @@ def simulate(
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            help='KIND[:SUBJECT][=AMOUNT][@START[-END]], times in s; may be given several times.'
+            help='KIND[:SUBJECT][=AMOUNT][@START[-END]], times in s, an angle as 30deg; '
+            'may be given several times.'
         ),
     ] = None,
     config: Annotated[
@@ -62,8 +63,8 @@ def simulate(
         raise typer.BadParameter('expected a folder to record into, got none', param_hint='--bag')
     from ugv_acceptance.config import load
     from ugv_acceptance.run.catalogue import case_of
+    from ugv_acceptance.run.fault_text import fault_from
     from ugv_acceptance.run.record import record
-    from ugv_acceptance.simulation.faults import fault_from
 
     loaded = load(config)
     robot = loaded.settings.robot

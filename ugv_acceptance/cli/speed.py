@@ -39,20 +39,20 @@ def speed(
     import numpy as np
 
     from ugv_acceptance import BadConfig
-    from ugv_acceptance.cli.robot_description import posture_from
+    from ugv_acceptance.cli.robot_description import (
+        payload_doubts,
+        payload_from,
+        posture_from,
+        warn,
+    )
     from ugv_acceptance.config import load
-    from ugv_acceptance.config.units import quantity
-    from ugv_acceptance.model.robot import Payload
     from ugv_acceptance.studies.postures import random_postures, sweeps
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
     if reference <= 0.0:
         raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
-    mass = quantity(payload, 'mass', '--payload') if payload else robot.payload.mass
-    if mass < 0.0:
-        raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
-    load_carried = Payload(mass, robot.payload.cog)
+    load_carried, doubts = payload_from(robot, payload), payload_doubts(robot, payload)
     bound = critical or critical_value(samples=samples)
     if bound <= 1.0:
         raise BadConfig(f'--critical: expected a value > 1, got {bound:g}')
@@ -63,13 +63,16 @@ def speed(
     limits = [
         float(speed_limit(robot, q, load_carried, reference, bound)[k]) for k, q in enumerate(sets)
     ]
+    warn(doubts)
     if as_json:
         degrees = [math.degrees(x) if np.isfinite(x) else None for x in limits]
         found = dict(zip(robot.joint_names, degrees, strict=True))
-        typer.echo(json.dumps({'critical_value': bound, 'speed_deg_s': found}, indent=2))
+        document = {'critical_value': bound, 'speed_deg_s': found, 'warnings': doubts}
+        typer.echo(json.dumps(document, indent=2))
         return
     typer.echo(
-        f'{robot.name}, {mass:g} kg, error of the static model {reference:g} N m, F < {bound:.4f}'
+        f'{robot.name}, {load_carried.mass:g} kg, '
+        f'error of the static model {reference:g} N m, F < {bound:.4f}'
     )
     for name, limit in zip(robot.joint_names, limits, strict=True):
         slides = robot.joint(name).kind == 'prismatic'

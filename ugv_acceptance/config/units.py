@@ -36,6 +36,7 @@ UNITS: dict[str, tuple[str, float]] = {
     'deg/s': ('angular rate', _DEG),
     '°/s': ('angular rate', _DEG),
     'm/s': ('rate', 1.0),
+    'mm/s': ('rate', 1e-3),
     'm/s2': ('acceleration', 1.0),
 }
 KEY_ENDINGS = {
@@ -56,6 +57,14 @@ EXAMPLES = {
     'angular rate': 'an angular rate such as 0.6 (rad/s) or "36 deg/s"',
     'rate': 'a speed such as 0.1 (m/s)',
     'acceleration': 'an acceleration such as 9.81 (m/s2)',
+}
+# What a command line asks for, where a bare number of a kind is read in one unit by one person and
+# in another by the next: its name, the unit people think in, the SI unit.
+SPELLINGS = {
+    'angle': ('an angle', 'deg', 'rad'),
+    'angular rate': ('an angular rate', 'deg/s', 'rad/s'),
+    'length': ('a length', 'mm', 'm'),
+    'rate': ('a speed', 'mm/s', 'm/s'),
 }
 # Larger magnitudes are mistakes, and their products would overflow.
 LARGEST = 1e9
@@ -109,14 +118,27 @@ def parse(value: object, kinds: tuple[str, ...]) -> Given:
 
 
 def quantity(text: str, kind: str, what: str) -> float:
-    """Return the number in SI that a user wrote, a bare one in SI; `what` names it in the error.
+    """Return the number in SI that a user wrote on a command line; `what` names it in the error.
 
-    Raises BadConfig where it is not of `kind` (a key of EXAMPLES).
+    A kind in SPELLINGS needs its unit, unless it is 0; a bare number of another is in SI. Raises
+    BadConfig where it is not of `kind` (a key of EXAMPLES).
     """
     try:
-        return parse(text, (kind,)).value
+        given = parse(text, (kind,))
     except ValueError as error:
-        raise BadConfig(f'{what}: {error}') from None
+        said = f'expected {_spelled(kind)}, got {shown(text)}' if kind in SPELLINGS else error
+        raise BadConfig(f'{cut(what)}: {said}') from None
+    if given.kind is None and given.value and kind in SPELLINGS:
+        number = text.strip()
+        raise BadConfig(f'{cut(what)}: expected {_spelled(kind, number)}, got {cut(number)}')
+    return given.value
+
+
+def _spelled(kind: str, number: str = '30') -> str:
+    """Return how a number of a kind in SPELLINGS is written in the usual unit and in SI."""
+    name, usual, si = SPELLINGS[kind]
+    in_si = float(number) * UNITS[usual][1]
+    return f'{name} with its unit, such as "{cut(number)}{usual}" or "{in_si:.4g}{si}"'
 
 
 def expected(kinds: tuple[str, ...]) -> str:
@@ -126,7 +148,11 @@ def expected(kinds: tuple[str, ...]) -> str:
 
 def shown(value: object) -> str:
     """Return a value as an error shows it: short, on one line."""
-    text = f'"{value}"' if isinstance(value, str) else str(value)
+    return cut(f'"{value}"' if isinstance(value, str) else str(value))
+
+
+def cut(text: str) -> str:
+    """Return a text short and on one line."""
     text = ' '.join(text.split())
     return text if len(text) <= 60 else f'{text[:57]}...'
 

@@ -87,6 +87,11 @@ class Robot:
         children = {joint.child for joint in self.joints}
         return next(link.name for link in self.links if link.name not in children)
 
+    @property
+    def mass(self) -> float:
+        """What the robot weighs (kg), without a payload."""
+        return sum(link.mass for link in self.links)
+
     def joint(self, name: str) -> Joint:
         """Return the joint of that name."""
         return next(joint for joint in self.joints if joint.name == name)

@@ -30,8 +30,8 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import run
+from ugv_acceptance.run.fault_text import fault_from
 from ugv_acceptance.run.virtual import VirtualRobot
-from ugv_acceptance.simulation.faults import fault_from
 
 NAME = 'packbot_simulator'
 # Behind by more than this (s), the simulation lets time slip instead of catching up.

@@ -102,9 +102,7 @@ def _drag(scene: Scene) -> MapData:
         payload=scene.payload,
     )
     # No paper or standard names a pull that is enough: a tenth and a fifth of the robot's weight.
-    weight = scene.robot.gravity * (
-        sum(link.mass for link in scene.robot.links) + scene.payload.mass
-    )
+    weight = scene.robot.gravity * (scene.robot.mass + scene.payload.mass)
     return MapData(
         'drag',
         f'largest horizontal pull at the gripper, friction {scene.friction:g}',

@@ -55,6 +55,8 @@ def assumptions(scene: Scene, kind: str) -> str:
             value = float(shown(scene.robot, k, np.array(scene.grid.q[k])))
             others.append(f'{name} {value:.0f}{unit}' if unit == '°' else f'{name} {value:.2f} m')
     load = '' if scene.robot.payload_link is None else f'payload {scene.payload.mass:g} kg'
+    if load and scene.payload.mass > scene.robot.mass:
+        load += ' (more than the robot weighs)'
     limits = '' if kind == 'rollover' else _limits(scene)
     words = (ground, load, ', '.join(others), limits, 'at rest')
     return '; '.join(part for part in words if part)

@@ -1,15 +1,7 @@
-"""Faults a run can be given: their names, what they do, and how they are written on a command line.
-
-A fault is written KIND[:SUBJECT][=AMOUNT][@START[-END]]: frozen-encoder:shoulder_joint@5-9,
-imu-bias=2, dropped:imu=0.3. Times in seconds; without them it lasts the whole run.
-"""
+"""Faults a run can be given: their names, and what they do."""
 
 import math
-import re
 from dataclasses import dataclass
-
-from ugv_acceptance import BadConfig
-from ugv_acceptance.model.robot import Robot
 
 INPUTS = ('joint_states', 'imu')
 
@@ -19,7 +11,7 @@ class Kind:
     """A kind of fault: what it does, whether to a joint, an input or neither, and how much.
 
     `subject` is joint, input or empty; `low` to `high` bound the amount, which stands for {} in
-    `text`.
+    `text`; where it is an `angle`, in degrees.
     """
 
     text: str
@@ -27,6 +19,7 @@ class Kind:
     amount: float = 0.0
     low: float = 0.0
     high: float = 0.0
+    angle: bool = False
 
     @property
     def words(self) -> str:
@@ -48,7 +41,7 @@ KINDS: dict[str, Kind] = {
     'effort-missing': Kind('joint states tell no efforts'),
     'imu-bias': Kind('the acceleration forward is {} m/s2 too large', '', 2.0, -50.0, 50.0),
     'wrong-mounting': Kind(
-        'the IMU is mounted turned by {} deg about its z axis', '', 90.0, -360.0, 360.0
+        'the IMU is mounted turned by {} deg about its z axis', '', 90.0, -360.0, 360.0, angle=True
     ),
     'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
     'clock-jump': Kind('header stamps are off by {} s', 'input', -5.0, -1e8, 1e8),
@@ -58,10 +51,6 @@ KINDS: dict[str, Kind] = {
 }
 # These are in the robot, not in its messages: from the start to the end.
 PHYSICAL = ('heavy-payload', 'weak-motor')
-_FORM = re.compile(
-    r'(?P<kind>[a-z-]+)(:(?P<subject>\w+))?(=(?P<amount>[-+.\de]+))?'
-    r'(@(?P<start>[.\d]+)(-(?P<end>[.\d]+))?)?'
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,36 +74,3 @@ class Fault:
 def fault_of(kind: str, subject: str = '', start: float = 0.0, end: float = math.inf) -> Fault:
     """Return a fault of a kind with its usual amount."""
     return Fault(kind, subject, KINDS[kind].amount, start, end)
-
-
-def fault_from(text: str, robot: Robot) -> Fault:
-    """Return the fault a person wrote. Raises BadConfig with what was expected."""
-    match = _FORM.fullmatch(text)
-    if match is None:
-        raise BadConfig(f'fault {text!r}: expected KIND[:SUBJECT][=AMOUNT][@START[-END]]')
-    name, subject = match['kind'], match['subject'] or ''
-    kind = KINDS.get(name)
-    if kind is None:
-        raise BadConfig(f'fault {text!r}: expected one of {", ".join(KINDS)}, got {name}')
-    allowed = {'joint': robot.joint_names, 'input': INPUTS}.get(kind.subject, ())
-    if subject not in ('', *allowed) or (kind.subject == 'joint' and not subject):
-        expected = ', '.join(allowed) or 'no subject'
-        raise BadConfig(f'fault {text!r}: expected {expected} behind the colon, got {subject!r}')
-    amount = _number(text, match['amount'], kind.amount)
-    if not kind.low <= amount <= kind.high:
-        raise BadConfig(
-            f'fault {text!r}: expected an amount from {kind.low:g} to {kind.high:g}, got {amount:g}'
-        )
-    start, end = _number(text, match['start'], 0.0), _number(text, match['end'], math.inf)
-    if not start < end:
-        raise BadConfig(f'fault {text!r}: expected an end after the start, got {start:g}-{end:g}')
-    if name in PHYSICAL and match['start']:
-        raise BadConfig(f'fault {text!r}: expected no times: {name} lasts the whole run')
-    return Fault(name, subject, amount, start, end)
-
-
-def _number(text: str, part: str | None, default: float) -> float:
-    try:
-        return default if part is None else float(part)
-    except ValueError:
-        raise BadConfig(f'fault {text!r}: expected a number, got {part!r}') from None

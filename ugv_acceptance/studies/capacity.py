@@ -91,7 +91,7 @@ def lift_capacity(
 
 
 def _weight(robot: Robot, load: Payload) -> float:
-    return sum(link.mass for link in robot.links) + load.mass
+    return robot.mass + load.mass
 
 
 def _rise(start: Floats, slope: Floats, end: Floats) -> Floats:
