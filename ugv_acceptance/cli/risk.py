@@ -16,8 +16,8 @@ def risk(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal), angles as 10deg, rates as 7deg/s; '
-            'may be given again.'
+            help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal), angles as 10deg, rates as '
+            '7deg/s; may be given again.'
         ),
     ] = None,
     mission: Annotated[
