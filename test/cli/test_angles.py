@@ -43,7 +43,7 @@ ANGLES: list[tuple[str, tuple[str, ...], str, str]] = [
 ]
 IDS = [f'{verb}-{option.strip("-")}-{text}' for verb, _, option, text in ANGLES]
 # Options of which some part is an angle, by what their help says.
-TOLD = re.compile(r'\bangle|\btilt|slope|deg\b|joint=|degree|radian', re.IGNORECASE)
+TOLD = re.compile(r'\bangle|\btilt|slope|deg\b|degree|radian', re.IGNORECASE)
 
 
 def options_of(verb: str) -> dict[str, str]:

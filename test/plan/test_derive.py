@@ -16,11 +16,12 @@ from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.plan.card import MEANINGS, card_of
 from ugv_acceptance.plan.derive import Wanted, derive
-from ugv_acceptance.plan.order import distance, time_text, way
+from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.plan.ways import Routes, safe_way
+from ugv_acceptance.report.numbers import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 CONFIG: Config = load()
@@ -204,7 +205,7 @@ def test_the_card_says_what_every_alert_means() -> None:
 )
 def test_a_length_is_told_in_the_unit_that_fits(seconds: float, text: str) -> None:
     """A short plan is not one of 0 min."""
-    assert time_text(seconds) == text
+    assert time_text(seconds, digits=2) == text
 
 
 @pytest.mark.parametrize(

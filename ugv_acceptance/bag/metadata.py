@@ -1,5 +1,9 @@
 """What a rosbag2 folder's metadata.yaml says, of any version, and the files of a recording."""
 
+import os
+import posixpath
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +14,9 @@ from ugv_acceptance import BadBag
 
 NAME = 'metadata.yaml'
 _MAX_BYTES = 64 << 20
-_SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
+SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
+# Runs are looked for so many folders deep, and so many are named.
+_DEEP, _NAMED = 3, 3
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
@@ -50,9 +56,7 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
         raise BadBag(f'{path}: no such file or folder')
     if path.is_file():
         return [path], Metadata(), []
-    present = sorted(
-        p for p in path.iterdir() if p.is_file() and p.name.lower().endswith(_SUFFIXES)
-    )
+    present = sorted(p for p in path.iterdir() if p.is_file() and p.name.lower().endswith(SUFFIXES))
     findings: list[str] = []
     metadata = Metadata()
     if (path / NAME).is_file():
@@ -74,7 +78,57 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
     if metadata.files and unlisted:
         findings.append(f'{NAME} does not list {", ".join(p.name for p in unlisted)}: not read')
     files = files or unlisted
+    known = (path / NAME).is_file()
+    if not files or (not known and len(numbered([p.name for p in files])) > 1):
+        _refuse_several(path)
     if not files:
-        wanted = ', '.join(_SUFFIXES)
+        wanted = ', '.join(SUFFIXES)
         raise BadBag(f'{path}: expected a rosbag2 folder, found no {wanted} file in it')
     return files, metadata, findings
+
+
+def numbered(files: Sequence[str]) -> list[list[str]]:
+    """Return files grouped: those that differ only in _NUMBER are the parts of one recording."""
+    groups: dict[str, list[tuple[int, str]]] = {}
+    for file in files:
+        stem, _, number = posixpath.basename(file).partition('.')[0].rpartition('_')
+        split = bool(stem) and number.isdigit()
+        groups.setdefault(stem + '/' if split else file, []).append(
+            (int(number) if split else 0, file)
+        )
+    return [[file for _, file in sorted(group)] for group in groups.values()]
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """Return the recordings in a folder and those below: rosbag2 folders, and first files else."""
+    found: list[Path] = []
+    for place, folders, names in os.walk(folder):
+        here = Path(place)
+        if len(here.relative_to(folder).parts) >= _DEEP:
+            folders.clear()
+        files = sorted(name for name in names if name.lower().endswith(SUFFIXES))
+        if files and NAME in names:
+            found.append(here)
+        else:
+            found += [here / run[0] for run in numbered(files)]
+    return sorted(found)
+
+
+def _refuse_several(folder: Path) -> None:
+    """Raise BadBag where a folder is not one recording but holds some; say how to judge them."""
+    runs = runs_in(folder)
+    if not runs:
+        return
+    if len(runs) == 1:
+        run = shlex.quote(str(runs[0]))
+        raise BadBag(
+            f'{folder}: expected a recording, found one below it: `ugv-acceptance evaluate {run}`'
+        )
+    names = ', '.join(str(run.relative_to(folder)) for run in runs[:_NAMED])
+    more = f' and {len(runs) - _NAMED} more' if len(runs) > _NAMED else ''
+    few = ' '.join(shlex.quote(str(run)) for run in runs[:2])
+    raise BadBag(
+        f'{folder}: expected one recording, found {len(runs)} in it ({names}{more}): '
+        f'`ugv-acceptance campaign {shlex.quote(str(folder))}` judges all of them, '
+        f'`ugv-acceptance evaluate {few}` single ones'
+    )

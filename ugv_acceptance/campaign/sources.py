@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag
+from ugv_acceptance.bag.metadata import NAME as METADATA
+from ugv_acceptance.bag.metadata import SUFFIXES, numbered
 from ugv_acceptance.campaign.trouble import words
-
-METADATA = 'metadata.yaml'
-SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -65,20 +64,8 @@ def sorted_out(files: Sequence[str], *, remote: bool = False) -> list[Source]:
         if parts and f'{folder}/{METADATA}' in members:
             sources.append(Source(folder, (*parts, f'{folder}/{METADATA}'), remote))
         else:
-            sources += [Source(run[0], tuple(run), remote) for run in _numbered(parts)]
+            sources += [Source(run[0], tuple(run), remote) for run in numbered(parts)]
     return sources
-
-
-def _numbered(files: Sequence[str]) -> list[list[str]]:
-    """Return files grouped: those that differ only in _NUMBER are the parts of one recording."""
-    groups: dict[str, list[tuple[int, str]]] = {}
-    for file in files:
-        stem, _, number = posixpath.basename(file).partition('.')[0].rpartition('_')
-        split = bool(stem) and number.isdigit()
-        groups.setdefault(stem + '/' if split else file, []).append(
-            (int(number) if split else 0, file)
-        )
-    return [[file for _, file in sorted(group)] for group in groups.values()]
 
 
 def _local_files(place: str) -> list[str]:

@@ -7,6 +7,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ugv_acceptance.report.numbers import hours_text
+
 if TYPE_CHECKING:
     from ugv_acceptance.campaign.run import Effort
 
@@ -43,7 +45,10 @@ def lines(said: Json) -> list[tuple[str, str]]:
         verdicts += f', {runs["NOT_JUDGED"]} NOT_JUDGED'
     found = [
         ('runs', f'{runs["total"]}: {verdicts}; copies counted once: {runs["copies"]}'),
-        ('hours', f'{hours["judged"]:.3f} judged of {hours["recorded"]:.3f} recorded'),
+        (
+            'time',
+            f'{hours_text(hours["judged"])} judged of {hours_text(hours["recorded"])} recorded',
+        ),
         (
             'failures',
             f'{failed["chargeable"]} chargeable'
@@ -74,11 +79,11 @@ def lines(said: Json) -> list[tuple[str, str]]:
 
 def mtbf_text(found: Json, share: str) -> str:
     """Return an MTBF with its bounds."""
-    value = 'no failure' if found['value'] is None else f'{found["value"]:.4g} h'
-    high = 'no upper bound' if found['high'] is None else f'{found["high"]:.4g} h'
+    value = 'no failure' if found['value'] is None else hours_text(found['value'])
+    high = 'no upper bound' if found['high'] is None else hours_text(found['high'])
     return (
-        f'{value}, {share} interval {found["low"]:.4g} h to {high};'
-        f' at least {found["demonstrated"]:.4g} h at {share}'
+        f'{value}, {share} interval {hours_text(found["low"])} to {high};'
+        f' at least {hours_text(found["demonstrated"])} at {share}'
     )
 
 
@@ -103,8 +108,8 @@ def trend_text(found: Json) -> str:
 def endurance_text(found: Json, share: str) -> str:
     """Return what the longest run shows by itself."""
     return (
-        f'{found["hours"]:.3f} h with {found["failures"]} failures alone shows MTBF'
-        f' >= {found["demonstrated_h"]:.3g} h at {share}'
+        f'{hours_text(found["hours"])} with {found["failures"]} failures alone shows MTBF'
+        f' >= {hours_text(found["demonstrated_h"])} at {share}'
     )
 
 
@@ -116,8 +121,8 @@ def requirement_text(found: Json, share: str) -> str:
     if found['verdict'] == 'PASS':
         return text
     return (
-        f'{text}; {found["still_to_run_h"]:.4g} h still to run without another failure,'
-        f' {found["still_to_run_after_one_more_failure_h"]:.4g} h with one more'
+        f'{text}; {hours_text(found["still_to_run_h"])} still to run without another failure,'
+        f' {hours_text(found["still_to_run_after_one_more_failure_h"])} with one more'
     )
 
 
@@ -137,7 +142,7 @@ def comparison_lines(found: Json, confidence: float) -> list[tuple[str, str]]:
 
 def _group_text(group: Json) -> str:
     return (
-        f'{group["name"]}: {group["failures"]} failures in {group["hours"]:.3f} h,'
+        f'{group["name"]}: {group["failures"]} failures in {hours_text(group["hours"])},'
         f' {group["passed"]} of {group["runs"]} passed'
     )
 

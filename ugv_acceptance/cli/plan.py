@@ -88,7 +88,8 @@ def _print(made: 'Plan') -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ugv_acceptance.plan.order import duration, time_text
+    from ugv_acceptance.plan.order import duration
+    from ugv_acceptance.report.numbers import time_text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2))
     for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
@@ -110,6 +111,6 @@ def _print(made: 'Plan') -> None:
     if not console.is_terminal:
         console = Console(highlight=False, width=_WIDE)
     console.print(table)
-    length = time_text(duration(made))
+    length = time_text(duration(made), digits=2)
     console.print(f'{len(made.steps)} steps, {length} of motion and holding')
     console.print(f'plan {made.plan}, sha256 {made.sha256}', soft_wrap=True)

@@ -10,6 +10,11 @@ from rich.table import Table
 
 Values = dict[str, Any]
 
+# A payload of so many times the robot's own mass is not a number anybody plans with.
+_MANY = 10.0
+# From here on digits are counted, not read.
+_LONG = 1e6
+
 
 def print_tables(description: Values) -> None:
     """Print what `describe` returned."""
@@ -67,11 +72,21 @@ def _torque(joint: Values) -> tuple[str, str, str]:
     if joint['topic_name'] is None:
         return 'held', '', ''
     unit, limit, used = joint['torque_unit'], joint['limit'], joint['utilisation']
-    torque = f'{round(joint["torque"], 1) + 0.0:.1f} {unit}'
+    torque = f'{_readable(joint["torque"])} {unit}'
     if limit is None:
         return torque, 'not judged', ''
     colour = 'red' if used > 1.0 else 'green'
-    return torque, f'{limit:g} {unit}', f'[{colour}]{used:.0%}[/]'
+    return torque, f'{limit:g} {unit}', f'[{colour}]{_share(used)}[/]'
+
+
+def _readable(value: float, digits: int = 1) -> str:
+    """Return a number to so many places after the point; three digits of one too long to read."""
+    # Adding 0.0 takes the sign off a rounded zero.
+    return f'{round(value, digits) + 0.0:.{digits}f}' if abs(value) < _LONG else f'{value:.3g}'
+
+
+def _share(used: float) -> str:
+    return f'{used:.0%}' if used < 100.0 else f'{_readable(used, 0)} x'
 
 
 def _range(joint: Values) -> str:
@@ -98,12 +113,20 @@ def _print_payload(console: Console, d: Values) -> None:
     console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}; ', end='')
     if not load['holds_itself']:
         console.print('[red]the arm is too heavy for its limits without one[/]\n')
-    elif load['largest_kg'] is None:
-        console.print('no limit forbids any mass here\n')
+    elif _boundless(d):
+        console.print('no joint limit bounds it in this posture; tipping may, see below\n')
     else:
         left = load['largest_kg'] - load['mass_kg']
-        state = f'{left:.2f} kg left' if left >= 0.0 else f'[red]{-left:.2f} kg too much[/]'
-        console.print(f'the limits allow {load["largest_kg"]:.2f} kg here: {state}\n')
+        text = f'{_readable(abs(left), 2)} kg'
+        state = f'{text} left' if left >= 0.0 else f'[red]{text} too much[/]'
+        console.print(f'the limits allow {_readable(load["largest_kg"], 2)} kg here: {state}\n')
+
+
+def _boundless(d: Values) -> bool:
+    """Return whether joints hold the payload here, and any other a person would try."""
+    largest, carried = d['payload']['largest_kg'], d['payload']['mass_kg']
+    own = sum(link['mass_kg'] for link in d['links'])
+    return largest is None or bool(largest > max(carried, _MANY * own))
 
 
 def _contacts(d: Values) -> Table:
@@ -118,7 +141,8 @@ def _contacts(d: Values) -> Table:
 def _print_stability(console: Console, d: Values) -> None:
     x, y, z = _numbers(d['centre_of_gravity_m'])
     console.print(
-        f'Total mass {d["total_mass_kg"]:.2f} kg with payload, centre of gravity {x} {y} {z} m'
+        f'Total mass {_readable(d["total_mass_kg"], 2)} kg with payload, '
+        f'centre of gravity {x} {y} {z} m'
     )
     names = ' '.join(d['support_polygon']) or 'none'
     console.print(f'Support polygon: {escape(names)} ({d["state"]})')
@@ -127,7 +151,7 @@ def _print_stability(console: Console, d: Values) -> None:
         angle = margin['tilt_left_deg']
         text = '-' if angle is None else f'[{"green" if angle > 0 else "red"}]{angle:.1f}[/]'
         row = (margin['restoring_moment_nm'], margin['energy_j'])
-        table.add_row(side, text, *('-' if value is None else f'{value:.1f}' for value in row))
+        table.add_row(side, text, *('-' if value is None else _readable(value) for value in row))
     console.print(table)
 
 

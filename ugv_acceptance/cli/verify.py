@@ -81,10 +81,18 @@ def read_result(path: Path) -> Json:
     return told
 
 
-def _near(path: str, folder: Path) -> Path:
-    """Return a file where it was, or beside the result: on a USB stick all lie together."""
-    moved = folder / Path(path).name
-    return moved if moved.exists() and not Path(path).exists() else Path(path)
+def _near(path: str, folder: Path, option: str) -> Path:
+    """Return a file where it was, or beside the result: on a USB stick all lie together.
+
+    Raises AcceptanceError where it is at neither place; `option` tells where it is now.
+    """
+    for place in (Path(path), folder / Path(path).name):
+        if place.exists():
+            return place
+    raise AcceptanceError(
+        f'{path}: expected it there (from {Path.cwd()}) or beside the result, found it at neither: '
+        f'say where it is with {option}'
+    )
 
 
 def again(
@@ -102,13 +110,16 @@ def again(
     from ugv_acceptance.config import load
 
     try:
-        paths = bag or [_near(path, folder) for path in told['bag']['path']]
+        paths = bag or [_near(path, folder, '--bag') for path in told['bag']['path']]
         robot, named = told['robot'], told['criteria']['path']
-        at, model = config or _near(robot['config'], folder), urdf or _near(robot['urdf'], folder)
+        at = config or _near(robot['config'], folder, '--config')
+        model = urdf or _near(robot['urdf'], folder, '--urdf')
     except (KeyError, TypeError) as error:
         raise AcceptanceError(f'expected a result of evaluate; there is no {error}') from None
     loaded = load(at, urdf=model)
-    papers = Papers(criteria=criteria or (None if named is None else _near(named, folder)))
+    if criteria is None and named is not None:
+        criteria = _near(named, folder, '--criteria')
+    papers = Papers(criteria=criteria)
     result, _ = judge_files(paths, loaded, papers, compare_effort='effort' in told)
     found: Json = json.loads(json.dumps(result, default=str))
     if 'limits_hash' not in told:  # written before results said it

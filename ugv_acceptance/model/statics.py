@@ -84,6 +84,10 @@ def utilisation(torque: ArrayLike, limit: ArrayLike) -> Floats:
     return np.abs(np.asarray(torque, dtype=np.float64)) / np.asarray(limit, dtype=np.float64)
 
 
+# A shorter lever (m) is rounding, such as that of an arm turned upright: it asks for nothing.
+LEAST_LEVER = 1e-9
+
+
 def payload_capacity(
     robot: Robot, q: ArrayLike, gravity: ArrayLike, limit: ArrayLike, workers: int = 1
 ) -> Floats:
@@ -100,7 +104,8 @@ def payload_capacity(
     with np.errstate(divide='ignore', invalid='ignore'):
         # The torque reaches +limit or -limit, whichever lies in the direction the payload pulls.
         mass = (limit - np.sign(slope) * empty) / np.abs(slope)
-    mass = np.where(slope == 0.0, np.inf, mass)
+    size = np.linalg.norm(np.asarray(gravity, dtype=np.float64), axis=-1)[..., np.newaxis]
+    mass = np.where(np.abs(slope) <= LEAST_LEVER * size, np.inf, mass)
     least: Floats = np.where(np.abs(empty) > limit, -np.inf, mass).min(axis=-1)
     return least
 

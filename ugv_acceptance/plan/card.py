@@ -11,10 +11,11 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.wording import advice
 from ugv_acceptance.plan.maps import safe_maps
-from ugv_acceptance.plan.order import duration, time_text
+from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
+from ugv_acceptance.report.numbers import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Code -> what it means to the person at the robot.
@@ -106,7 +107,7 @@ def card_of(plan: Plan, config: Config) -> str:
         levels=LEVELS,
         meanings=[(code, text, advice(code)) for code, text in MEANINGS.items()],
         maps=safe_maps(arm, plan),
-        length=time_text(duration(plan)),
+        length=time_text(duration(plan), digits=2),
         home=_text(plan.home_deg),
     )
 

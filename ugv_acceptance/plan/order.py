@@ -69,14 +69,6 @@ def durations(plan: Plan) -> list[float]:
     return [seconds_of(s, at, home) for s, at in zip(plan.steps, starts, strict=False)]
 
 
-def time_text(seconds: float) -> str:
-    """Return a time as people say it: 45 s, 12 min, 6.3 h."""
-    if seconds < 120.0:
-        return f'{seconds:.0f} s'
-    minutes = seconds / 60.0
-    return f'{minutes:.0f} min' if minutes < 120.0 else f'{minutes / 60.0:.1f} h'
-
-
 def duration(plan: Plan) -> float:
     """Return how long (s) the motions and holds of a plan take, without what a person does."""
     return sum(durations(plan))

@@ -7,7 +7,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ugv_acceptance.report.numbers import number_text
+from ugv_acceptance.report.numbers import hours_text, number_text
 from ugv_acceptance.report.regions import figure, svg_of
 
 Json = dict[str, Any]
@@ -23,7 +23,7 @@ def campaign_page(said: Json) -> str:
     environment = Environment(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
-    environment.filters.update(number=number_text, percent=_percent, hours=_hours)
+    environment.filters.update(number=number_text, percent=_percent, hours=hours_text)
     runs = sorted(said['each_run'], key=lambda run: run['verdict'] == 'PASS')
     made = trend_figure(said)
     return environment.get_template('campaign.html').render(
@@ -81,8 +81,3 @@ def trend_figure(said: Json) -> Figure | None:
 
 def _percent(value: float | None) -> str:
     return number_text(None if value is None else 100.0 * value, 1, '%')
-
-
-def _hours(value: float | None) -> str:
-    """Return hours; short ones keep their digits."""
-    return number_text(value) if value is None else f'{value:.4g} h'

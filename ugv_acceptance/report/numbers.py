@@ -18,6 +18,26 @@ def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
     return f'{round(value, digits) + 0.0:.{digits}f} {unit}'.strip()
 
 
+def time_text(seconds: float | None, digits: int = 3) -> str:
+    """Return a time as people say it: 45 s, 3.2 min, 6.35 h; a dash where there is none."""
+    if seconds is None:
+        return DASH
+    units = ((3600.0, 'h'), (60.0, 'min'))
+    size, unit = next((u for u in units if seconds >= 2.0 * u[0]), (1.0, 's'))
+    value = seconds / size
+    places = max(0, digits - 1 - (value >= 10.0) - (value >= 100.0))
+    text = f'{value:,.{places}f}'
+    return f'{text.rstrip("0").rstrip(".") if places else text} {unit}'
+
+
+def hours_text(hours: float | None) -> str:
+    """Return a number of hours as people say it."""
+    if hours is None:
+        return DASH
+    # What is still to run of some hundred hours is planned by the hour.
+    return time_text(3600.0 * hours, digits=4 if hours >= 100.0 else 3)
+
+
 def seconds_text(value: float | None) -> str:
     """Return seconds since the start of the recording."""
     return 'the end' if value is None else f'{value:.2f} s'

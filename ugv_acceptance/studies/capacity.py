@@ -15,7 +15,7 @@ from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.rows import Rows
-from ugv_acceptance.model.statics import gripper_point, static_torque
+from ugv_acceptance.model.statics import LEAST_LEVER, gripper_point, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
 
 # What ends a pull first; NOTHING: no finite force does.
@@ -98,7 +98,7 @@ def _rise(start: Floats, slope: Floats, end: Floats) -> Floats:
     """Return the smallest f >= 0 at which start + slope f leaves |value| <= end."""
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         room = (end - np.sign(slope) * start) / np.abs(slope)
-    room = np.where(slope == 0.0, np.inf, room)
+    room = np.where(np.abs(slope) <= LEAST_LEVER, np.inf, room)
     found: Floats = np.where(np.abs(start) > end, 0.0, np.maximum(room, 0.0))
     return found
 
