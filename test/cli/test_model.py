@@ -1,6 +1,7 @@
 """`ugv-acceptance model`: what it prints and what it refuses."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -142,3 +143,27 @@ def test_a_prismatic_joint_is_shown_in_metres_and_newtons(shared_bags: Path) -> 
     text = output_of('--config', 'abitobot', '--urdf', str(urdf))
     assert '-1.15 .. 1.15 m' in text
     assert '98.0 N ' in text
+
+
+@pytest.mark.parametrize('shoulder', ['90deg', '89.99999999deg', '89.9deg', '-90deg', '90.01deg'])
+def test_a_load_no_joint_feels_is_no_number(shoulder: str) -> None:
+    """Of an arm upright the limits allow nothing that a person could carry to it or read."""
+    text = output_of('--posture', f'shoulder_joint={shoulder}')
+    assert 'no joint limit bounds it in this posture; tipping may, see below' in text
+    assert max(len(digits) for digits in re.findall(r'\d+', text.split('sha256')[1][20:])) < 7
+
+
+@pytest.mark.parametrize('payload', ['4000', '1e6', '1e9'])
+def test_tables_fit_whatever_is_carried(payload: str) -> None:
+    """Nobody reads eleven digits in a row; a load too heavy is still computed."""
+    text = output_of('--payload', payload)
+    told = text[text.index('Links') :]
+    lines = [line for line in told.splitlines() if not line.startswith('warning:')]
+    assert max(len(line) for line in lines) <= 80
+    assert 'kg too much' in told
+    assert not re.search(r'\d{7}', told)
+
+
+def test_rounding_bears_no_load() -> None:
+    """In the document the largest load of an upright arm is null: nothing bounds it."""
+    assert described('--posture', 'shoulder_joint=90deg')['payload']['largest_kg'] is None

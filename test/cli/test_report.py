@@ -291,6 +291,29 @@ def test_a_result_is_verified_from_what_lies_beside_it(papers: Path, tmp_path: P
     assert done.exit_code == 0, done.output
 
 
+@pytest.mark.parametrize(
+    ('lost', 'option'),
+    [
+        (('bag', 'path'), '--bag'),
+        (('robot', 'config'), '--config'),
+        (('robot', 'urdf'), '--urdf'),
+        (('criteria', 'path'), '--criteria'),
+    ],
+)
+def test_what_is_not_found_is_asked_for(
+    papers: Path, tmp_path: Path, lost: tuple[str, str], option: str
+) -> None:
+    """Of a result made in another folder: what is missing, and the option that says where it is."""
+    told = result_of(papers, 'packbot_pass')
+    gone = 'run/part_of_the_result'
+    told[lost[0]][lost[1]] = [gone] if option == '--bag' else gone
+    (tmp_path / 'result.json').write_text(json.dumps(told), 'utf-8')
+    error = str(run(VERIFY, tmp_path / 'result.json').exception)
+    assert error.startswith(f'{gone}: expected it there')
+    assert error.endswith(f'say where it is with {option}')
+    assert '\n' not in error
+
+
 def test_another_recording_has_another_hash(papers: Path) -> None:
     """What was judged then is not what lies there now."""
     bag = SHIPPED / 'packbot_pass'

@@ -4,7 +4,16 @@ from typing import Any
 
 import pytest
 
-from ugv_acceptance.report.numbers import DASH, doubts_of, limit_text, missing_text, worst_text
+from ugv_acceptance.report.numbers import (
+    DASH,
+    doubts_of,
+    hours_text,
+    limit_text,
+    missing_text,
+    number_text,
+    time_text,
+    worst_text,
+)
 
 
 def of_data(quantity: str, unit: str, **bounds: float | None) -> dict[str, Any]:
@@ -57,3 +66,39 @@ def test_a_load_that_nobody_declared_is_a_doubt(low: float, doubted: bool) -> No
 def test_where_no_load_could_be_told_nothing_is_doubted() -> None:
     """As without efforts."""
     assert doubts_of({'model_check': {'payload': None}}) == []
+
+
+@pytest.mark.parametrize(
+    ('hours', 'text'),
+    [
+        (None, DASH),
+        (0.0, '0 s'),
+        (0.0002, '0.72 s'),
+        (0.006675, '24 s'),
+        (0.0533, '3.2 min'),
+        (1.0, '60 min'),
+        (4.5, '4.5 h'),
+        (37.24, '37.2 h'),
+        (154.53, '154.5 h'),
+        (221.0, '221 h'),
+        (12345.6, '12,345.6 h'),
+        (1e9, '1,000,000,000 h'),
+    ],
+)
+def test_hours_are_told_in_the_unit_that_fits(hours: float | None, text: str) -> None:
+    """No exponent, no row of zeros: 24 s is not 0.006675 h."""
+    assert hours_text(hours) == text
+
+
+def test_a_time_that_is_none_ends_no_report() -> None:
+    """Not a number stays one."""
+    assert time_text(float('nan')) == 'nan s'
+
+
+@pytest.mark.parametrize(
+    ('value', 'text'),
+    [(19289181967339508.0, '1.93e+16 kg'), (-2e6, '-2e+06 kg'), (999999.0, '999999.0 kg')],
+)
+def test_a_long_number_is_shortened(value: float, text: str) -> None:
+    """Sixteen digits overflow every column and tell nothing."""
+    assert number_text(value, 1, 'kg') == text

@@ -23,6 +23,7 @@ from ugv_acceptance.model.stability import (
     stance_of,
 )
 from ugv_acceptance.model.statics import payload_capacity, torque_of
+from ugv_acceptance.report.numbers import number_text
 
 VERSION = 1
 
@@ -226,7 +227,7 @@ def _overload(config: Config, load: Payload) -> list[str]:
     robot, limits = config.settings.robot, config.settings.limits.torque
     return [
         f'{worst.joint}: limit {limit:g} {worst.unit} cannot hold {load.mass:g} kg'
-        f' in every posture: up to {worst.torque:.1f} {worst.unit} needed'
+        f' in every posture: up to {number_text(worst.torque, 1, worst.unit)} needed'
         for worst, limit in zip(worst_torques(robot, load), limits, strict=False)
         if load.mass > 0.0 and worst.torque > limit
     ]

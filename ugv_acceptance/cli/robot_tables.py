@@ -8,12 +8,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ugv_acceptance.report.numbers import number_text
+
 Values = dict[str, Any]
 
 # A payload of so many times the robot's own mass is not a number anybody plans with.
 _MANY = 10.0
-# From here on digits are counted, not read.
-_LONG = 1e6
 
 
 def print_tables(description: Values) -> None:
@@ -72,21 +72,15 @@ def _torque(joint: Values) -> tuple[str, str, str]:
     if joint['topic_name'] is None:
         return 'held', '', ''
     unit, limit, used = joint['torque_unit'], joint['limit'], joint['utilisation']
-    torque = f'{_readable(joint["torque"])} {unit}'
+    torque = f'{number_text(joint["torque"])} {unit}'
     if limit is None:
         return torque, 'not judged', ''
     colour = 'red' if used > 1.0 else 'green'
     return torque, f'{limit:g} {unit}', f'[{colour}]{_share(used)}[/]'
 
 
-def _readable(value: float, digits: int = 1) -> str:
-    """Return a number to so many places after the point; three digits of one too long to read."""
-    # Adding 0.0 takes the sign off a rounded zero.
-    return f'{round(value, digits) + 0.0:.{digits}f}' if abs(value) < _LONG else f'{value:.3g}'
-
-
 def _share(used: float) -> str:
-    return f'{used:.0%}' if used < 100.0 else f'{_readable(used, 0)} x'
+    return f'{used:.0%}' if used < 100.0 else f'{number_text(used, 0)} x'
 
 
 def _range(joint: Values) -> str:
@@ -110,16 +104,16 @@ def _print_payload(console: Console, d: Values) -> None:
     if load['link'] is None:
         console.print('Payload: no payload link is configured\n')
         return
-    console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}; ', end='')
+    console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}:\n  ', end='')
     if not load['holds_itself']:
         console.print('[red]the arm is too heavy for its limits without one[/]\n')
     elif _boundless(d):
         console.print('no joint limit bounds it in this posture; tipping may, see below\n')
     else:
         left = load['largest_kg'] - load['mass_kg']
-        text = f'{_readable(abs(left), 2)} kg'
+        text = f'{number_text(abs(left), 2)} kg'
         state = f'{text} left' if left >= 0.0 else f'[red]{text} too much[/]'
-        console.print(f'the limits allow {_readable(load["largest_kg"], 2)} kg here: {state}\n')
+        console.print(f'the limits allow {number_text(load["largest_kg"], 2)} kg here: {state}\n')
 
 
 def _boundless(d: Values) -> bool:
@@ -141,7 +135,7 @@ def _contacts(d: Values) -> Table:
 def _print_stability(console: Console, d: Values) -> None:
     x, y, z = _numbers(d['centre_of_gravity_m'])
     console.print(
-        f'Total mass {_readable(d["total_mass_kg"], 2)} kg with payload, '
+        f'Total mass {number_text(d["total_mass_kg"], 2)} kg with payload, '
         f'centre of gravity {x} {y} {z} m'
     )
     names = ' '.join(d['support_polygon']) or 'none'
@@ -151,7 +145,7 @@ def _print_stability(console: Console, d: Values) -> None:
         angle = margin['tilt_left_deg']
         text = '-' if angle is None else f'[{"green" if angle > 0 else "red"}]{angle:.1f}[/]'
         row = (margin['restoring_moment_nm'], margin['energy_j'])
-        table.add_row(side, text, *('-' if value is None else _readable(value) for value in row))
+        table.add_row(side, text, *('-' if value is None else number_text(value) for value in row))
     console.print(table)
 
 

@@ -8,12 +8,16 @@ Json = dict[str, Any]
 DASH = '\N{EN DASH}'
 # Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
 MISSING, HEAVIER = 0.05, 0.2
+# From here on the digits of a number are counted, not read, and no column holds them.
+LONG = 1e6
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
-    """Return a number with its unit; a dash where there is none."""
+    """Return a number with its unit; a dash where there is none, three digits of a long one."""
     if value is None:
         return DASH
+    if abs(value) >= LONG:
+        return f'{value:.3g} {unit}'.strip()
     # Adding 0.0 takes the sign off a rounded zero.
     return f'{round(value, digits) + 0.0:.{digits}f} {unit}'.strip()
 

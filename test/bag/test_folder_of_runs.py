@@ -1,0 +1,79 @@
+"""A folder that is not one recording but holds several: nothing is taken for one run."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bag.bag_cases import run, write_mcap
+
+from ugv_acceptance import BadBag
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.writer import BagWriter
+
+
+def write_runs(folder: Path, *names: str) -> Path:
+    """Write rosbag2 folders in a folder."""
+    for name in names:
+        with BagWriter(folder / name) as bag:
+            bag.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
+    return folder
+
+
+def told(folder: Path) -> str:
+    """Return what opening the folder says."""
+    with pytest.raises(BadBag) as caught:
+        open_bag(folder)
+    return str(caught.value)
+
+
+def test_a_folder_of_runs_names_them_and_what_judges_them(tmp_path: Path) -> None:
+    """The first few, how many, and both ways on; words of a shell where a name has blanks."""
+    folder = write_runs(tmp_path / 'all runs', 'a', 'b', 'c', 'd', 'e')
+    text = told(folder)
+    assert text.startswith(f'{folder}: expected one recording, found 5 in it (a, b, c and 2 more)')
+    assert f"`ugv-acceptance campaign '{folder}'` judges all of them" in text
+    assert f"`ugv-acceptance evaluate '{folder}/a' '{folder}/b'` single ones" in text
+    assert '\n' not in text
+
+
+def test_files_of_two_runs_are_not_one(tmp_path: Path) -> None:
+    """Without metadata.yaml only files that differ in their number alone belong together."""
+    for name in ('one.mcap', 'two.mcap'):
+        write_mcap(tmp_path / name, run(20))
+    assert 'found 2 in it (one.mcap, two.mcap)' in told(tmp_path)
+
+
+def test_parts_without_metadata_are_one_recording(tmp_path: Path) -> None:
+    """The parts of a split recording are read together as ever."""
+    for name in ('run_0.mcap', 'run_1.mcap'):
+        write_mcap(tmp_path / name, run(20))
+    assert len(open_bag(tmp_path).paths) == 2
+
+
+def test_a_run_one_folder_further_down_is_named(tmp_path: Path) -> None:
+    """Where there is one run only, that is what was meant."""
+    folder = write_runs(tmp_path / 'day', 'run')
+    assert told(folder).endswith(f'found one below it: `ugv-acceptance evaluate {folder}/run`')
+
+
+def test_a_folder_without_recordings_says_what_one_is(tmp_path: Path) -> None:
+    """Nothing found: the endings that were looked for."""
+    (tmp_path / 'notes.txt').write_text('no bag')
+    assert 'expected a rosbag2 folder, found no .mcap' in told(tmp_path)
+
+
+@pytest.mark.parametrize('verb', [('evaluate',), ('watch',), ('map', 'torque', '--from-bag')])
+def test_every_verb_says_so_in_one_line(verb: tuple[str, ...], tmp_path: Path) -> None:
+    """Exit code 2."""
+    folder = write_runs(tmp_path / 'day', 'a', 'b')
+    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    code = 'from ugv_acceptance.cli import main; main()'
+    command = [sys.executable, '-c', code, *verb, str(folder)]
+    done = subprocess.run(
+        command, env=env, capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert done.stderr.count('\n') == 1
+    assert f'`ugv-acceptance campaign {folder}` judges all of them' in done.stderr
