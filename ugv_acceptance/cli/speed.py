@@ -1,9 +1,12 @@
 """`ugv-acceptance speed`: joint speeds up to which the static model holds."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from ugv_acceptance.model.robot import Robot
 
 
 def speed(
@@ -75,6 +78,13 @@ def speed(
         f'error of the static model {reference:g} N m, F < {bound:.4f}'
     )
     for name, limit in zip(robot.joint_names, limits, strict=True):
-        slides = robot.joint(name).kind == 'prismatic'
-        text = f'{limit:8.3f} m/s' if slides else f'{math.degrees(limit):8.1f} deg/s'
-        typer.echo(f'  {name:24}{text if np.isfinite(limit) else "     any"}')
+        typer.echo(f'  {name:24}{_speed(robot, name, limit)}')
+
+
+def _speed(robot: 'Robot', name: str, limit: float) -> str:
+    import math
+
+    if not math.isfinite(limit):
+        return '     any'
+    slides = robot.joint(name).kind == 'prismatic'
+    return f'{limit:8.3f} m/s' if slides else f'{math.degrees(limit):8.1f} deg/s'
