@@ -9,7 +9,7 @@ from bag.recordings import SHAPES, chunk_starts
 from mcap.reader import make_reader
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.annotated import Said, check_new, write_annotated
+from ugv_acceptance.bag.annotated import Said, write_annotated
 from ugv_acceptance.bag.reader import open_bag
 
 WRITTEN = run(60)
@@ -65,22 +65,3 @@ def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
     with pytest.raises(AcceptanceError, match=r'out\.mcap: cannot be written'):
         write_annotated(tmp_path / 'out.mcap', open_bag(path), {}, [])
     assert sorted(p.name for p in tmp_path.iterdir()) == ['in.mcap', 'out.mcap']
-
-
-@pytest.mark.parametrize('overwrite', [False, True])
-def test_a_recording_is_never_written_over(tmp_path: Path, *, overwrite: bool) -> None:
-    """Neither by its own name nor by a link to it, asked for or not."""
-    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
-    (tmp_path / 'link.mcap').hardlink_to(path)
-    for target in (path, tmp_path / 'link.mcap'):
-        with pytest.raises(AcceptanceError, match='expected a new file, got the recording itself'):
-            check_new(target, [path], overwrite=overwrite)
-
-
-def test_another_file_is_replaced_only_when_asked(tmp_path: Path) -> None:
-    """With --overwrite, and not without."""
-    path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
-    (tmp_path / 'old.mcap').write_bytes(b'')
-    check_new(tmp_path / 'old.mcap', [path], overwrite=True)
-    with pytest.raises(AcceptanceError, match='--overwrite only'):
-        check_new(tmp_path / 'old.mcap', [path], overwrite=False)

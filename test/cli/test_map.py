@@ -120,7 +120,7 @@ def test_a_recorded_run_is_drawn(tmp_path: Path, repository: Path) -> None:
         (('torque', '--limit', 'knee=3'), '--limit: expected JOINT=TORQUE'),
         (('drag', '--friction', '0'), '--friction: expected a number > 0'),
         (('torque', '--caution', '120'), 'on the safe side of --failure'),
-        (('torque', '--out', 'map.gif'), 'expected a file ending in .svg, .png, .csv, .npz'),
+        (('torque', '--out', 'map.gif'), '--out map.gif: expected .svg, .png, .csv or .npz'),
     ],
 )
 def test_wrong_options_are_named(arguments: tuple[str, ...], words: str) -> None:

@@ -17,9 +17,27 @@ from hardening.wire import child, environment, listening, monitor, robot, runnin
 SIZE, LEFT = 1 << 20, 1 << 15
 # Verb -> its words, given a recording and a folder to write into.
 VERBS: dict[str, Callable[[Path, Path], list[str]]] = {
-    'evaluate --json': lambda bag, to: ['evaluate', str(bag), '--json', str(to / 'result.json')],
-    'evaluate --report': lambda bag, to: ['evaluate', str(bag), '--report', str(to / 'page.html')],
-    'evaluate --csv': lambda bag, to: ['evaluate', str(bag), '--csv', str(to / 'margins.csv')],
+    'evaluate --json': lambda bag, to: [
+        'evaluate',
+        str(bag),
+        '--overwrite',
+        '--json',
+        str(to / 'result.json'),
+    ],
+    'evaluate --report': lambda bag, to: [
+        'evaluate',
+        str(bag),
+        '--overwrite',
+        '--report',
+        str(to / 'page.html'),
+    ],
+    'evaluate --csv': lambda bag, to: [
+        'evaluate',
+        str(bag),
+        '--overwrite',
+        '--csv',
+        str(to / 'margins.csv'),
+    ],
     'simulate': lambda _, to: ['simulate', 'fetch', '--bag', str(to / 'simulated')],
     'campaign': lambda bag, to: ['campaign', str(bag), '--out', str(to / 'campaign')],
 }

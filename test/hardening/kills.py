@@ -183,7 +183,7 @@ def _lives(pid: int) -> bool:
 def report(recording: Path, folder: Path, times: int, seed: int = 0) -> Outcome:
     """Kill an evaluation that writes over older results: each file is the old or the new one."""
     rng, names = Random(seed), ('result.json', 'report.html', 'junit.xml')
-    options: list[str] = []
+    options = ['--overwrite']
     for option, name in zip(('--json', '--report', '--junit'), names, strict=True):
         options += [option, str(folder / name)]
     took = _took('evaluate', str(recording), *options)

@@ -22,7 +22,7 @@ from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.cli import running_plan
 from ugv_acceptance.config import load
 from ugv_acceptance.nodes.guard import Guard
-from ugv_acceptance.plan.plan import Plan, write_plan
+from ugv_acceptance.plan.plan import Plan, plan_text
 from ugv_acceptance.run.hands import OPERATOR, ROBOT
 from ugv_acceptance.run.verdicts import seen_in
 
@@ -55,7 +55,7 @@ def plan_file(folder: Path, *steps: dict[str, Any]) -> Path:
         {'plan': 'tiny', 'robot': 'packbot', 'config_sha256': load().sha256, 'home_deg': HOME,
          'steps': steps}
     )  # fmt: skip
-    write_plan(plan, folder / 'plan.yaml')
+    (folder / 'plan.yaml').write_text(plan_text(plan), 'utf-8')
     return folder / 'plan.yaml'
 
 

@@ -11,7 +11,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.derive import Wanted, derive
-from ugv_acceptance.plan.plan import Step, read_plan, write_plan
+from ugv_acceptance.plan.plan import Step, plan_text, read_plan
 from ugv_acceptance.run.catalogue import case_of
 from ugv_acceptance.run.coverage import cells, coverage_of
 from ugv_acceptance.run.folder import open_folder
@@ -134,7 +134,7 @@ def test_cells_do_not_see_whole_turns() -> None:
 
 def opened(path: Path, plan_file: Path, *, resume: bool = False, mode: str = 'sim') -> Any:
     """Open a run's folder."""
-    write_plan(PLAN, plan_file)
+    plan_file.write_text(plan_text(PLAN), 'utf-8')
     return open_folder(path, PLAN, plan_file, mode, CONFIG, resume=resume)
 
 

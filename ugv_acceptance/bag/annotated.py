@@ -17,12 +17,12 @@ from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
-from ugv_acceptance import AcceptanceError, BadBag, __version__
+from ugv_acceptance import BadBag, __version__
 from ugv_acceptance.bag.mcap_writer import McapWriter
 from ugv_acceptance.bag.raw import Logged, messages_of
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
-from ugv_acceptance.bag.result import check_writable, unwritable
+from ugv_acceptance.bag.result import is_stream, unwritable, whole
 from ugv_acceptance.bag.writer import definition_of
 
 CHUNK = 1 << 20
@@ -41,15 +41,6 @@ class Said:
     data: bytes
 
 
-def check_new(path: Path, bag_paths: Iterable[Path], *, overwrite: bool) -> None:
-    """Raise AcceptanceError where `path` cannot be written, is there already, or is the bag."""
-    check_writable(path)
-    if path.exists() and any(path.samefile(p) for p in bag_paths if p.exists()):
-        raise AcceptanceError(f'{path}: expected a new file, got the recording itself')
-    if path.exists() and not overwrite:
-        raise AcceptanceError(f'{path}: it exists; it is replaced with --overwrite only')
-
-
 def write_annotated(
     path: Path,
     bag: Bag,
@@ -63,19 +54,16 @@ def write_annotated(
     what is written late by design; `progress` takes the log time reached (ns). Every chunk has a
     checksum. The file has its name only when it is whole.
     """
-    part = path.with_name(path.name + '.part')
     try:
-        with part.open('wb') as file:
+        with whole(path) as file:
             writer = McapWriter(file, f'ugv_acceptance {__version__}')
             count = _write(writer, bag, types, said, progress)
             writer.finish()
             file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
+            if not is_stream(path):
+                os.fsync(file.fileno())
     except OSError as error:
         raise unwritable(path, error.strerror) from None
-    finally:
-        part.unlink(missing_ok=True)
     return count
 
 

@@ -1,12 +1,17 @@
 """What an evaluation writes, whole or not at all: the result as JSON, the margins as CSV."""
 
+import io
 import json
 import os
-from collections.abc import Callable
+import re
+import secrets
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from math import isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 
@@ -18,6 +23,8 @@ from ugv_acceptance.model.stability import SIDES, STATES
 
 # Units of columns, of a joint that turns and of one that slides.
 POSITION, TORQUE = ('rad', 'm'), ('nm', 'n')
+# Names of files that this process holds open: 1 and 2, or those a shell made for us, as in >(gzip).
+_OPEN = re.compile(r'/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)')
 
 
 def write_json(path: Path, result: object) -> None:
@@ -37,12 +44,61 @@ def write_text(path: Path, text: str) -> None:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file, whole or not at all."""
-    part = path.with_name(path.name + '.part')
     try:
-        part.write_bytes(content)
-        part.replace(path)
+        with whole(path) as file:
+            file.write(content)
     except OSError as error:
         raise unwritable(path, error.strerror) from None
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[BinaryIO]:
+    """Give a file to write that has its name only once it is whole; an older one stays till then.
+
+    Links are followed. A device or a pipe (`is_stream`) is written as it is. AcceptanceError where
+    the file cannot be made or named; errors of the block are not changed.
+    """
+    part: Path | None = None
+    try:
+        if is_stream(path):
+            file = _stream(path)
+        else:
+            # A name of its own: whatever lies beside the file is somebody else's.
+            path = Path(os.path.realpath(path))
+            part = path.with_name(f'.{secrets.token_hex(8)}.part')
+            file = part.open('xb')
+    except OSError as error:
+        raise unwritable(path, error.strerror) from None
+    try:
+        yield file
+        try:
+            file.close()
+            if part is not None:
+                part.replace(path)
+        except OSError as error:
+            raise unwritable(path, error.strerror) from None
+    finally:
+        with suppress(OSError):
+            file.close()
+        if part is not None:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+
+
+def is_stream(path: Path) -> bool:
+    """Return whether a path is a device, a pipe or a socket, or names one of our own open files."""
+    if _OPEN.fullmatch(str(path)):
+        return True
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)  # noqa: PTH110, PTH112, PTH113 - these raise nothing
+
+
+def _stream(path: Path) -> BinaryIO:
+    found = _OPEN.fullmatch(str(path))
+    if found is None:
+        return path.open('wb')
+    sys.stdout.flush()
+    number = 1 if found[1] else 2 if found[2] else int(found[3] or found[4])
+    return os.fdopen(os.dup(number), 'wb')
 
 
 def unwritable(path: Path, why: str | None) -> AcceptanceError:
@@ -52,14 +108,22 @@ def unwritable(path: Path, why: str | None) -> AcceptanceError:
 
 def check_writable(path: Path | None) -> None:
     """Raise AcceptanceError where a result could not be written: better before than after."""
-    if path is None:
+    if path is None or is_stream(path):
         return
-    if path.is_dir():
+    if os.path.isdir(path):  # noqa: PTH112 - it raises nothing
         raise unwritable(path, 'expected a file, it is a folder')
-    if not path.parent.is_dir():
-        raise unwritable(path, f'there is no folder {path.parent}')
-    if not os.access(path.parent, os.W_OK):
-        raise unwritable(path, f'no permission in {path.parent}')
+    linked = os.path.islink(path)  # noqa: PTH114 - it raises nothing
+    folder = Path(os.path.realpath(path)).parent if linked else path.parent
+    if not folder.is_dir():
+        raise unwritable(path, f'there is no folder {folder}')
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise unwritable(path, error.strerror) from None
+    if not os.access(folder, os.W_OK):
+        raise unwritable(path, f'no permission in {folder}')
 
 
 class CsvSink:
@@ -73,14 +137,13 @@ class CsvSink:
         self._settings = settings
         self._start = start
         self._file: TextIO | None = None
+        self._stack = ExitStack()
 
     def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
         """Open the file under a name that says it is not whole."""
         if self._path is not None:
-            try:
-                self._file = self._path.with_name(self._path.name + '.part').open('w')
-            except OSError as error:
-                raise unwritable(self._path, error.strerror) from None
+            binary = self._stack.enter_context(whole(self._path))
+            self._file = io.TextIOWrapper(binary, encoding='utf-8', newline='\n')
             self._file.write(','.join(self._header()) + '\n')
         return self
 
@@ -91,11 +154,9 @@ class CsvSink:
         trace: TracebackType | None,
     ) -> None:
         """Give the file its name if it is whole."""
-        if self._file is None or self._path is None:
-            return
-        self._file.close()
-        if kind is None:
-            Path(self._file.name).replace(self._path)
+        if self._file is not None and kind is None:
+            self._stack.callback(self._told, self._file.flush)
+        self._stack.__exit__(kind, error, trace)
 
     @property
     def sinks(self) -> list[Callable[[MarginRows], None]]:
@@ -133,11 +194,20 @@ class CsvSink:
         times = (rows.time - self._start) / 1e9
         states = [STATES[s] for s in rows.state.tolist()]
         lines = zip(times.tolist(), rows.stamp.tolist(), states, table.tolist(), strict=True)
-        if self._file is not None:
-            self._file.writelines(
+        file = self._file
+        if file is not None:
+            text = (
                 f'{time:.9f},{stamp},{state},{",".join(map(_cell, numbers))}\n'
                 for time, stamp, state, numbers in lines
             )
+            self._told(lambda: file.writelines(text))
+
+    def _told(self, write: Callable[[], None]) -> None:
+        """Write; of a disk that is full say which file was to be written."""
+        try:
+            write()
+        except OSError as error:
+            raise unwritable(self._path or Path(), error.strerror) from None
 
 
 def joint_columns(robot: Robot, what: str, units: tuple[str, str]) -> list[str]:

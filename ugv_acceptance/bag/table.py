@@ -1,6 +1,7 @@
 """The margins over time as a Parquet file, stretch by stretch; PyArrow is an extra."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.result import POSITION, TORQUE, joint_columns, unwritable
+from ugv_acceptance.bag.result import POSITION, TORQUE, joint_columns, unwritable, whole
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES, STATES
@@ -24,6 +25,7 @@ class ParquetSink:
         self._path, self._settings, self._start = path, settings, start
         self._writer: Any = None
         self._arrow: Any = None
+        self._stack = ExitStack()
         if path is not None:
             try:
                 from pyarrow import parquet  # noqa: PLC0415 - an extra
@@ -45,30 +47,29 @@ class ParquetSink:
         trace: TracebackType | None,
     ) -> None:
         """Give the file its name if it is whole."""
-        if self._writer is not None and self._path is not None:
-            self._writer.close()
-            if kind is None:
-                self._part.replace(self._path)
+        if self._writer is not None:
+            self._stack.callback(self._told, self._writer.close)
+        self._stack.__exit__(kind, error, trace)
 
     @property
     def sinks(self) -> list[Callable[[MarginRows], None]]:
         """Return the sink, if there is a file to write."""
         return [] if self._path is None else [self._write]
 
-    @property
-    def _part(self) -> Path:
-        path = self._path or Path()
-        return path.with_name(path.name + '.part')
-
     def _write(self, rows: MarginRows) -> None:
         # The first stretch, though it be empty, makes the file: no older one must stay.
         if not len(rows.time) and self._writer is not None:
             return
         table = self._arrow.table(self._columns(rows))
+        if self._writer is None:
+            file = self._stack.enter_context(whole(self._path or Path()))
+            self._writer = self._parquet.ParquetWriter(file, table.schema)
+        self._told(lambda: self._writer.write_table(table))
+
+    def _told(self, write: Callable[[], None]) -> None:
+        """Write; of a disk that is full say which file was to be written."""
         try:
-            if self._writer is None:
-                self._writer = self._parquet.ParquetWriter(self._part, table.schema)
-            self._writer.write_table(table)
+            write()
         except OSError as error:
             raise unwritable(self._path or Path(), error.strerror) from None
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.cli.outputs import Overwrite, check_folder, inputs_of
 
 if TYPE_CHECKING:
     from ugv_acceptance.campaign.statement import Origin
@@ -63,6 +64,7 @@ def campaign(
         float,
         typer.Option(min=0.0, help='Seconds to wait for a scheduler or workers that are gone.'),
     ] = 60.0,
+    overwrite: Overwrite = False,
 ) -> None:
     """Judge many runs and state what they show: MTBF, availability, success, trend.
 
@@ -85,6 +87,7 @@ def campaign(
     from ugv_acceptance.campaign.sources import find_sources
     from ugv_acceptance.campaign.statement import Question, statement
     from ugv_acceptance.cli.campaign_text import print_campaign, print_effort
+    from ugv_acceptance.cli.kinds import CAMPAIGN
     from ugv_acceptance.cli.summary import while_read
 
     check_requirement(require_mtbf)
@@ -92,6 +95,9 @@ def campaign(
     brief, origin = terms_of(config, urdf, criteria)
     entries = read_log(failures) if failures else []
     sources = find_sources(places)
+    recorded = [Path(file) for s in sources if not s.remote for file in s.files]
+    inputs = inputs_of(brief.config, recorded, criteria=criteria, failures=failures)
+    check_folder('--out', out, CAMPAIGN, inputs, overwrite=overwrite)
     began = time.monotonic()
     with progress_bar(len(sources)) as progress:
         place = Place(out, workers or cores(), scheduler, cluster_wait)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,9 +65,7 @@ def evaluate(
         Path | None,
         typer.Option(help='Write the recording with margins, verdict and alerts beside it (MCAP).'),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option('--overwrite', help='Let --annotate replace a file that exists.')
-    ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Judge recorded runs: margins, alerts and a verdict with its reasons.
 
@@ -82,15 +81,17 @@ def evaluate(
       ugv-acceptance evaluate run --annotate run_judged.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.result import write_json
+    from ugv_acceptance.cli import kinds
     from ugv_acceptance.cli.evidence import Papers, write_junit
     from ugv_acceptance.cli.summary import print_result, while_read
     from ugv_acceptance.config import load
-    from ugv_acceptance.config.identity import identity_from
+    from ugv_acceptance.config.identity import file_of, identity_from
 
-    tables, wishes = (report, pdf, csv_file, parquet), (criteria, init_criteria, annotate)
-    papers = Papers(*tables, *wishes, overwrite)
+    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria, annotate)
     groups, loaded = recordings(bags), load(config, urdf=urdf)
-    papers.check(len(groups), (json_file, junit))
+    of_all = [Output('--json', json_file, kinds.RESULT), Output('--junit', junit, kinds.JUNIT)]
+    inputs = inputs_of(loaded, bags, criteria=criteria, identity=file_of(identity))
+    check_outputs([*of_all, *papers.outputs(len(groups))], inputs, overwrite=overwrite)
     entered = identity_from(identity)
     results: list[dict[str, Any]] = []
     codes: list[int] = []

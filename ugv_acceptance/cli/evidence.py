@@ -1,7 +1,6 @@
 """What an evaluation leaves behind: a report, PDF, JUnit XML, tables, proposed criteria."""
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from ugv_acceptance import AcceptanceError, __version__
 if TYPE_CHECKING:
     from ugv_acceptance.bag.judge import Judgement
     from ugv_acceptance.bag.reader import Bag, Topics
+    from ugv_acceptance.cli.outputs import Output
     from ugv_acceptance.config import Config
     from ugv_acceptance.evaluation.criteria import CriteriaSet
     from ugv_acceptance.evaluation.settings import Settings
@@ -32,34 +32,29 @@ class Papers:
     criteria: Path | None = None
     init_criteria: Path | None = None
     annotate: Path | None = None
-    overwrite: bool = False
 
     @property
     def paged(self) -> bool:
         """Whether a report is asked for, as HTML or PDF."""
         return self.report is not None or self.pdf is not None
 
-    def check(self, recordings: int, others: Iterable[Path | None] = ()) -> None:
-        """Raise AcceptanceError where a file cannot be written, or is of one run but not asked so.
+    def outputs(self, recordings: int) -> list['Output']:
+        """Return the files to write. AcceptanceError where one is of one run, but asked of more."""
+        from ugv_acceptance.cli import kinds
+        from ugv_acceptance.cli.outputs import Output
 
-        `others` are files of all recordings.
-        """
-        from ugv_acceptance.bag.result import check_writable
-
-        one_run = {
-            '--report': self.report,
-            '--pdf': self.pdf,
-            '--csv': self.csv,
-            '--parquet': self.parquet,
-            '--init-criteria': self.init_criteria,
-            '--annotate': self.annotate,
-        }
-        for option, path in one_run.items():
-            if path is not None and recordings != 1:
-                raise AcceptanceError(f'{option} takes one recording, got {recordings}')
-            check_writable(path)
-        for path in others:
-            check_writable(path)
+        found = [
+            Output('--report', self.report, kinds.REPORT),
+            Output('--pdf', self.pdf, kinds.PDF),
+            Output('--csv', self.csv, kinds.MARGINS),
+            Output('--parquet', self.parquet, kinds.PARQUET),
+            Output('--init-criteria', self.init_criteria, kinds.CRITERIA),
+            Output('--annotate', self.annotate, kinds.ANNOTATED),
+        ]
+        for output in found:
+            if output.path is not None and recordings != 1:
+                raise AcceptanceError(f'{output.option} takes one recording, got {recordings}')
+        return found
 
 
 def judge_files(
@@ -67,7 +62,6 @@ def judge_files(
 ) -> tuple[Json, 'StripRecorder | None']:
     """Return the result of one recording, and its strips where a report is asked for."""
     from ugv_acceptance.bag.acknowledgements import add_acknowledgements
-    from ugv_acceptance.bag.annotated import check_new
     from ugv_acceptance.bag.judge import Terms, judge
     from ugv_acceptance.bag.reader import choose_topics, open_bag
     from ugv_acceptance.bag.result import CsvSink
@@ -84,8 +78,6 @@ def judge_files(
         detail=papers.csv is not None or papers.parquet is not None,
     )
     bag = open_bag(paths)
-    if papers.annotate is not None:
-        check_new(papers.annotate, bag.paths, overwrite=papers.overwrite)
     names = (wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
     topics = choose_topics(bag, *names)
     effort, recorder = EffortComparison(settings), StripRecorder(settings, bag.start_ns)
@@ -174,10 +166,11 @@ def write_papers(
 def _propose(path: Path, result: Json) -> None:
     """Write criteria that a good run meets; of any other say so and go on: its verdict stands."""
     from ugv_acceptance.bag.result import write_text
+    from ugv_acceptance.config.seal import sealed
     from ugv_acceptance.evaluation.proposal import proposed_criteria
 
     if result['verdict'] == 'PASS':
-        write_text(path, proposed_criteria(result, result['robot']['name']))
+        write_text(path, sealed(proposed_criteria(result, result['robot']['name'])))
     else:
         text = f'--init-criteria: expected a run that passes, got {result["verdict"]}'
         typer.echo(f'ugv-acceptance: {text}', err=True)

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
     from ugv_acceptance.model.blocks import Floats
@@ -40,6 +42,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     from_bag: Annotated[
         list[Path] | None, typer.Option(help='Recorded run to draw over the map; may be split.')
     ] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Map two joints: torque used, tilt left, payload or pull; at rest, on rigid ground.
 
@@ -51,6 +54,8 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
       ugv-acceptance map rollover --x flipper_joint=-30deg:180deg --y elbow_joint --out tip.csv
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.bag.result import whole
+    from ugv_acceptance.cli import kinds
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
     from ugv_acceptance.config import load
@@ -59,6 +64,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     from ugv_acceptance.studies.maps import CLASSES, area_fraction, classes
 
     loaded = load(config)
+    paths = out or [Path(f'{kind}_map.svg')]
+    outputs = [Output('--out', path, kinds.MAP) for path in paths]
+    check_outputs(outputs, inputs_of(loaded, from_bag or ()), overwrite=overwrite)
     wanted = Wanted(x, y, posture, orientation, slope, payload, limit, friction, steps)
     scene = scene_from(loaded, wanted)
     data = with_levels(map_of(kind, scene), caution, failure)
@@ -68,8 +76,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     found = classes(data.margin, data.levels.caution, data.levels.failure)
     for k, name in enumerate(CLASSES):
         typer.echo(f'  {name:8}{100.0 * area_fraction(found == k, scene.grid):6.1f} % of the map')
-    for path in out or [Path(f'{kind}_map.svg')]:
-        write_map(path, scene, data, track)
+    for path in paths:
+        with whole(path) as file:
+            write_map(file, path.suffix.lower(), scene, data, track)
         typer.echo(f'Wrote {path}.')
 
 

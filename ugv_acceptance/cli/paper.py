@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ugv_acceptance.cli.outputs import Overwrite, check_folder, inputs_of
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -27,6 +29,7 @@ def paper(
         int,
         typer.Option(help='Random cases in which MuJoCo decides what tips: 0.3 s each.'),
     ] = 0,
+    overwrite: Overwrite = False,
 ) -> None:
     """Compute the paper again and write it as a page and as JSON; print the table of matches.
 
@@ -35,17 +38,17 @@ def paper(
       ugv-acceptance paper
       ugv-acceptance paper --out pages/paper --truth 500
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    import json
-
     from rich.console import Console
     from rich.progress import track
 
+    from ugv_acceptance.cli.kinds import PAPER
     from ugv_acceptance.config import load
     from ugv_acceptance.report.page import draw, render
     from ugv_acceptance.report.paper import SECTIONS
     from ugv_acceptance.report.paper_numbers import as_json, summary
 
     loaded = load(config)
+    check_folder('--out', out, PAPER, inputs_of(loaded), overwrite=overwrite)
     console = Console(stderr=True)
     subject = _subject(loaded, simulate, truth, console)
     sections: list[Section] = []
@@ -54,15 +57,11 @@ def paper(
         section, more = build(subject)
         sections.append(section)
         extra |= more
-    out.mkdir(parents=True, exist_ok=True)
     drawn = draw(sections)
     rows = [row for section in sections for row in section.rows]
     document = as_json(rows, [f'{name}.svg' for name in drawn]) | extra
-    (out / 'paper.html').write_text(render(loaded.name, sections, drawn), encoding='utf-8')
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    (out / 'paper.json').write_text(text + '\n', encoding='utf-8')
-    for name, svg in drawn.items():
-        (out / f'{name}.svg').write_text(svg, encoding='utf-8')
+    pages = {'paper.html': render(loaded.name, sections, drawn)}
+    _write(out, document, pages | {f'{name}.svg': svg for name, svg in drawn.items()})
     for place, count in summary(rows).items():
         typer.echo(f'{place:34}{count["matches"]:3} of {count["of"]:2} match')
     for row in rows:
@@ -71,6 +70,21 @@ def paper(
     for line in subject.truth:
         typer.echo('  '.join(f'{cell:24}' for cell in line).rstrip())
     typer.echo(f'Wrote {out / "paper.html"} and {out / "paper.json"}.')
+
+
+def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
+    """Write the folder; paper.json, by which it is known, comes first."""
+    import json
+
+    from ugv_acceptance.bag.result import unwritable, write_text
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(out, error.strerror) from None
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    for name, content in {'paper.json': text + '\n', **files}.items():
+        write_text(out / name, content)
 
 
 def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -> 'Subject':

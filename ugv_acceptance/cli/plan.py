@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+
 if TYPE_CHECKING:
     from ugv_acceptance.plan.plan import Plan
 
@@ -37,6 +39,7 @@ def plan(
     short: Annotated[
         bool, typer.Option('--short', help='One step of each kind, for a demonstration.')
     ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
 
@@ -48,12 +51,15 @@ def plan(
       ugv-acceptance plan --from plan.yaml --card card.html
       ugv-acceptance plan --config my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance import AcceptanceError
+    from ugv_acceptance.bag.result import write_text
+    from ugv_acceptance.cli import kinds
     from ugv_acceptance.config import load
     from ugv_acceptance.plan.derive import Wanted, derive
-    from ugv_acceptance.plan.plan import read_plan, write_plan
+    from ugv_acceptance.plan.plan import plan_text, read_plan
 
     loaded = load(config)
+    outputs = [Output('--out', out, kinds.PLAN), Output('--card', card, kinds.CARD)]
+    check_outputs(outputs, inputs_of(loaded, plan=existing), overwrite=overwrite)
     if existing is not None:
         made = read_plan(existing, loaded.settings.robot)
     else:
@@ -61,14 +67,11 @@ def plan(
         made = derive(loaded, wanted)
     _print(made)
     if out is not None:
-        write_plan(made, out)
+        write_text(out, plan_text(made))
     if card is not None:
         from ugv_acceptance.plan.card import card_of
 
-        try:
-            card.write_text(card_of(made, loaded), 'utf-8')
-        except OSError as error:
-            raise AcceptanceError(f'{card}: cannot be written: {error.strerror}') from None
+        write_text(card, card_of(made, loaded))
 
 
 def _ramp(tilt: str) -> float:

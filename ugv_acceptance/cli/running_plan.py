@@ -54,6 +54,8 @@ class Asked:
 
 def execute(asked: Asked) -> int:
     """Run the plan; return the exit code."""
+    from ugv_acceptance.cli.kinds import RUN
+    from ugv_acceptance.cli.outputs import check_folder, inputs_of
     from ugv_acceptance.config import load
     from ugv_acceptance.run.folder import open_folder
 
@@ -63,6 +65,7 @@ def execute(asked: Asked) -> int:
     _faults(asked, config)
     mode = f'{asked.mode}-fast' if asked.fast else asked.mode
     out = folder_of(asked)
+    check_folder('--out', out, RUN, inputs_of(config))
     folder = open_folder(out, plan, asked.plan, mode, config, resume=asked.resume)
     waiting = [step for step in chosen if folder.done(step) is None]
     console = Console(highlight=False)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.outputs import check_folder, inputs_of
+
 if TYPE_CHECKING:
     from ugv_acceptance.run.catalogue import Case
     from ugv_acceptance.run.record import Outcome
@@ -61,12 +63,14 @@ def simulate(
         return
     if bag is None:
         raise typer.BadParameter('expected a folder to record into, got none', param_hint='--bag')
+    from ugv_acceptance.cli.kinds import RECORDING
     from ugv_acceptance.config import load
     from ugv_acceptance.run.catalogue import case_of
     from ugv_acceptance.run.fault_text import fault_from
     from ugv_acceptance.run.record import record
 
     loaded = load(config)
+    check_folder('--bag', bag, RECORDING, inputs_of(loaded))
     robot = loaded.settings.robot
     faults = tuple(fault_from(text, robot) for text in fault or ())
     case = case_of(scenario, robot, seed, seconds, faults)

@@ -32,8 +32,8 @@ def identity_from(text: str | None) -> dict[str, str]:
     """
     if text is None:
         return {}
-    if '=' not in text:
-        return _checked(_file(Path(text)), text)
+    if (path := file_of(text)) is not None:
+        return _checked(_file(path), text)
     pairs: dict[object, object] = {}
     key = ''
     for part in text.split(','):
@@ -48,6 +48,11 @@ def identity_from(text: str | None) -> dict[str, str]:
         else:
             raise BadConfig(f'--identity: expected KEY=VALUE, got {shown(part)}')
     return _checked(pairs, '--identity')
+
+
+def file_of(text: str | None) -> Path | None:
+    """Return the file that a text names, if it does not say KEY=VALUE itself."""
+    return None if text is None or '=' in text else Path(text)
 
 
 def _file(path: Path) -> dict[object, object]:

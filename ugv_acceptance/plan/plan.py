@@ -12,9 +12,10 @@ from typing import Annotated, Literal
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.seal import sealed
 from ugv_acceptance.evaluation.alerts import LEVELS
 from ugv_acceptance.evaluation.wording import WORDS
 from ugv_acceptance.model.robot import Robot, Vector
@@ -171,17 +172,14 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
     return plan
 
 
-def write_plan(plan: Plan, path: Path) -> None:
-    """Write a plan as YAML with a head that says how to read it."""
+def plan_text(plan: Plan) -> str:
+    """Return a plan as YAML: a head that says how to read it, a last line that tells of edits."""
     data = plan.model_dump(mode='json', exclude_defaults=True)
     for step, whole in zip(data['steps'], plan.steps, strict=True):
         step['alerts'] = whole.alerts.model_dump(mode='json')
         step['where'] = whole.where
     body = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True)
-    try:
-        path.write_text(f'{HEAD}\n{body}', 'utf-8')
-    except OSError as error:
-        raise AcceptanceError(f'{path}: cannot be written: {error.strerror}') from None
+    return sealed(f'{HEAD}\n{body}')
 
 
 HEAD = """\

@@ -1,16 +1,16 @@
 """A map as a picture or as a file of numbers."""
 
 import csv
+import io
 import math
 from collections.abc import Callable
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from ugv_acceptance import BadConfig
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.map_data import MapData, Scene
@@ -142,30 +142,27 @@ def _axis(axes: Axes, scene: Scene) -> None:
         axis.set_label_text(f'{name}, degrees' if turns else f'{name}, m')
 
 
-def write_map(path: Path, scene: Scene, data: MapData, track: Floats | None = None) -> None:
-    """Write the map as its file's ending says: .svg, .png, .csv or .npz.
-
-    Raises BadConfig for any other ending.
-    """
-    if path.suffix not in _WRITERS:
-        raise BadConfig(f'{path}: expected a file ending in {", ".join(_WRITERS)}')
-    _WRITERS[path.suffix](path, scene, data, track)
+def write_map(
+    file: BinaryIO, ending: str, scene: Scene, data: MapData, track: Floats | None = None
+) -> None:
+    """Write the map as one of ENDINGS says."""
+    _WRITERS[ending](file, scene, data, track)
 
 
-def _write_svg(path: Path, scene: Scene, data: MapData, track: Floats | None) -> None:
-    path.write_text(svg_of(draw_map(scene, data, track), data.kind), encoding='utf-8')
+def _write_svg(file: BinaryIO, scene: Scene, data: MapData, track: Floats | None) -> None:
+    file.write(svg_of(draw_map(scene, data, track), data.kind).encode('utf-8'))
 
 
-def _write_png(path: Path, scene: Scene, data: MapData, track: Floats | None) -> None:
-    path.write_bytes(png_of(draw_map(scene, data, track)))
+def _write_png(file: BinaryIO, scene: Scene, data: MapData, track: Floats | None) -> None:
+    file.write(png_of(draw_map(scene, data, track)))
 
 
-def _write_csv(path: Path, scene: Scene, data: MapData, _: Floats | None) -> None:
+def _write_csv(binary: BinaryIO, scene: Scene, data: MapData, _: Floats | None) -> None:
     """Write one line a cell: positions (rad, m), value, class, cause."""
     robot, grid = scene.robot, scene.grid
     kind = classes(data.margin, data.levels.caution, data.levels.failure)
     names = [robot.joint_names[grid.first], robot.joint_names[grid.second]]
-    with path.open('w', newline='', encoding='utf-8') as file:
+    with io.TextIOWrapper(binary, newline='', encoding='utf-8') as file:
         writer = csv.writer(file)
         writer.writerow(
             [*names, f'{data.kind}_{_ENDINGS.get(data.unit, data.unit)}', 'class', 'cause']
@@ -177,7 +174,7 @@ def _write_csv(path: Path, scene: Scene, data: MapData, _: Floats | None) -> Non
                 writer.writerow([*cells, CLASSES[kind[i, j]], cause])
 
 
-def _write_npz(path: Path, scene: Scene, data: MapData, track: Floats | None) -> None:
+def _write_npz(file: BinaryIO, scene: Scene, data: MapData, track: Floats | None) -> None:
     grid = scene.grid
     arrays: dict[str, np.ndarray] = {
         'x': grid.x,
@@ -192,15 +189,16 @@ def _write_npz(path: Path, scene: Scene, data: MapData, track: Floats | None) ->
         arrays |= {'cause': data.cause, 'causes': np.array(data.causes)}
     if track is not None:
         arrays['track'] = track
-    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # its own flag is no array
+    np.savez_compressed(file, **arrays)  # type: ignore[arg-type]  # its own flag is no array
 
 
 # Units as column names have them.
 _ENDINGS = {'°': 'deg', '%': 'percent'}
 
-_WRITERS: dict[str, Callable[[Path, Scene, MapData, Floats | None], None]] = {
+_WRITERS: dict[str, Callable[[BinaryIO, Scene, MapData, Floats | None], None]] = {
     '.svg': _write_svg,
     '.png': _write_png,
     '.csv': _write_csv,
     '.npz': _write_npz,
 }
+ENDINGS = tuple(_WRITERS)

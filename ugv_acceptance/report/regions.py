@@ -109,5 +109,5 @@ def png_of(made: Figure, dpi: int = 150) -> bytes:
     """Return the figure as a PNG file's bytes."""
     target = io.BytesIO()
     with mpl.rc_context(STYLE):
-        made.savefig(target, format='png', dpi=dpi, metadata={'Software': None})
+        made.savefig(target, format='png', dpi=dpi, metadata={'Software': 'ugv_acceptance'})
     return target.getvalue()

@@ -17,7 +17,7 @@ from typing import Any
 from ugv_acceptance import BadConfig, __version__
 from ugv_acceptance.bag.result import write_json, write_text
 from ugv_acceptance.config import Config
-from ugv_acceptance.plan.plan import SIMULATION, Plan, Step, write_plan
+from ugv_acceptance.plan.plan import SIMULATION, Plan, Step, plan_text
 from ugv_acceptance.run.hands import SIM
 from ugv_acceptance.run.report import html_of, report_of
 from ugv_acceptance.run.verdicts import VERDICTS, whole
@@ -125,10 +125,8 @@ def open_folder(
         raise BadConfig(
             f'{path}: expected a folder to record into, got: {error.strerror}'
         ) from None
-    if source is None:
-        write_plan(plan, path / 'plan.yaml')
-    else:
-        write_text(path / 'plan.yaml', source.read_text('utf-8'))
+    text = plan_text(plan) if source is None else source.read_text('utf-8')
+    write_text(path / 'plan.yaml', text)
     folder.note('begun', plan_sha256=plan.sha256, mode=mode)
     # Last: a folder with this file is a run.
     write_json(state, head)
@@ -136,13 +134,15 @@ def open_folder(
 
 
 def _unborn(path: Path) -> bool:
-    """Return whether a folder is empty or holds what a run killed while it made it has left."""
-    known = {'steps', 'plan.yaml', 'plan.yaml.part', 'journal.jsonl', 'run.json.part'}
-    return (
-        path.is_dir()
-        and {p.name for p in path.iterdir()} <= known
-        and not any((path / 'steps').glob('*'))
-    )
+    """Return whether a folder is empty or holds what a run killed while it made it has left.
+
+    `steps` is made first: without it, a plan in the folder is somebody's own.
+    """
+    if not path.is_dir():
+        return False
+    found = {p.name for p in path.iterdir() if p.suffix != '.part'}
+    begun = 'steps' in found and found <= {'steps', 'plan.yaml', 'journal.jsonl'}
+    return not found or (begun and not any((path / 'steps').glob('*')))
 
 
 def _check_same(state: Path, head: dict[str, str]) -> None:
