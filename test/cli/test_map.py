@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import AcceptanceError
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.cli.map import map as map_verb
 from ugv_acceptance.config import load
@@ -125,5 +125,5 @@ def test_a_recorded_run_is_drawn(tmp_path: Path, repository: Path) -> None:
 )
 def test_wrong_options_are_named(arguments: tuple[str, ...], words: str) -> None:
     """One line: the option, what was expected, what came."""
-    with pytest.raises(BadConfig, match=re.escape(words)):
+    with pytest.raises(AcceptanceError, match=re.escape(words)):
         runner.invoke(app, [*arguments, *SMALL], catch_exceptions=False)
