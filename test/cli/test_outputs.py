@@ -14,8 +14,7 @@ from typing import Any, get_type_hints
 import pytest
 import typer
 import yaml
-from click.testing import Result
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli import VERBS
@@ -549,6 +548,13 @@ def test_devices_and_pipes_are_written_as_they_are(place: Path) -> None:
     assert 'steps:' in done.stdout
     assert 'Operator card' in done.stderr
     assert place.is_dir()
+
+
+def test_a_map_needs_an_ending(place: Path) -> None:
+    """A pipe has none that would say which format is meant."""
+    assert place.is_dir()
+    words = ('torque', '--out', '/dev/null')
+    assert 'expected .svg, .png' in refused('map', *words, option='--out', path='/dev/null')
 
 
 def test_a_table_and_a_recording_go_through_a_pipe(place: Path) -> None:

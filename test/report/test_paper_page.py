@@ -12,6 +12,7 @@ from robots import paper_arm
 from typer.testing import CliRunner
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.kinds import PAPER
 from ugv_acceptance.cli.paper import paper
 from ugv_acceptance.report.arm_figures import disagreement, paper_grid, safe_fractions
 from ugv_acceptance.report.paper import Subject, rollover
@@ -80,6 +81,13 @@ def test_pictures_are_well_formed(written: tuple[Path, str]) -> None:
     """Every SVG is XML and draws something."""
     for file in written[0].glob('*.svg'):
         assert len(list(ET.parse(file).getroot().iter())) > 50  # noqa: S314 - written by us
+
+
+def test_the_folder_is_known_again(written: tuple[Path, str], tmp_path: Path) -> None:
+    """So the same command may be given twice; another folder is not taken for one."""
+    assert PAPER.ours(written[0])
+    (tmp_path / 'paper.json').write_text('{"title": "mine"}')
+    assert not PAPER.ours(tmp_path)
 
 
 def test_mujoco_gives_table_2_as_well(written: tuple[Path, str]) -> None:

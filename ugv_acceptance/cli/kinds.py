@@ -21,12 +21,14 @@ class Kind:
     """A kind of file: its format, its endings, whether a file is one we wrote, and what else it is.
 
     A file that is one we wrote may be replaced without a word; another only with --overwrite.
+    `by_ending`: the ending says what is written, so a pipe, which has none, will not do.
     """
 
     format: str
     endings: tuple[str, ...]
     ours: Callable[[Path], bool]
     else_it_is: str
+    by_ending: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +174,7 @@ CRITERIA = Kind(
 ANNOTATED = Kind('MCAP', ('.mcap',), lambda _: False, 'and may be a recording')
 PLAN = Kind('YAML', _YAML, _unedited('# A test plan made by'), 'and is no plan, or an edited one')
 CARD = Kind('HTML', _HTML, _starts(_PAGE % b'Operator card'), 'and is no operator card')
-MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is no map')
+MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is no map', by_ending=True)
 
 CAMPAIGN = FolderKind('campaign', ('campaign.json', 'campaign.html', 'runs/*.json'), _is_campaign)
 PAPER = FolderKind('paper', ('paper.json', 'paper.html', '*.svg'), _is_paper)

@@ -80,7 +80,8 @@ def check_outputs(
         if path is None:
             continue
         _check_no_input(option, path, inputs)
-        if not is_stream(path) and path.suffix.lower() not in kind.endings:
+        fits = path.suffix.lower() in kind.endings or (is_stream(path) and not kind.by_ending)
+        if not fits:
             raise _refused(option, path, f'expected {_ending(output, outputs)}')
         twice = next((other for other, seen in earlier if same(path, seen)), None)
         # Two may go to one pipe: it keeps nothing that could be lost.
