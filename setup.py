@@ -1,13 +1,17 @@
 """Packaging for pip and for colcon (ament_python): what is installed, and where."""
 
+import ast
 import re
+import sys
 from pathlib import Path
+from typing import Any
 
 from setuptools import find_packages, setup
 
 NAME = 'ugv_acceptance'
 HERE = Path(__file__).resolve().parent
 SHARE = f'share/{NAME}'
+TOP = (HERE / NAME / '__init__.py').read_text(encoding='utf-8')
 
 # ROS is not among these: on a robot apt brings it, in a virtual environment the Makefile does.
 REQUIRES = [
@@ -26,13 +30,6 @@ REQUIRES = [
     'typer>=0.12.5',
     'zstandard',
 ]
-SIMULATION = ['mujoco']
-CONSOLE = ['starlette', 'textual', 'uvicorn', 'websockets']
-FOXGLOVE = ['foxglove-sdk']
-PDF = ['weasyprint']  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
-TABLE = ['pyarrow']
-# Older ones of s3fs know no `endpoint_url`; pip falls back to them beside a newer botocore.
-CLUSTER = ['dask', 'distributed', 'fsspec', 's3fs>=2023.1']
 TEST = [
     'catkin-pkg',
     'flask',  # with flask-cors: the S3 server of moto
@@ -48,13 +45,9 @@ TEST = [
     'pytest-xdist',
     'setuptools<80',
     'wheel',
-    *CLUSTER,
-    *CONSOLE,
-    *FOXGLOVE,
-    *PDF,
-    *SIMULATION,
-    *TABLE,
 ]
+# Extras that the tests try too.
+TESTED = ('cluster', 'console', 'foxglove', 'pdf', 'sim', 'table')
 LINT = [
     'mypy',
     'pre-commit',
@@ -68,12 +61,40 @@ LINT = [
 
 def version() -> str:
     """Return the version, which stands once in the code: in the package's __init__.py."""
-    text = (HERE / NAME / '__init__.py').read_text(encoding='utf-8')
-    match = re.search(r"^__version__ = '([^']+)'$", text, re.MULTILINE)
+    match = re.search(r"^__version__ = '([^']+)'$", TOP, re.MULTILINE)
     if match is None:
         msg = f'{NAME}/__init__.py: expected a line __version__ = "X.Y.Z", found none'
         raise SystemExit(msg)
     return match.group(1)
+
+
+def extras() -> dict[str, list[str]]:
+    """Return the extras by name: the table EXTRAS of the package's __init__.py, test and lint."""
+    (table,) = (
+        node.value
+        for node in ast.parse(TOP).body
+        if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == 'EXTRAS' and node.value
+    )
+    told = {extra: list(needed) for extra, needed in ast.literal_eval(table).items()}
+    tested = [name for extra in TESTED for name in told[extra]]
+    return told | {'test': TEST + tested, 'lint': LINT}
+
+
+def commands() -> dict[str, Any]:
+    """Return our own `setup.py develop`, where that is what runs: by colcon --symlink-install.
+
+    It writes the interpreter it runs on into the scripts, heedless of build_scripts in setup.cfg.
+    """
+    if 'develop' not in sys.argv:
+        return {}
+    from setuptools.command.develop import develop  # noqa: PLC0415 - not in every setuptools
+
+    class Develop(develop):
+        def write_script(self, name: str, contents: str, *more: Any) -> None:  # noqa: ANN401
+            code = contents.partition('\n')[2]
+            super().write_script(name, f'#!/usr/bin/env python3\n{code}', *more)
+
+    return {'develop': Develop}
 
 
 def share(folder: str) -> list[tuple[str, list[str]]]:
@@ -120,17 +141,8 @@ setup(
         *share('bags'),
     ],
     install_requires=REQUIRES,
-    extras_require={
-        'console': CONSOLE,
-        'foxglove': FOXGLOVE,
-        'sim': SIMULATION,
-        'fast': ['isal'],
-        'pdf': PDF,
-        'table': TABLE,
-        'cluster': CLUSTER,
-        'test': TEST,
-        'lint': LINT,
-    },
+    extras_require=extras(),
+    cmdclass=commands(),
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',

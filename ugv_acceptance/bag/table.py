@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ugv_acceptance import AcceptanceError
+from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.bag.result import POSITION, TORQUE, joint_columns, unwritable, whole
 from ugv_acceptance.evaluation.rows import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
@@ -31,8 +31,7 @@ class ParquetSink:
                 from pyarrow import parquet  # noqa: PLC0415 - an extra
             except ImportError as error:
                 raise AcceptanceError(
-                    'no Parquet: expected PyArrow (pip install "ugv_acceptance[table]"), got: '
-                    f'{error}'
+                    f'no Parquet: expected PyArrow ({pip_install("table")}), got: {error}'
                 ) from None
             self._arrow, self._parquet = __import__('pyarrow'), parquet
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from ugv_acceptance import AcceptanceError
+from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.campaign.batches import AHEAD, DIED, Runs, Work, batches, each
 from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.trouble import words
@@ -271,6 +271,6 @@ def _distributed() -> Any:  # noqa: ANN401 - a module of an extra
         import distributed  # noqa: PLC0415 - an extra
     except ImportError:
         raise AcceptanceError(
-            "--scheduler: expected dask.distributed (pip install 'ugv_acceptance[cluster]')"
+            f'--scheduler: expected dask.distributed ({pip_install("cluster")})'
         ) from None
     return distributed

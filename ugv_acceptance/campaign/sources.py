@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ugv_acceptance import AcceptanceError, BadBag
+from ugv_acceptance import AcceptanceError, BadBag, pip_install
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.metadata import SUFFIXES, numbered
 from ugv_acceptance.campaign.trouble import words
@@ -98,7 +98,7 @@ def _opened(url: str) -> tuple[Any, str]:
     except ImportError as error:
         name = error.name or 'fsspec'
         raise AcceptanceError(
-            f"{url}: expected {name} for this URL (pip install 'ugv_acceptance[cluster]')"
+            f'{url}: expected {name} for this URL ({pip_install("cluster")})'
         ) from None
     except Exception as error:  # noqa: BLE001 - every protocol has its own errors
         raise AcceptanceError(f'{url}: expected a URL that fsspec knows ({words(error)})') from None

@@ -54,12 +54,12 @@ def evaluate(
     report: Annotated[
         Path | None, typer.Option(help='Write a report to sign, one HTML file.')
     ] = None,
-    pdf: Annotated[Path | None, typer.Option(help='Write the report as PDF (extra pdf).')] = None,
+    pdf: Annotated[Path | None, typer.Option(help='The report as PDF (needs weasyprint).')] = None,
     junit: Annotated[
         Path | None, typer.Option(help='Write JUnit XML, one case a criterion.')
     ] = None,
     parquet: Annotated[
-        Path | None, typer.Option(help='Write the margins over time as Parquet (extra table).')
+        Path | None, typer.Option(help='Write the margins over time as Parquet (needs pyarrow).')
     ] = None,
     annotate: Annotated[
         Path | None,

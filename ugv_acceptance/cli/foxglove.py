@@ -13,7 +13,7 @@ def foxglove(
     context: typer.Context,
     port: Annotated[int, typer.Option(help='Port on 127.0.0.1; 0 takes a free one.')] = 8765,
 ) -> None:
-    """Show the live topics in Foxglove or Lichtblick on this machine (extra foxglove).
+    """Show the live topics in Foxglove or Lichtblick on this machine (needs foxglove-sdk).
 
     Read only: nothing can be published, set or called. Ctrl-C ends.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import BadConfig, pip_install
 from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def need(*libraries: str) -> None:
     """Raise BadConfig where a library of the extra `console` is not installed."""
     missing = [name for name in libraries if find_spec(name) is None]
     if missing:
-        text = f"expected {', '.join(missing)}, found none: pip install 'ugv_acceptance[console]'"
+        text = f'expected {", ".join(missing)}, found none: {pip_install("console")}'
         raise BadConfig(text)
 
 

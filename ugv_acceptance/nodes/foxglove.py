@@ -15,7 +15,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from ugv_acceptance import AcceptanceError, BadBag
+from ugv_acceptance import AcceptanceError, BadBag, pip_install
 from ugv_acceptance.bag.writer import definition_of
 from ugv_acceptance.nodes.player import message_type
 
@@ -165,6 +165,6 @@ def _foxglove() -> Any:  # noqa: ANN401 - a module
         import foxglove  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise AcceptanceError(
-            f'no Foxglove: expected its SDK (pip install "ugv_acceptance[foxglove]"), got: {error}'
+            f'no Foxglove: expected its SDK ({pip_install("foxglove")}), got: {error}'
         ) from None
     return foxglove

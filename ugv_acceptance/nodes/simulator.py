@@ -30,8 +30,6 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.nodes.inputs import qos_of
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import run
-from ugv_acceptance.run.fault_text import fault_from
-from ugv_acceptance.run.virtual import VirtualRobot
 
 NAME = 'packbot_simulator'
 # Behind by more than this (s), the simulation lets time slip instead of catching up.
@@ -44,6 +42,10 @@ class Simulator(Node):
     """The simulated robot as a node; `slipped` (s) is how much real time it could not follow."""
 
     def __init__(self, **node: Any) -> None:  # noqa: ANN401 - as Node does
+        # Where MuJoCo is absent, they say so: run() catches it here.
+        from ugv_acceptance.run.virtual import VirtualRobot  # noqa: PLC0415
+        from ugv_acceptance.run.fault_text import fault_from  # noqa: PLC0415
+
         super().__init__(NAME, **node)
         self.slipped = 0.0
         self._declare()

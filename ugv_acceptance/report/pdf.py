@@ -3,7 +3,7 @@
 import logging
 from typing import Any
 
-from ugv_acceptance import AcceptanceError
+from ugv_acceptance import AcceptanceError, pip_install
 
 
 def pdf_of(html: str) -> bytes:
@@ -13,7 +13,7 @@ def pdf_of(html: str) -> bytes:
     except (ImportError, OSError) as error:
         reason = str(error).splitlines()[0]
         raise AcceptanceError(
-            'no PDF: expected WeasyPrint (pip install "ugv_acceptance[pdf]") and Pango '
+            f'no PDF: expected WeasyPrint ({pip_install("pdf")}) and Pango '
             f'(apt install libpango-1.0-0 libpangoft2-1.0-0), got: {reason}'
         ) from None
     logging.getLogger('weasyprint').setLevel(logging.ERROR)

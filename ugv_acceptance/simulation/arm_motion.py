@@ -9,12 +9,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
-import mujoco
 import numpy as np
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import RAISED, stability
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import TIPPED, attitude, turn
 from ugv_acceptance.simulation.tip_cases import clear_of_ground
 from ugv_acceptance.simulation.vehicle import (

@@ -6,12 +6,12 @@ when it has turned by TIPPED against the plane on which it had come to rest.
 
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import IDENTITY, Payload, Robot
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
 
 # Turn (rad) against the plane that counts as tipping; the slack of the contacts is far below.

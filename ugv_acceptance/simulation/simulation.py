@@ -8,12 +8,12 @@ tilts slowly: what its turning adds to accelerations is left out.
 import math
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.scenario import Command
 from ugv_acceptance.simulation.vehicle import (
     SERVO,

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-import mujoco
 import numpy as np
 
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recording, Scenario, Truth
 from ugv_acceptance.simulation.simulation import BUILD, Simulation
 from ugv_acceptance.simulation.vehicle import Build

@@ -6,12 +6,12 @@ On the free base the whole vehicle stands on wheels and yields; stiff servos hol
 
 from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, tune, vehicle_of
 
 FIXED = Build(base='fixed', motors=False)

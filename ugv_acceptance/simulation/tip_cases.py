@@ -5,7 +5,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -14,6 +13,7 @@ from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.support import support_of
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
 

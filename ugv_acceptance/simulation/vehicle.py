@@ -9,13 +9,13 @@ import math
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.simulation import shape
+from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.shape import numbers
 
 # Mass (kg) and inertia (kg m2) of what has none: MuJoCo wants a moving body to have some.

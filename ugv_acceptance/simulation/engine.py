@@ -1,0 +1,12 @@
+"""MuJoCo, an extra: who simulates imports it from here, or is told how to get it."""
+
+from ugv_acceptance import AcceptanceError, pip_install
+
+try:
+    import mujoco
+except ImportError as error:
+    raise AcceptanceError(
+        f'no simulation: expected MuJoCo ({pip_install("sim")}), got: {error}'
+    ) from None
+
+__all__ = ['mujoco']
