@@ -14,7 +14,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help venv demo test lint pytest colcon versions hardening clean distclean
+.PHONY: help venv tools demo test lint pytest colcon recipe versions hardening clean distclean
 
 # The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
 # libraries load.
@@ -24,10 +24,10 @@ unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # are no type stubs.
 ifdef ROS_DISTRO
 ROS := -c requirements/jazzy.txt
-EXTRAS := console,fast,sim,test
+TOOLS := test
 else
 ROS := -r requirements/ros.txt
-EXTRAS := console,fast,lint,sim,test
+TOOLS := lint,test
 endif
 PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
@@ -37,28 +37,40 @@ ONCE := $(foreach name,page_of_ kills operator run_verb soak,'--ignore-glob=*tes
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:
-	@echo 'make venv       .venv with the command .venv/bin/ugv-acceptance'
+	@echo 'make venv       .venv with the command .venv/bin/ugv-acceptance: @LEAN@'
+	@echo 'make tools      the same and what the tests and lint need: @FULL@'
 	@echo 'make demo       the main job on a recorded run: live margins and alerts, then the verdict on the bag'
 	@echo 'make test       everything CI checks: lint, the tests here, the tests on Python 3.12 + NumPy 1.26'
 	@echo 'make lint       ruff and mypy --strict'
 	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
 	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
+	@echo 'make recipe     what README.md says for a robot, command by command, with colcon from apt'
 	@echo 'make versions   the tests, but for the browser, on $(VERSIONS), the oldest with NumPy 1.26; ARGS as above'
 	@echo 'make hardening  the faults of docs/threats.md, tried by the thousand: see ARGS=--help; ARGS="--only 1,2"'
 	@echo 'make clean      removes what was built; make distclean the virtual environments too'
 
 venv: .venv/.installed
 
+tools: .venv/.tools
+
 .venv/.installed: $(REQUIREMENTS)
-	@echo 'Installing what is needed into .venv: about a minute.'
+	@echo 'Installing what is needed into .venv: @LEAN@.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[$(EXTRAS)]'
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim]'
 	test -x .venv/bin/ugv-acceptance
 	touch $@
 
+# In one go where nothing is there yet.
+.venv/.tools: $(REQUIREMENTS)
+	@echo 'Installing what is needed and what the tests need into .venv: @FULL@.'
+	test -x .venv/bin/python || $(PYTHON) -m venv .venv
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim,$(TOOLS)]'
+	test -x .venv/bin/ugv-acceptance
+	touch $@ .venv/.installed
+
 .venv312/.installed: $(REQUIREMENTS)
 	@test -n '$(JAZZY_PYTHON)' || { echo 'expected a python3.12 on PATH, in pyenv or in uv, found none'; exit 1; }
-	@echo 'Installing what is needed into .venv312: about a minute.'
+	@echo 'Installing what is needed and what the tests need into .venv312: @FULL@.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
 	    -e '.[console,fast,sim,test]' colcon-common-extensions
@@ -89,13 +101,13 @@ ifdef ROS_DISTRO
 lint:
 	@echo '*** NOT DONE: lint: it needs a newer NumPy than the sourced ROS; run it in a shell without ROS.'
 else
-lint: venv
+lint: tools
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 endif
 
-pytest: venv
+pytest: tools
 	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal $(ARGS)
 
 colcon: export PATH := $(CURDIR)/.venv312/bin:$(PATH)
@@ -115,12 +127,16 @@ colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 
+# Not the Makefile's virtual environments but the system's Python, which apt's colcon runs on.
+recipe:
+	/usr/bin/python3 test/robot_recipe.py
+
 versions: $(foreach version,$(VERSIONS),.venv$(subst .,,$(version))/.installed)
 	failed=0; for version in $(VERSIONS); do \
 	    ".venv$${version/./}/bin/python" -m pytest -n $(JOBS) --dist worksteal '--ignore-glob=*test_page_of_*' $(ARGS) || failed=1; \
 	done; exit $$failed
 
-hardening: venv
+hardening: tools
 	.venv/bin/python -m bench.hardening $(ARGS)
 
 clean:
