@@ -57,11 +57,15 @@ COPY = (
     f' | tar -C {shlex.quote(str(REPOSITORY))} --null -T - -c | tar -C ugv_acceptance -x'
 )
 STAND_INS = (
-    StandIn(r'sudo apt install .*', '', "Debian has no ros-dev-tools; .ci/run installs apt's colcon"),
+    StandIn(
+        r'sudo apt install .*', '', "Debian has no ros-dev-tools; .ci/run installs apt's colcon"
+    ),
     StandIn(r'sudo rosdep init|rosdep update', '', "rosdep's index is not on this machine"),
     StandIn(r'source /opt/ros/jazzy/setup\.bash', '', 'no ROS from apt: wheels of it, see below'),
     StandIn(r'git clone <this repository> ugv_acceptance', COPY, 'this checkout'),
-    StandIn(r'rosdep install .*', '', 'its packages come as wheels of the same versions, see below'),
+    StandIn(
+        r'rosdep install .*', '', 'its packages come as wheels of the same versions, see below'
+    ),
     StandIn(
         r'\. venv/bin/activate',
         '. venv/bin/activate && pip install -q -c ../apt.txt -r ../rosdep.txt',
@@ -89,8 +93,8 @@ def replaced(command: str) -> tuple[str, str]:
 def apt_versions() -> dict[str, str]:
     """Return the versions that stand for apt's, by pip's names."""
     lines = (REPOSITORY / 'requirements/jazzy.txt').read_text(encoding='utf-8').splitlines()
-    pinned = [line.split('==') for line in lines if not line.startswith('#')]
-    return {name: version for name, version in pinned} | APT_HAS
+    pinned = [line.partition('==') for line in lines if not line.startswith('#')]
+    return {name: version for name, _, version in pinned} | APT_HAS
 
 
 def from_rosdep() -> list[str]:
@@ -131,14 +135,23 @@ def shell(recipe: list[str], folder: Path, env: dict[str, str]) -> dict[str, str
     script = ['set -eo pipefail']
     for command in recipe:
         run, why = replaced(command)
-        run, told = run.replace('~/', f'{folder}/'), f'$ {command}' + (f'   # HERE: {why}' * bool(why))
+        run, told = (
+            run.replace('~/', f'{folder}/'),
+            f'$ {command}' + (f'   # HERE: {why}' * bool(why)),
+        )
         script += [f'echo {shlex.quote(told)}', *([run] if run else [])]
     script += ['env -0 > "$LEFT"']
     left = folder / 'environment'
     bash = ['/bin/bash', '--norc', '-c', '\n'.join(script)]
-    subprocess.run(bash, cwd=folder, env=env | {'LEFT': str(left)}, check=True)  # noqa: S603
+    subprocess.run(bash, cwd=folder, env=env | {'LEFT': str(left)}, check=True)
     pairs = left.read_text(encoding='utf-8').split('\0')
     return dict(pair.split('=', 1) for pair in pairs if pair)
+
+
+def say(text: str) -> None:
+    """Print a line at once: other processes write to the same place."""
+    sys.stdout.write(f'{text}\n')
+    sys.stdout.flush()
 
 
 class Written:
@@ -159,9 +172,16 @@ def read_launch_file(path: Path) -> list[Any]:
             setattr(self, name, made)
             return made
 
-    for name in re.findall(r'^from (launch\S*) import', path.read_text(encoding='utf-8'), re.M):
-        sys.modules.setdefault(name, Stand(name))
-    described = runpy.run_path(str(path))['generate_launch_description']()
+    text = path.read_text(encoding='utf-8')
+    names = re.findall(r'^from (launch\S*) import', text, re.MULTILINE)
+    before = dict(sys.modules)
+    sys.modules.update({name: Stand(name) for name in names})
+    try:
+        described = runpy.run_path(str(path))['generate_launch_description']()
+    finally:
+        for name in names:
+            del sys.modules[name]
+        sys.modules.update(before)
     return list(described.words[0])
 
 
@@ -219,12 +239,12 @@ def started(command: str, folder: Path) -> list[list[str]]:
 
 def follow(command: str, folder: Path, env: dict[str, str]) -> None:
     """Start what a ros2 command starts; nodes until they are seen to work, verbs to their end."""
-    print(f'$ {command}', flush=True)
+    say(f'$ {command}')
     running: list[tuple[list[str], subprocess.Popen[bytes]]] = []
     try:
         for words in started(command, folder):
-            print(f'  {shlex.join(words)}'.replace(f'{folder}/', '~/'), flush=True)
-            running.append((words, subprocess.Popen(words, cwd=folder / 'ws', env=env)))  # noqa: S603
+            say(f'  {shlex.join(words)}'.replace(f'{folder}/', '~/'))
+            running.append((words, subprocess.Popen(words, cwd=folder / 'ws', env=env)))
         for words, process in running:
             wait_until_it_works(words, process, env)
     finally:
@@ -244,15 +264,15 @@ def wait_until_it_works(
     name = Path(words[0]).name
     if name in SHOWN_BY:
         hear = [sys.argv[0], 'hear', *SHOWN_BY[name]]
-        subprocess.run(['python3', *hear], env=env, check=True)  # noqa: S603, S607
-        print(f'  {name}: a message on {SHOWN_BY[name][0]}', flush=True)
+        subprocess.run(['python3', *hear], env=env, check=True)
+        say(f'  {name}: a message on {SHOWN_BY[name][0]}')
     elif '--ros-args' in words:
         port = int(next(w for w in words if w.startswith('--port=')).removeprefix('--port='))
         until = time.monotonic() + PATIENCE
         while process.poll() is None and time.monotonic() < until:
             with socket.socket() as client:
                 if client.connect_ex(('127.0.0.1', port)) == 0:
-                    print(f'  {name} console: answers on port {port}', flush=True)
+                    say(f'  {name} console: answers on port {port}')
                     return
             time.sleep(0.1)
         raise SystemExit(f'{name}: expected a page on port {port}, got none')
@@ -288,10 +308,10 @@ def main() -> None:
         env = shell(set_up, folder, prepare(folder))
         # apt's message packages are compiled against this one.
         check = f'import numpy; assert numpy.__version__ == {NUMPY!r}, numpy.__version__'
-        subprocess.run(['python3', '-c', check], env=env, check=True)  # noqa: S603, S607
+        subprocess.run(['python3', '-c', check], env=env, check=True)
         for command in recipe[len(set_up) :]:
             follow(command, folder, env)
-    print(f'The recipe works: {len(recipe)} commands, {time.monotonic() - start:.0f} s.')
+    say(f'The recipe works: {len(recipe)} commands, {time.monotonic() - start:.0f} s.')
 
 
 if __name__ == '__main__':

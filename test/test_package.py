@@ -27,9 +27,9 @@ DATA_FOLDERS = [
 ]
 
 # A requirement's rosdep key is python3-<its name>, except:
-ROSDEP_KEY = {'pyyaml': 'python3-yaml', 'rosbags': 'python3-rosbags-pip'}
-# lz4 and zstandard come with mcap, which has no key.
-WITHOUT_ROSDEP_KEY = {'mcap', 'lz4', 'zstandard'}
+ROSDEP_KEY = {'pyyaml': 'python3-yaml'}
+# pip brings them, by README.md: rosbags' key is one of pip's, the others have none.
+WITHOUT_ROSDEP_KEY = {'mcap', 'rosbags', 'lz4', 'zstandard'}
 
 # Nobody else's machine has these. Written in two halves, so that this file does not name them.
 NOT_OURS = [
