@@ -251,10 +251,19 @@ def follow(command: str, folder: Path, env: dict[str, str]) -> None:
         for _, process in running:
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
-        ends = [(words, process.wait(PATIENCE)) for words, process in running]
+        ends = [(words, end_of(process)) for words, process in running]
     bad = [f'{Path(words[0]).name}: exit code {code}' for words, code in ends if code]
     if bad:
         raise SystemExit(f'{command}: expected exit code 0, got {", ".join(bad)}')
+
+
+def end_of(process: 'subprocess.Popen[bytes]') -> int:
+    """Return the exit code of a process that was asked to end; one that does not is killed."""
+    try:
+        return process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
 
 
 def wait_until_it_works(
@@ -287,7 +296,8 @@ def hear(topic: str, kind: str) -> None:
     rclpy = import_module('rclpy')
     module, name = kind.split(':')
     rclpy.init()
-    node, heard = rclpy.create_node('recipe'), []
+    heard: list[Any] = []
+    node = rclpy.create_node('recipe')
     quality = import_module('rclpy.qos').qos_profile_sensor_data
     kind_of = getattr(import_module(module), name)
     node.create_subscription(kind_of, topic, heard.append, quality)

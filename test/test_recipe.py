@@ -104,11 +104,20 @@ def test_scripts_of_a_colcon_build_take_the_active_python(
     version = f'{sys.version_info.major}.{sys.version_info.minor}'
     site = prefix / f'lib/python{version}/site-packages'
     site.mkdir(parents=True)
-    options = {
+    options: dict[str, list[str | Path]] = {
         'install': ['--record', tmp_path / 'log', '--single-version-externally-managed'],
         'develop': ['--editable', '--build-directory', tmp_path / 'build', '--no-deps'],
     }
-    words = [sys.executable, '-W', 'ignore', 'setup.py', '-q', verb, '--prefix', prefix]
+    words: list[str | Path] = [
+        sys.executable,
+        '-W',
+        'ignore',
+        'setup.py',
+        '-q',
+        verb,
+        '--prefix',
+        prefix,
+    ]
     env = os.environ | {'PYTHONPATH': str(site)}
     subprocess.run([*words, *options[verb]], cwd=source, env=env, check=True)
     scripts = list((prefix / 'lib/ugv_acceptance').iterdir())
