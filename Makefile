@@ -37,8 +37,8 @@ ONCE := $(foreach name,page_of_ kills operator run_verb soak,'--ignore-glob=*tes
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:
-	@echo 'make venv       .venv with the command .venv/bin/ugv-acceptance: 0.7 GB, one to six minutes'
-	@echo 'make tools      the same and what the tests and lint need: 1.6 GB, one to six minutes'
+	@echo 'make venv       .venv with the command .venv/bin/ugv-acceptance: 0.7 GB, 1 to 6 minutes'
+	@echo 'make tools      the same and what the tests and lint need: 1.6 GB, 2 to 18 minutes'
 	@echo 'make demo       the main job on a recorded run: live margins and alerts, then the verdict on the bag'
 	@echo 'make test       everything CI checks: lint, the tests here, the tests on Python 3.12 + NumPy 1.26'
 	@echo 'make lint       ruff and mypy --strict'
@@ -54,7 +54,7 @@ venv: .venv/.installed
 tools: .venv/.tools
 
 .venv/.installed: $(REQUIREMENTS)
-	@echo 'Installing what is needed into .venv: 0.7 GB, one to six minutes.'
+	@echo 'Installing what is needed into .venv: 0.7 GB, 1 to 6 minutes.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
 	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim]'
 	test -x .venv/bin/ugv-acceptance
@@ -62,7 +62,7 @@ tools: .venv/.tools
 
 # In one go where nothing is there yet.
 .venv/.tools: $(REQUIREMENTS)
-	@echo 'Installing what is needed and what the tests need into .venv: 1.6 GB, one to six minutes.'
+	@echo 'Installing what is needed and what the tests need into .venv: 1.6 GB, 2 to 18 minutes.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
 	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim,$(TOOLS)]'
 	test -x .venv/bin/ugv-acceptance
@@ -70,7 +70,7 @@ tools: .venv/.tools
 
 .venv312/.installed: $(REQUIREMENTS)
 	@test -n '$(JAZZY_PYTHON)' || { echo 'expected a python3.12 on PATH, in pyenv or in uv, found none'; exit 1; }
-	@echo 'Installing what is needed and what the tests need into .venv312: 1.6 GB, one to six minutes.'
+	@echo 'Installing what is needed and what the tests need into .venv312: 1.6 GB, 2 to 18 minutes.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
 	    -e '.[console,fast,sim,test]' colcon-common-extensions

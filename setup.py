@@ -89,7 +89,8 @@ def commands() -> dict[str, Any]:
         return {}
     from setuptools.command.develop import develop  # noqa: PLC0415 - not in every setuptools
 
-    class Develop(develop):  # type: ignore[misc] - setuptools has no types
+    # setuptools has no types.
+    class Develop(develop):  # type: ignore[misc]
         def write_script(self, name: str, contents: str, *more: Any) -> None:  # noqa: ANN401
             code = contents.partition('\n')[2]
             super().write_script(name, f'#!/usr/bin/env python3\n{code}', *more)
