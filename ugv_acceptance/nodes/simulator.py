@@ -43,8 +43,8 @@ class Simulator(Node):
 
     def __init__(self, **node: Any) -> None:  # noqa: ANN401 - as Node does
         # Where MuJoCo is absent, they say so: run() catches it here.
-        from ugv_acceptance.run.virtual import VirtualRobot  # noqa: PLC0415
         from ugv_acceptance.run.fault_text import fault_from  # noqa: PLC0415
+        from ugv_acceptance.run.virtual import VirtualRobot  # noqa: PLC0415
 
         super().__init__(NAME, **node)
         self.slipped = 0.0
