@@ -5,6 +5,7 @@ Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small e
 """
 
 import io
+import os
 import sys
 import time
 from pathlib import Path
@@ -27,6 +28,8 @@ POSTURES = {
 }
 LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE'}
 COLOURS = 96
+# Hz of the joint states, and of the IMU.
+RATES = '50 100'
 # How a posture is reached: steps, in seconds.
 STEPS, SECONDS = 120, 8.0
 
@@ -34,6 +37,7 @@ STEPS, SECONDS = 120, 8.0
 def main() -> None:
     """Take all pictures."""
     OUT.mkdir(exist_ok=True)
+    os.environ['DRIVER_RATES'] = RATES
     with live_console() as robot, chromium() as browser, browser.page() as page:
         page.open(robot.url)
         # A sign that flashes would be caught half faded.

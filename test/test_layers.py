@@ -92,6 +92,8 @@ IMPURE_MODULES = {
     'socket',
 }
 IMPURE_CALLS = {'open', 'print', 'input'}
+# Functions that change nothing, whatever they are given.
+PURE_CALLS = {'abs', 'float', 'int', 'len', 'max', 'min', 'sum'}
 
 LONGEST_MODULE = 400
 LONGEST_FUNCTION = 40
@@ -252,6 +254,35 @@ def test_a_function_is_short(path: Path) -> None:
         if (lines := code_lines(node, source)) > LONGEST_FUNCTION
     }
     assert not long.keys() - LONGER.keys(), long
+
+
+@each_module
+def test_no_call_changes_what_it_is_added_to(path: Path) -> None:
+    """In `x.n += f()` Python reads x.n before it calls f: what f adds to x.n would be lost.
+
+    So only calls that change nothing stand there, and no await.
+    """
+    kinds = (ast.Call, ast.Await, ast.Yield, ast.YieldFrom)
+    wrong = [
+        f'line {node.lineno}: {ast.unparse(node)}'
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.AugAssign) and not isinstance(node.target, ast.Name)
+        for part in ast.walk(node.value)
+        if isinstance(part, kinds) and not changes_nothing(part)
+    ]
+    assert not wrong, name_of(path)
+
+
+def changes_nothing(node: ast.AST) -> bool:
+    """Return whether this calls a function of numbers or arrays, or an array's own sum or end."""
+    if not isinstance(node, ast.Call):
+        return False
+    name = ast.unparse(node.func)
+    return (
+        name in PURE_CALLS
+        or name.split('.')[0] in {'np', 'math'}
+        or name.endswith(('.sum', '.min', '.max'))
+    )
 
 
 @each_module

@@ -141,6 +141,15 @@ def test_a_caution_can_be_shelved_a_danger_not(shown: Page, robot: Live) -> None
     assert not shown.run('!!document.querySelector("#alerts li.ERROR button[data-deed=shelve]")')
 
 
+def test_inputs_arrive_at_the_rate_sent(shown: Page) -> None:
+    """Joint states and IMU of 50 Hz each are said to arrive, at 50 Hz, and not long ago."""
+    cells = '[...document.querySelectorAll("#inputs tr")].slice(0, 2).map(row => row.children)'
+    shown.wait(
+        f'{cells}.every(([, state, rate, age]) => state.textContent === "arriving"'
+        ' && /^(49|50|51) Hz$/.test(rate.textContent) && / ms$/.test(age.textContent))'
+    )
+
+
 def test_a_silent_input_is_no_data(shown: Page, robot: Live) -> None:
     """Without IMU the page shows NO DATA and which input is silent."""
     robot.say('silent')

@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from nodes.live_case import imu, joints
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.bag.encode import joint_state_cdr
+from ugv_acceptance.bag.encode import inertia_cdr, joint_state_cdr
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
@@ -101,8 +102,82 @@ def test_a_gap_is_no_data() -> None:
     gap = judged('packbot_gap')
     shown = gap.snapshot_at(gap.bag.start_ns + 9_500_000_000)
     assert (shown.level, shown.known, shown.torque) == (STALE, False, ())
-    assert [row.level for row in shown.inputs] == [OK, STALE]
+    assert [row.level for row in shown.inputs] == [OK, STALE, OK]
     assert gap.snapshot_at(gap.bag.start_ns + 13_000_000_000).known
+
+
+def recorded(folder: Path, *parts: tuple[str, float, float, float]) -> Recording:
+    """Return a recording of parts: (topic, Hz, from, to) in seconds."""
+    types = {
+        '/joint_states': 'sensor_msgs/msg/JointState',
+        '/imu/data': 'sensor_msgs/msg/Imu',
+        '/payload': 'geometry_msgs/msg/InertiaStamped',
+    }
+    link = SETTINGS.robot.payload_link or ''
+    rows = [
+        (10**9 + round((start + k / hertz) * 1e9), topic)
+        for topic, hertz, start, end in parts
+        for k in range(round((end - start) * hertz))
+    ]
+    with BagWriter(folder) as writer:
+        for topic, kind in types.items():
+            writer.add_topic(topic, kind, Qos())
+        for when, topic in sorted(rows):
+            data = {
+                '/joint_states': lambda t: joints(stamp=t),
+                '/imu/data': lambda t: imu(stamp=t),
+                '/payload': lambda t: inertia_cdr(t, link, 1.0, (0.0, 0.0, 0.0)),
+            }[topic](when)
+            writer.write(topic, when, data)
+    bag = open_bag(folder)
+    return judge_for_console(bag, choose_topics(bag), SETTINGS)
+
+
+def rates_at(recording: Recording, seconds: float) -> list[float]:
+    """Return the rates shown of joint states, IMU and payload, so long after the start."""
+    shown = recording.snapshot_at(10**9 + round(seconds * 1e9))
+    return [row.rate for row in shown.inputs]
+
+
+def test_the_rate_is_that_of_the_moment(tmp_path: Path) -> None:
+    """Each input's Hz are those at which it came then, not what they were or were to be."""
+    made = recorded(
+        tmp_path / 'run',
+        ('/joint_states', 50.0, 0.0, 8.0),
+        ('/joint_states', 20.0, 8.0, 16.0),
+        ('/imu/data', 100.0, 0.0, 16.0),
+        ('/payload', 1.0, 4.0, 10.0),
+    )
+    assert rates_at(made, 2.0) == pytest.approx([50.0, 100.0, 0.0], rel=0.01)
+    assert rates_at(made, 7.5) == pytest.approx([50.0, 100.0, 1.0], rel=0.01)
+    assert rates_at(made, 15.0) == pytest.approx([20.0, 100.0, 0.0], rel=0.01)
+
+
+def test_a_short_recording_shows_its_rates(tmp_path: Path) -> None:
+    """A few messages are enough: an input of 5 Hz shows 5 Hz after two seconds."""
+    made = recorded(
+        tmp_path / 'run', ('/joint_states', 5.0, 0.0, 3.0), ('/imu/data', 10.0, 0.0, 3.0)
+    )
+    assert rates_at(made, 2.0) == pytest.approx([5.0, 10.0, 0.0], rel=0.01)
+
+
+def test_pairs_of_messages_are_two(tmp_path: Path) -> None:
+    """What comes in pairs comes at twice the rate of the pairs, not of what is between the two."""
+    made = recorded(
+        tmp_path / 'run',
+        ('/joint_states', 10.0, 0.0, 8.0),
+        ('/joint_states', 10.0, 0.001, 8.001),
+        ('/imu/data', 50.0, 0.0, 8.0),
+    )
+    assert rates_at(made, 6.0) == pytest.approx([20.0, 50.0, 0.0], rel=0.02)
+
+
+def test_a_rate_is_not_taken_over_a_gap() -> None:
+    """The messages behind a gap show at which rate they come."""
+    gap = judged('packbot_gap')
+    start = gap.bag.start_ns
+    (_, imu_row, _) = gap.snapshot_at(start + 11_500_000_000).inputs
+    assert imu_row.rate == pytest.approx(200.0, rel=0.02)
 
 
 def test_a_recording_without_one_margin_can_be_shown(tmp_path: Path) -> None:

@@ -63,17 +63,18 @@ class Newest:
 def newest_of_joints() -> Pick:
     """Pick the newest JointState of each set of names, for a driver may tell of some joints only.
 
-    What cannot be read is of a set of its own.
+    What cannot be read is handed on, each of it, to be counted as that.
     """
     decode = joint_state_decoder().raw
 
     def pick(waiting: Sequence[bytes]) -> Sequence[bytes]:
         newest: dict[Hashable, bytes] = {}
-        for data in waiting:
+        for k, data in enumerate(waiting):
+            names: Hashable
             try:
                 names = decode(data)[0].names
             except BadSample:
-                names = None
+                names = k
             newest.pop(names, None)
             newest[names] = data
         return list(newest.values())

@@ -15,10 +15,11 @@ from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.playhead import SPEEDS, Playhead
-from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
-from ugv_acceptance.console.track import Track, TrackMaker
+from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.track import Track, TrackMaker, rate_at
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.rows import Times
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.evaluation.wording import describe
@@ -31,7 +32,10 @@ INPUTS = ('joint_states', 'imu')
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recording:
-    """A judged recording: `snapshot_at` any of its times. Times are log times, ns."""
+    """A judged recording: `snapshot_at` any of its times. Times are log times, ns.
+
+    `payloads` are those that count, and since when; `declared` (n,) when any message of one came.
+    """
 
     settings: Settings
     bag: Bag
@@ -41,6 +45,7 @@ class Recording:
     worst: TrackMaker
     alerts: tuple[Alert, ...]
     payloads: tuple[tuple[int, Payload], ...]
+    declared: Times
 
     def snapshot_at(self, when: int) -> Snapshot:
         """Return what was known at `when`."""
@@ -66,7 +71,7 @@ class Recording:
             int(track.state[k]) if known else nothing.state,
             payload,
             alerts,
-            tuple(self._input(w, k, when) for w in range(2)),
+            (*(self._input(w, k, when) for w in range(2)), self._payload_input(when)),
         )
 
     def _near(self, when: int) -> list[tuple[int, Alert]]:
@@ -99,24 +104,41 @@ class Recording:
     def _input(self, which: int, k: int, when: int) -> InputRow:
         heard = int(self.track.heard[k, which])
         silent = heard < 0 or self._silent(which, when)
-        period = self.judgement.evaluator.fresh[which].period
         topic = (self.topics.joint_states, self.topics.imu)[which] or ''
-        bad = [
-            a
-            for a in self.alerts
-            if a.rule.subject == INPUTS[which]
-            and a.start <= when
-            and (a.end is None or when < a.end)
-        ]
+        bad = self._bad(INPUTS[which], when)
+        since = max((b for _, b in self.judgement.evaluator.gaps[which] if b <= when), default=0)
+        rate = rate_at(when, self.track.heard[:, which], self.track.taken[:, which], since)
         return InputRow(
             INPUTS[which],
             topic,
             max([a.rule.level for a in bad], default=STALE if silent else OK),
-            0.0 if silent or not period > 0 else 1e9 / period,
+            0.0 if silent else rate,
             math.nan if heard < 0 else (when - heard) / 1e9,
             ('the recording',),
             '; '.join(describe(a, self.settings) for a in bad),
         )
+
+    def _payload_input(self, when: int) -> InputRow:
+        """Return how the payload's topic is, which may be silent, or not there."""
+        came = bisect_right(self.declared, when)
+        bad = self._bad('payload', when)
+        return InputRow(
+            'payload',
+            self.topics.payload or '',
+            max([a.rule.level for a in bad], default=OK),
+            rate_at(when, self.declared, np.arange(len(self.declared))),
+            (when - int(self.declared[came - 1])) / 1e9 if came else math.nan,
+            ('the recording',) if self.topics.payload else (),
+            '; '.join(describe(a, self.settings) for a in bad) or ('' if came else NO_PAYLOAD),
+        )
+
+    def _bad(self, subject: str, when: int) -> list[Alert]:
+        """Return the alerts of an input that are active then."""
+        return [
+            a
+            for a in self.alerts
+            if a.rule.subject == subject and a.start <= when and (a.end is None or when < a.end)
+        ]
 
     def timeline(self) -> dict[str, Any]:
         """Return the run at a glance: worst margins by stretches, alerts, verdict."""
@@ -144,20 +166,24 @@ def judge_for_console(bag: Bag, topics: Topics, settings: Settings) -> Recording
     maker = TrackMaker(settings, bag.start_ns, bag.end_ns)
     judgement = judge(bag, topics, settings, [maker])
     alerts = tuple(ordered(judgement.evaluator.watch.log))
-    payloads = tuple(_payloads(bag, topics, settings))
-    return Recording(settings, bag, topics, judgement, maker.track(), maker, alerts, payloads)
+    track, (declared, payloads) = maker.track(), _payloads(bag, topics, settings)
+    return Recording(settings, bag, topics, judgement, track, maker, alerts, payloads, declared)
 
 
-def _payloads(bag: Bag, topics: Topics, settings: Settings) -> list[tuple[int, Payload]]:
-    found = [(-1, settings.robot.payload)]
+def _payloads(
+    bag: Bag, topics: Topics, settings: Settings
+) -> tuple[Times, tuple[tuple[int, Payload], ...]]:
+    """Return when payloads were declared, and those that count."""
+    found, times = [(-1, settings.robot.payload)], list[int]()
     if topics.payload is None:
-        return found
+        return np.array(times, np.int64), tuple(found)
     for batch in bag.batches(Topics(None, None, topics.payload)):
         for part in batch.payload:
+            times += part.log_time.tolist()
             for when, mass, com in zip(part.log_time, part.mass, part.com, strict=True):
                 load = payload_from(settings.robot, float(mass), com.tolist(), part.frame_id)
                 found += [(int(when), load)] if load else []
-    return sorted(found, key=lambda entry: entry[0])
+    return np.array(sorted(times), np.int64), tuple(sorted(found, key=lambda entry: entry[0]))
 
 
 def _numbers(row: np.ndarray[Any, Any]) -> tuple[float, ...]:

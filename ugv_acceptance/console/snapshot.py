@@ -10,6 +10,8 @@ from ugv_acceptance.model.stability import SIDES, UNKNOWN
 
 NOTHING = (math.nan,) * len(SIDES)
 NO_LOAD = Payload()
+# What stands beside a payload's topic on which nothing came.
+NO_PAYLOAD = 'optional; none was declared'
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class AlertRow:
 
 @dataclass(frozen=True, slots=True)
 class InputRow:
-    """How an input is: `rate` Hz, `age` s (NaN: none), who publishes it, what is wrong with it."""
+    """How an input is: `rate` Hz (NaN: unknown), `age` s (NaN: none came), publishers, faults."""
 
     name: str
     topic: str

@@ -176,6 +176,7 @@ def inputs_of(frame: Plain) -> Table:
     table = Table('Input', 'State', 'Rate', 'Published by', box=None, padding=(0, 1))
     for row in frame['inputs']:
         state = row['text'] or ('arriving' if row['level'] == LEVELS[OK] else 'silent')
-        cells = (row['topic'], state, f'{row["rate_hz"] or 0:.0f} Hz', ', '.join(row['publishers']))
+        rate = '-' if row['rate_hz'] is None else f'{row["rate_hz"]:.0f} Hz'
+        cells = (row['topic'], state, rate, ', '.join(row['publishers']))
         table.add_row(*(Text(str(cell)) for cell in cells))
     return table

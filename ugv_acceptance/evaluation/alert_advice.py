@@ -57,7 +57,7 @@ class AlertAdvice:
         What fell due after the last message is judged by that.
         """
         if self._last is not None:
-            self._cases += [(alert, self._last) for alert in self._fresh()]
+            self._cases.extend((alert, self._last) for alert in self._fresh())
         order = sorted(self._cases, key=lambda case: (-case[0].rule.level, case[0].start))
         alike: dict[Payload, list[tuple[Alert, _Moment]]] = {}
         for alert, moment in order[:MOST]:

@@ -26,7 +26,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.console import hearing
 from ugv_acceptance.console.alert_book import AlertBook, row_of
 from ugv_acceptance.console.numbers import number_in
-from ugv_acceptance.console.snapshot import NO_LOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.payload import payload_from
 from ugv_acceptance.nodes.conversions import key_values
@@ -104,7 +104,9 @@ class ConsoleNode(Node):
         self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
         silent = not all(newest.waiting for newest in self._heard.values())
         for name, newest in self._heard.items():
-            self.session.counts[name].taken += newest.hand_on()
+            # The count is read after what is handed on was counted, never before.
+            left_out = newest.hand_on()
+            self.session.counts[name].taken += left_out
         now, clock = time.monotonic(), self.session.clock
         if clock.simulated:
             clock.follow(clock.now(), self.get_clock().now().nanoseconds)
@@ -261,15 +263,16 @@ class ConsoleNode(Node):
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:
         count, now = self.session.counts[name], self.session.clock.now()
+        unknown = float('nan') if count.taken else 0.0
         mine = [a for a in active if a.rule.subject == name]
         silent = STALE if not count.taken and name != 'payload' else OK
         sentences = [self.session.faults.sentence(a, self.settings) for a in mine]
-        optional = 'optional; none was declared' if name == 'payload' and not count.taken else ''
+        optional = NO_PAYLOAD if name == 'payload' and not count.taken else ''
         return InputRow(
             name,
             self._inputs.subscriptions[name].topic_name,
             max([a.rule.level for a in mine], default=silent),
-            self.session.rates.get(name, 0.0),
+            self.session.rates.get(name, unknown),
             (now - count.last) / 1e9 if count.taken else float('nan'),
             tuple(self._inputs.publishers.get(name, ())),
             '; '.join(sentences) or optional,

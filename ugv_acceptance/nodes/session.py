@@ -5,6 +5,7 @@ object is made; whatever they hold, the worst that happens is that they are coun
 """
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from operator import attrgetter
@@ -32,6 +33,8 @@ IMU_FIELDS = attrgetter(
     'frame_id',
 )
 INPUTS = ('joint_states', 'imu', 'payload')
+# Measurements, one a second, over which a rate is taken: what comes in bursts is even over them.
+_MEASUREMENTS = 4
 
 
 @dataclass(slots=True)
@@ -43,6 +46,24 @@ class InputCount:
     lost: int = 0
     last: int = 0
     reason: str = ''
+    _before: int = 0
+    _past: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_MEASUREMENTS))
+
+    def rate(self, now: int, known: float | None) -> float | None:
+        """Return the rate (Hz) now (ns), from the one `known` a second before; None: not known.
+
+        It is that between messages: one a second is 1 Hz, also where a second has none or two. What
+        is silent for two periods has 0 Hz, and is measured anew when it comes again.
+        """
+        came, self._before = self.taken - self._before, self.taken
+        if came:
+            self._past.append((self.taken, self.last))
+            (first, since), (taken, until) = self._past[0], self._past[-1]
+            return (taken - first) * 1e9 / (until - since) if until > since else (known or None)
+        if known and (now - self.last) * known > 2e9:
+            self._past.clear()
+            return 0.0
+        return known
 
 
 @dataclass(slots=True)
@@ -70,7 +91,6 @@ class Session:
     rates: dict[str, float] = field(default_factory=dict)
     limits_hash: str = field(init=False)
     _known: bool = False
-    _counted: tuple[int, dict[str, int]] = field(default_factory=lambda: (0, {}))
 
     def __post_init__(self) -> None:
         self.evaluator = LiveEvaluator(self.settings)
@@ -116,14 +136,10 @@ class Session:
             self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
 
     def measure_rates(self) -> None:
-        """Set `rates` (Hz) of the inputs since the call before."""
-        now, (since, before) = self.clock.now(), self._counted
-        taken = {name: count.taken for name, count in self.counts.items()}
-        if before and now > since:
-            self.rates = {
-                name: (taken[name] - before[name]) * 1e9 / (now - since) for name in taken
-            }
-        self._counted = (now, taken)
+        """Set `rates` (Hz) of the inputs; to be called once a second."""
+        now = self.clock.now()
+        rates = {name: c.rate(now, self.rates.get(name)) for name, c in self.counts.items()}
+        self.rates = {name: rate for name, rate in rates.items() if rate is not None}
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; what was learnt and is active stays."""

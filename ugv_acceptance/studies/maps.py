@@ -121,7 +121,8 @@ def _within(
     robot: Robot, grid: Grid, form: Floats, bound: float, ok: Mask
 ) -> Callable[[slice], None]:
     def run(rows: slice) -> None:
-        ok[rows] &= np.abs(evaluate(robot, grid, form, rows)) <= bound
+        within = np.abs(evaluate(robot, grid, form, rows)) <= bound
+        ok[rows] &= within
 
     return run
 
