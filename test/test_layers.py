@@ -25,17 +25,19 @@ BELOW_RUN = {
     'report',
     'plan',
     'campaign',
+    'processes',
 }
 BELOW_NODES = BELOW_RUN | {'run', 'console'}
 MAY_IMPORT: dict[str, set[str]] = {
     '__init__': set(),
     'model': set(),
-    'studies': {'model'},
+    'processes': set(),
+    'studies': {'model', 'processes'},
     'evaluation': {'model'},
     'config': {'model', 'evaluation'},
     'bag': {'model', 'evaluation'},
-    'simulation': {'model'},
-    'campaign': {'model', 'studies', 'evaluation', 'config', 'bag'},
+    'simulation': {'model', 'processes'},
+    'campaign': {'model', 'studies', 'evaluation', 'config', 'bag', 'processes'},
     'report': {'model', 'studies', 'evaluation'},
     'console': {'model', 'studies', 'evaluation', 'bag', 'config'},
     'plan': {'model', 'studies', 'evaluation', 'config', 'report'},

@@ -8,7 +8,7 @@ import multiprocessing
 import os
 from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 from threading import Thread
@@ -17,6 +17,7 @@ from ugv_acceptance.campaign.batches import AHEAD, DIED, Runs, Work, batches, ea
 from ugv_acceptance.campaign.cluster import WAIT_S, on_cluster
 from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Brief, Done, judge_source
+from ugv_acceptance.processes import Workers
 
 
 def cores() -> int:
@@ -75,7 +76,7 @@ def _round(work: Work, waiting: deque[Runs], workers: int, suspects: Runs) -> It
     context = multiprocessing.get_context('forkserver')
     context.set_forkserver_preload([judge_source.__module__])
     given: dict[Future[list[Done]], Runs] = {}
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_end_with_parent) as pool:
+    with Workers(workers, mp_context=context, initializer=_end_with_parent) as pool:
         try:
             while waiting or given:
                 while waiting and len(given) < AHEAD * workers:

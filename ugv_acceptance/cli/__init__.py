@@ -11,6 +11,7 @@ from importlib import import_module
 import typer
 
 from ugv_acceptance import AcceptanceError, __version__
+from ugv_acceptance.cli.ending import end_on_signals
 
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 # A disk that is full, a quota or a limit that is reached, a file system that is read-only.
@@ -68,6 +69,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error a user can act on is one line and exit code 2."""
+    end_on_signals()
     for verb in VERBS:
         module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
         settings = getattr(module, 'CONTEXT', None)

@@ -41,8 +41,8 @@ def console(
     # A launch file's default is empty.
     token = token or None
     check_address(host, token)
-    with feed_of(context, bag, config, urdf) as feed:
-        serve(Hub(feed), host, port, token, lambda at: _announce(at, token))
+    with feed_of(context, bag, config, urdf) as (feed, asked):
+        serve(Hub(feed), host, port, token, lambda at: _announce(at, token), asked)
 
 
 def _announce(address: str, token: str | None) -> None:

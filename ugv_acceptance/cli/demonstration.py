@@ -93,14 +93,17 @@ def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Rai
 
 @contextmanager
 def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
-    """Run a verb in a process that ends when this one does; its output is to be read."""
+    """Run a verb in a process that ends when this one does; its output is to be read.
+
+    It has a session of its own: a Ctrl-C is for this process, which ends it.
+    """
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     code = 'from ugv_acceptance.nodes import child; child.end_with_parent()'
     code += '; from ugv_acceptance.cli import main; main()'
     command, pipe = [sys.executable, '-u', '-c', code, *words], subprocess.PIPE
     with subprocess.Popen(  # noqa: S603 - our own command
-        command, env=environment, stdin=pipe, stdout=pipe, text=True
+        command, env=environment, stdin=pipe, stdout=pipe, text=True, start_new_session=True
     ) as process:
         try:
             yield process

@@ -131,9 +131,12 @@ def watch(
     ros_args: list[str],
     console: Console,
     every: float = 5.0,
-    until: Callable[[], bool] = lambda: False,
+    until: Callable[[], bool] | None = None,
 ) -> Raised:
-    """Run the monitor in this process until it is interrupted; return what alerts it raised."""
+    """Run the monitor in this process until it is interrupted; return what alerts it raised.
+
+    With `until` an interrupt comes too early, and ends the process.
+    """
     from ugv_acceptance.nodes.monitor import build
     from ugv_acceptance.nodes.running import end, ros, spin
 
@@ -144,6 +147,8 @@ def watch(
         node.bring_up()
         if panel is not None:
             node.create_timer(0.25, partial(panel.draw, node), clock=node.steady)
-        spin(node, stop, until)
+        spin(node, stop, until or (lambda: False))
         end(node)
+        if until is not None:
+            stop.leave()
     return shown.raised

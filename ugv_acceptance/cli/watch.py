@@ -1,7 +1,9 @@
 """`ugv-acceptance watch [BAG]`: the console in a terminal, such as over SSH; what it shows."""
 
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ugv_acceptance import BadConfig, pip_install
+from ugv_acceptance.cli.ending import asked_to_end
 from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
 
 if TYPE_CHECKING:
@@ -50,16 +53,27 @@ def watch(
 ) -> None:
     """Show verdict, alerts and margins in the terminal, in the words of the console. q leaves.
 
+    Where there is no terminal, a line tells what has changed, at most one a second.
+
     \b
     Examples:
       ugv-acceptance watch
       ugv-acceptance watch bags/packbot_fail
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    need('textual')
-    from ugv_acceptance.console.terminal import Terminal
+    lines = not all(file.isatty() for file in (sys.stdin, sys.stdout, sys.stderr))
+    if not lines:
+        need('textual')
+    with feed_of(context, bag, config, urdf) as (feed, asked):
+        if lines:
+            from ugv_acceptance.cli.summary import while_read
+            from ugv_acceptance.console.lines import show_lines
 
-    with feed_of(context, bag, config, urdf) as feed:
-        Terminal(feed).run()
+            with while_read():
+                show_lines(feed, partial(print, flush=True), asked)
+        else:
+            from ugv_acceptance.console.terminal import Terminal
+
+            Terminal(feed, asked).run()
 
 
 def need(*libraries: str) -> None:
@@ -73,8 +87,8 @@ def need(*libraries: str) -> None:
 @contextmanager
 def feed_of(
     context: typer.Context, bag: Path | None, config: Path | None, urdf: Path | None
-) -> Iterator['Feed']:
-    """Yield what is to be shown: a recording, or the live robot."""
+) -> 'Iterator[tuple[Feed, Callable[[], bool]]]':
+    """Yield what is to be shown, a recording or the live robot, and what says when to end."""
     from ugv_acceptance.config import load
 
     # Where no bag is given, click takes --ros-args for it.
@@ -82,12 +96,14 @@ def feed_of(
         context.args, bag = [str(bag), *context.args], None
     ros, loaded = ros_arguments(context), load(config, urdf=urdf)
     if bag is not None:
-        yield recording_feed(bag, loaded)
+        recording = recording_feed(bag, loaded)
+        with asked_to_end() as asked:
+            yield recording, asked
         return
     from ugv_acceptance.nodes.console import live_feed
 
-    with live_feed(loaded, ros) as feed:
-        yield feed
+    with live_feed(loaded, ros) as (feed, stop):
+        yield feed, lambda: stop.asked
 
 
 def recording_feed(bag: Path, config: 'Config') -> 'RecordingFeed':

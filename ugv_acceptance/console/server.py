@@ -84,8 +84,11 @@ def serve(
     port: int = 0,
     token: str | None = None,
     ready: Callable[[str], None] = lambda _: None,
+    asked: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Serve until SIGINT or SIGTERM; `ready` takes the page's address once the port is open.
+    """Serve until SIGINT or SIGTERM, or `asked` to end.
+
+    `ready` takes the page's address once the port is open.
 
     Port 0 takes a free one. BadConfig where the address cannot be had, or must not be had.
     """
@@ -112,14 +115,15 @@ def serve(
         )
         name = f'[{host}]' if ':' in host else host
         ready(f'http://{name}:{listener.getsockname()[1]}/')
-        _Server(config).run(sockets=[listener])
+        _Server(config, asked).run(sockets=[listener])
 
 
 class _Server(uvicorn.Server):
     """uvicorn's server, which lets go of who asks for nothing, and keeps little for who is slow."""
 
-    def __init__(self, config: uvicorn.Config) -> None:
+    def __init__(self, config: uvicorn.Config, asked: Callable[[], bool]) -> None:
         super().__init__(config)
+        self._asked = asked
         self._since: dict[Any, float] = {}
 
     async def on_tick(self, counter: int) -> bool:
@@ -135,4 +139,4 @@ class _Server(uvicorn.Server):
         for connection in there:
             if not hasattr(connection, 'cycle'):
                 connection.transport.set_write_buffer_limits(_WRITTEN)
-        return await super().on_tick(counter)
+        return await super().on_tick(counter) or self._asked()

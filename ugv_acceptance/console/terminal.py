@@ -1,5 +1,6 @@
 """The console in a terminal, over SSH: the same frames in the same words, drawn by Textual."""
 
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 from rich.table import Table
@@ -30,7 +31,7 @@ _BAR = 20
 
 
 class Terminal(App[None]):
-    """Shows a feed until it is left; `frame` is what is shown now."""
+    """Shows a feed until it is left or `asked` to end; `frame` is what is shown now."""
 
     CSS = """
     #verdict { height: auto; min-height: 4; padding: 0 1; }
@@ -43,11 +44,13 @@ class Terminal(App[None]):
         Binding('left', 'jump(-1)', '-1 s'),
         Binding('right', 'jump(1)', '+1 s'),
         Binding('q', 'quit', 'Leave'),
+        # A terminal in use by Textual sends no signal for it.
+        Binding('ctrl+c', 'quit', 'Leave', show=False, priority=True),
     ]
 
-    def __init__(self, feed: Feed) -> None:
+    def __init__(self, feed: Feed, asked: Callable[[], bool] = lambda: False) -> None:
         super().__init__()
-        self.feed = feed
+        self.feed, self._asked = feed, asked
         self.frame: Plain = {}
         self.said = ''
         self._figure = figure_of(feed.settings.robot)
@@ -103,6 +106,8 @@ class Terminal(App[None]):
         self._draw()
 
     def _listen(self) -> None:
+        if self._asked():
+            self.exit()
         self._snapshot = self.feed.snapshot()
 
     def _draw(self) -> None:

@@ -20,12 +20,15 @@ PATIENCE = 5.0
 def child(
     module: str, ros_args: list[str], environment: Mapping[str, str] | None = None
 ) -> Iterator['subprocess.Popen[bytes]']:
-    """Run the node of ugv_acceptance.nodes.MODULE until the block is left."""
+    """Run the node of ugv_acceptance.nodes.MODULE until the block is left.
+
+    It has a session of its own: a Ctrl-C is for this process, which ends it.
+    """
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     command = [sys.executable, '-m', 'ugv_acceptance.nodes.child', module, *ros_args]
     process = subprocess.Popen(  # noqa: S603 - our own module
-        command, stdin=subprocess.PIPE, env={**env, **(environment or {})}
+        command, stdin=subprocess.PIPE, env={**env, **(environment or {})}, start_new_session=True
     )
     try:
         yield process

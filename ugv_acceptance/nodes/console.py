@@ -35,7 +35,7 @@ from ugv_acceptance.nodes.inputs import Inputs, qos_of
 from ugv_acceptance.nodes.operating import DOINGS, SHELVED
 from ugv_acceptance.nodes.outputs import LATCHED
 from ugv_acceptance.nodes.receipt import ReceiptClock
-from ugv_acceptance.nodes.running import ros
+from ugv_acceptance.nodes.running import Stop, ros
 from ugv_acceptance.nodes.session import INPUTS, Session
 
 MONITOR = 'acceptance_monitor'
@@ -286,14 +286,14 @@ class ConsoleNode(Node):
 
 
 @contextmanager
-def live_feed(config: Config, args: list[str] | None = None) -> Iterator[ConsoleNode]:
-    """Run the console's node for as long as it is asked for snapshots."""
-    with ros(args):
+def live_feed(config: Config, args: list[str] | None = None) -> Iterator[tuple[ConsoleNode, Stop]]:
+    """Run the console's node for as long as it is asked for snapshots; yield also when to stop."""
+    with ros(args) as stop:
         node = ConsoleNode(config)
         # What is there now stays: the garbage collector need not look through it between frames.
         gc.collect()
         gc.freeze()
         try:
-            yield node
+            yield node, stop
         finally:
             node.close()

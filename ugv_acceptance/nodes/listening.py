@@ -82,6 +82,7 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
         spin(node, stop, found_all)
         end = time.monotonic() + seconds
         spin(node, stop, lambda: time.monotonic() >= end)
+        stop.leave()
         for heard, topic in ((joints, topics.joint_states), (imu, topics.imu)):
             _look(node, heard, topic)
         found = Surroundings(

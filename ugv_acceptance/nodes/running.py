@@ -44,9 +44,15 @@ LOOPBACK = str(Path(__file__).with_name('loopback.xml'))
 
 @dataclass(slots=True)
 class Stop:
-    """Whether the process was asked to end."""
+    """Whether the process was asked to end, and by which signal."""
 
     asked: bool = False
+    signal: int = 0
+
+    def leave(self) -> None:
+        """End the process where it was asked to: for what has no result then. See cli/ending.py."""
+        if self.asked:
+            raise SystemExit(128 + self.signal)
 
 
 def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
@@ -76,8 +82,8 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
     choose_transport(os.environ)
     stop = Stop()
 
-    def ask(*_: object) -> None:
-        stop.asked = True
+    def ask(number: int, _: object) -> None:
+        stop.asked, stop.signal = True, number
 
     before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)

@@ -5,7 +5,6 @@ whether the simulated robot, its joints held to the motion, leaves its stance.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
@@ -14,6 +13,7 @@ import numpy as np
 from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import RAISED, stability
+from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import TIPPED, attitude, turn
 from ugv_acceptance.simulation.tip_cases import clear_of_ground
@@ -163,5 +163,5 @@ def tips_all(
 ) -> list[bool]:
     """Return what `tips` says of each motion, worked on by `workers` processes."""
     n = len(motions)
-    with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
+    with Workers(workers, mp_context=get_context('spawn')) as pool:
         return list(pool.map(tips, [robot] * n, motions, [speed] * n, [ramp] * n, chunksize=8))

@@ -1,7 +1,6 @@
 """The force-angle of the model against simulated truth: random postures, loads and slopes."""
 
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 
@@ -13,6 +12,7 @@ from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.support import support_of
+from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
@@ -103,7 +103,7 @@ def judge(robot: Robot, case: TipCase) -> Judged:
 
 def judge_all(robot: Robot, cases: Sequence[TipCase], workers: int = 2) -> list[Judged]:
     """Return the judged `cases`, in their order, worked on by `workers` processes."""
-    with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
+    with Workers(workers, mp_context=get_context('spawn')) as pool:
         return list(pool.map(judge, [robot] * len(cases), cases, chunksize=8))
 
 

@@ -6,7 +6,6 @@ counts for a seed whatever the number of processes.
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 from typing import Any
@@ -18,6 +17,7 @@ from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import Posture, mechanics_of
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import stability_of, stances_of
+from ugv_acceptance.processes import Workers
 from ugv_acceptance.studies.risk_kernel import risk_kernel
 from ugv_acceptance.studies.spread import Spread, clopper_pearson, generators
 
@@ -181,7 +181,7 @@ def _chunks(study: Study, samples: int, seed: int, workers: int) -> Iterator[Cou
     if workers < 2 or samples < WORTH_A_PROCESS:
         yield from map(_chunk, tasks)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context('spawn')) as pool:
+    with Workers(workers, mp_context=get_context('spawn')) as pool:
         yield from pool.map(_chunk, tasks)
 
 
