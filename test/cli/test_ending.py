@@ -24,6 +24,7 @@ import pytest
 CODE = 'from ugv_acceptance.cli import main; main()'
 BAGS = Path(__file__).parents[2] / 'bags'
 BAG = str(BAGS / 'packbot_fail')
+FILE = next((BAGS / 'packbot_fail').glob('*.mcap'))
 # Seconds in which whatever is waited for comes, on a busy machine too.
 PATIENCE = 100.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -113,8 +114,8 @@ def loaded(library: str) -> Ready:
 def on_the_net(run: Started) -> bool:
     """Return whether it has opened a socket: it is a node."""
     with suppress(FileNotFoundError):
-        held = [os.readlink(fd.path) for fd in os.scandir(f'/proc/{run.process.pid}/fd')]
-        return any(name.startswith('socket:') for name in held)
+        held = [fd.readlink() for fd in Path(f'/proc/{run.process.pid}/fd').iterdir()]
+        return any(str(name).startswith('socket:') for name in held)
     return False
 
 
@@ -144,7 +145,7 @@ TOLD_TO = {
     # What was recorded until then is judged and filed: inconclusive.
     'run': (('run', '--sim'), on_the_net, dict.fromkeys(SIGNALS, 3)),
     'run fast': (('run', '--sim', '--fast'), loaded('mujoco'), None),
-    'simulate': (('simulate', 'work', '-s', '9e5', '-o', 'made'), records, BROKEN_OFF),
+    'simulate': (('simulate', 'work', '-s', '9000', '-o', 'made'), records, BROKEN_OFF),
     'campaign': (('campaign', 'runs', '--workers', '2'), working, BROKEN_OFF),
     'evaluate': (('evaluate', *[BAG] * 300), loaded('_multiarray_umath'), BROKEN_OFF),
     'plan': (('plan', '--points', '20'), loaded('_multiarray_umath'), BROKEN_OFF),
@@ -177,7 +178,7 @@ def many(folder: Path) -> None:
     """Fill a folder with recordings that take a while to be judged."""
     folder.mkdir(parents=True)
     for k in range(200):
-        (folder / f'run{k}').symlink_to(BAG)
+        (folder / f'run{k}.mcap').symlink_to(FILE)
 
 
 def end_it(run: Started, number: signal.Signals, ready: Ready) -> None:
