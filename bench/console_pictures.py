@@ -28,6 +28,11 @@ POSTURES = {
 }
 LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE'}
 COLOURS = 96
+# On a busy machine an input may have been late while the robot came up.
+CALM = (
+    '(console_page.frame.alerts.length && console_page.socket.send(JSON.stringify({do:'
+    ' "acknowledge", key: null}))), console_page.frame.alerts.length === 0'
+)
 # Hz of the joint states, and of the IMU.
 RATES = '50 100'
 # How a posture is reached: steps, in seconds.
@@ -49,6 +54,8 @@ def main() -> None:
                 page.resize(width, height, touch=touch)
                 page.run('scrollTo(0, 0); new Promise(done => setTimeout(done, 700))')
                 page.wait(f'document.body.dataset.level === "{level}"')
+                if state == 'ok':
+                    page.wait(CALM)
                 save(page.picture(), OUT / f'console_{state}_{screen}.png')
 
 
@@ -62,7 +69,15 @@ def bring(robot: Live, page: Page, state: str, level: str) -> None:
         page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
         page.wait('console_page.frame.level === "OK"')
         go(robot, POSTURES[state])
-    page.wait(f'document.body.dataset.level === "{level}"')
+    rates = [f'{hertz} Hz' for hertz in RATES.split()]
+    if state == 'no_data':
+        rates[1] = '0 Hz'
+    cells = (
+        '[...document.querySelectorAll("#inputs tr")].slice(0, 2).map(x => x.children[2].innerText)'
+    )
+    page.wait(
+        f'document.body.dataset.level === "{level}" && {cells}.join() === "{",".join(rates)}"'
+    )
 
 
 def go(robot: Live, posture: tuple[float, ...]) -> None:
