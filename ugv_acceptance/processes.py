@@ -24,7 +24,7 @@ class Workers(ProcessPoolExecutor):
         if kind is not None:
             for process in list((self._processes or {}).values()):
                 process.kill()
-        return super().__exit__(kind, *rest)
+        super().__exit__(kind, *rest)
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """What `watch` prints where there is no terminal: a line where something changes."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -52,7 +53,7 @@ def test_a_recording_is_told_to_its_end(clock: Clock) -> None:
     found = told(clock, feed, 1000.0)
     assert clock.now - began == pytest.approx(feed.head.duration, abs=2 * LISTEN)
     times = [when for when, _ in found]
-    assert all(b - a >= BETWEEN - 1e-9 for a, b in zip(times, times[1:-1], strict=False))
+    assert all(b - a >= BETWEEN - 1e-9 for a, b in pairwise(times[:-1]))
     levels = [line.split()[2] for _, line in found]
     assert {'STALE', 'OK', 'WARN', 'ERROR'} >= set(levels) >= {'OK', 'WARN', 'ERROR'}
     danger = next(line for _, line in found if line.split()[2] == 'ERROR')
