@@ -69,22 +69,30 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error a user can act on is one line and exit code 2."""
-    end_on_signals()
+    told = end_on_signals()
     for verb in VERBS:
         module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
         settings = getattr(module, 'CONTEXT', None)
         app.command(verb, context_settings=settings)(getattr(module, verb.replace('-', '_')))
     try:
         app()
-    except AcceptanceError as error:
-        typer.echo(f'ugv-acceptance: {error}', err=True)
-        sys.exit(BAD_INPUT)
-    except OSError as error:
-        if error.errno not in NO_ROOM:
+    except Exception as error:
+        # A library that was being loaded makes an error of its own of the signal.
+        if told():
+            sys.exit(told())
+        sentence = _sentence(error)
+        if not sentence:
             raise
-        where = f'{error.filename}: ' if error.filename else ''
-        typer.echo(f'ugv-acceptance: {where}cannot be written: {error.strerror}', err=True)
+        typer.echo(f'ugv-acceptance: {sentence}', err=True)
         sys.exit(BAD_INPUT)
+
+
+def _sentence(error: Exception) -> str:
+    """Return what a user is told of an error that he can act on; empty for others."""
+    if isinstance(error, OSError) and error.errno in NO_ROOM:
+        where = f'{error.filename}: ' if error.filename else ''
+        return f'{where}cannot be written: {error.strerror}'
+    return str(error) if isinstance(error, AcceptanceError) else ''
 
 
 if __name__ == '__main__':

@@ -11,14 +11,20 @@ from contextlib import contextmanager
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def end_on_signals() -> None:
-    """Let a signal end this process wherever it is; what is open is closed, and nothing printed."""
+def end_on_signals() -> Callable[[], int]:
+    """Let a signal end this process wherever it is; what is open is closed, and nothing printed.
+
+    Return what gives the exit code once a signal came, 0 before.
+    """
+    codes = [0]
 
     def leave(number: int, _: object) -> None:
-        raise SystemExit(128 + number)
+        codes.append(128 + number)
+        raise SystemExit(codes[-1])
 
     for number in SIGNALS:
         signal.signal(number, leave)
+    return lambda: codes[-1]
 
 
 @contextmanager
