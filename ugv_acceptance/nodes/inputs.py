@@ -1,7 +1,9 @@
 """The monitor's subscriptions: raw bytes into the session, and who publishes on the topics."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from inspect import Parameter, Signature
+from typing import Any
 
 from geometry_msgs.msg import InertiaStamped
 from rclpy.clock import Clock
@@ -16,6 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.evaluation.effort import opposed_joints
 from ugv_acceptance.nodes.session import Session
+from ugv_acceptance.nodes.voices import Publisher, Voices
 
 _RELIABILITY = {
     'best_effort': ReliabilityPolicy.BEST_EFFORT,
@@ -43,7 +46,10 @@ def qos_of(topic: Topic, depth: int) -> QoSProfile:
 
 
 class Inputs:
-    """The subscriptions of an active monitor. `publishers` are the nodes seen on each input."""
+    """The subscriptions of an active monitor. `publishers` are the nodes that publish each input.
+
+    `voices` tells them apart: a driver that was started again is one node.
+    """
 
     def __init__(self, node: Node, topics: Topics, session: Session, depth: int) -> None:
         self._node = node
@@ -60,11 +66,12 @@ class Inputs:
             ('imu', Imu, topics.imu, session.take_imu),
             ('payload', InertiaStamped, topics.payload, session.take_payload),
         )
+        self.voices = {name: Voices() for name, _, _, _ in rows}
         self.subscriptions: dict[str, Subscription] = {
             name: node.create_subscription(
                 kind,
                 topic.name,
-                take,
+                numbered(take, self.voices[name]),
                 qos_of(topic, depth),
                 event_callbacks=self._events(name),
                 raw=True,
@@ -125,10 +132,13 @@ class Inputs:
     def _see_publishers(self, now: int) -> None:
         for name, subscription in self.subscriptions.items():
             infos = self._node.get_publishers_info_by_topic(subscription.topic_name)
-            nodes = sorted(_node_name(info.node_namespace, info.node_name) for info in infos)
-            if self._nameless(name, now, nodes):
+            known = [
+                Publisher(_node_name(i.node_namespace, i.node_name), bytes(i.endpoint_gid))
+                for i in infos
+            ]
+            if self._nameless(name, now, [publisher.node for publisher in known]):
                 continue
-            self.publishers[name] = nodes
+            nodes = self.publishers[name] = self.voices[name].present(now, known)
             foreign = [node for node in nodes if self._allowed and node not in self._allowed]
             several = nodes if len(nodes) > 1 else []
             self._tell(now, 'SECOND_PUBLISHER', name, several, float(len(nodes)))
@@ -171,6 +181,22 @@ class Inputs:
         for subscription in self.subscriptions.values():
             self._node.destroy_subscription(subscription)
         self.subscriptions = {}
+
+
+def numbered(take: Callable[[bytes], None], voices: Voices) -> Callable[..., None]:
+    """Return a subscription's callback that lets `voices` hear the number of each message."""
+    hear = voices.hear
+
+    # An executor hands message and information on as two arguments, the events executor as a pair.
+    def callback(*given: Any) -> None:  # noqa: ANN401 - bytes and a dict, or both as a tuple
+        data, information = given if len(given) == 2 else given[0]
+        hear(information.get('publication_sequence_number'))
+        take(data)
+
+    # By its signature rclpy knows that the information is wanted.
+    both = [Parameter(name, Parameter.POSITIONAL_ONLY) for name in ('data', 'information')]
+    callback.__signature__ = Signature(both)  # type: ignore[attr-defined]
+    return callback
 
 
 def _node_name(namespace: str, name: str) -> str:

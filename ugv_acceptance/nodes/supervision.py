@@ -64,6 +64,8 @@ def _input(name: str, session: Session, inputs: 'Inputs | None', active: list[Al
         'publishers': len(nodes),
         'published_by': ', '.join(nodes),
     }
+    if inputs and inputs.voices[name].restarted:
+        values['restarted'] = ', '.join(inputs.voices[name].restarted)
     if name == 'imu':
         of = session.evaluator.orientations
         values |= {f'orientation_{how}': number for how, number in of.items()}
