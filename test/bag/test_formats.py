@@ -82,6 +82,58 @@ def test_missing_part_is_a_finding(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_renamed_recording_is_said_to_be_read(tmp_path: Path, storage: StoragePlugin) -> None:
+    """Where metadata.yaml lists another name, one finding tells what was read in its place."""
+    messages = run(10)
+    folder = write_folder(tmp_path / 'bag', messages, storage)
+    old = next(p for p in folder.iterdir() if p.suffix in {'.mcap', '.db3'})
+    old.rename(new := old.with_name(f'renamed{old.suffix}'))
+    bag, batches, _ = read(folder)
+    assert rows(batches) == expected(messages)
+    (finding,) = bag.findings
+    assert finding.endswith(f'lists {old.name!r}, not there; read in its place: {new.name}')
+
+
+@pytest.mark.parametrize('parts', [1, 2])
+@pytest.mark.parametrize('listed', ['packed', 'unpacked'])
+def test_a_part_packed_or_unpacked_later_is_read(
+    tmp_path: Path, parts: int, listed: str
+) -> None:
+    """A file that is there with or without .zstd is the one that metadata.yaml lists."""
+    messages = run(20)
+    folder = write_folder(tmp_path / 'bag', messages[::parts], StoragePlugin.MCAP)
+    if parts == 2:
+        write_mcap(folder / 'more.mcap', messages[1::2])
+    plain, path = folder / 'bag.mcap', folder / 'metadata.yaml'
+    name = 'bag.mcap'
+    if listed == 'packed':
+        name = 'bag.mcap.zstd'
+    else:
+        packed = plain.with_name('bag.mcap.zstd')
+        packed.write_bytes(zstandard.ZstdCompressor().compress(plain.read_bytes()))
+        plain.unlink()
+    lines = [f'\n  - {name}', *['\n  - more.mcap'] * (parts - 1)]
+    path.write_text(path.read_text().replace('\n  - bag.mcap', ''.join(lines), 1))
+    bag, batches, _ = read(folder)
+    assert rows(batches) == expected(messages)
+    assert not any('missing' in text or 'not read' in text for text in bag.findings)
+    assert any(f'file {name!r} is not there' in text for text in bag.findings)
+
+
+def test_a_part_that_is_not_read_is_still_said_so(tmp_path: Path) -> None:
+    """Of two parts one is renamed: that one is missing, and what lies there is not read."""
+    messages = run(20)
+    folder = write_folder(tmp_path / 'bag', messages, StoragePlugin.MCAP)
+    write_mcap(folder / 'renamed.mcap', run(3))
+    path = folder / 'metadata.yaml'
+    path.write_text(path.read_text().replace('- bag.mcap', '- bag.mcap\n  - part.mcap', 1))
+    bag, batches, _ = read(folder)
+    assert rows(batches) == expected(messages)
+    assert "metadata.yaml: file 'part.mcap' is missing" in bag.findings
+    assert 'metadata.yaml does not list renamed.mcap: not read' in bag.findings
+
+
+@pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
 def test_file_compression(tmp_path: Path, storage: StoragePlugin) -> None:
     """A file that was compressed as a whole is read like the file itself."""
     messages = run(30)

@@ -15,6 +15,7 @@ from ugv_acceptance import BadBag
 NAME = 'metadata.yaml'
 _MAX_BYTES = 64 << 20
 SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
+_PACKED = '.zstd'
 # Runs are looked for so many folders deep, and so many are named.
 _DEEP, _NAMED = 3, 3
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
@@ -66,20 +67,14 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
             findings.append(f'{error}: not used')
     else:
         findings.append(f'{path.name}: no {NAME}')
-    files = []
-    for name in metadata.files:
-        # Old versions put the folder's own name in front; nothing outside the folder is a part.
-        file = path / Path(name).name
-        if file.is_file():
-            files.append(file)
-        else:
-            findings.append(f'{NAME}: file {name!r} is missing')
-    unlisted = [p for p in present if p not in files]
-    if metadata.files and unlisted:
-        findings.append(f'{NAME} does not list {", ".join(p.name for p in unlisted)}: not read')
-    files = files or unlisted
-    known = (path / NAME).is_file()
-    if not files or (not known and len(numbered([p.name for p in files])) > 1):
+    listed, told = _listed(path, metadata.files, present)
+    findings += told
+    files = listed or present
+    several = not listed and len(numbered([p.name for p in files])) > 1
+    if several and (path / NAME).is_file():
+        held = ', '.join(p.name for p in files)
+        raise BadBag(f'{path}: expected the files that {NAME} lists, found others: {held}; give one')
+    if several or not files:
         _refuse_several(path)
     if not files:
         wanted = ', '.join(SUFFIXES)
@@ -132,3 +127,31 @@ def _refuse_several(folder: Path) -> None:
         f'`ugv-acceptance campaign {shlex.quote(str(folder))}` judges all of them, '
         f'`ugv-acceptance evaluate {few}` single ones'
     )
+
+
+def _listed(
+    folder: Path, names: Sequence[str], present: Sequence[Path]
+) -> tuple[list[Path], list[str]]:
+    """Return the files that metadata.yaml lists and findings; no files: read those present."""
+    files, findings, missing = [], [], []
+    listed = {Path(name).name for name in names}
+    for name in names:
+        # Old versions put the folder's own name in front; nothing outside the folder is a part.
+        file = folder / Path(name).name
+        packed = folder / f'{file.name}{_PACKED}'
+        other = file.with_suffix('') if file.suffix == _PACKED else packed
+        if file.is_file():
+            files.append(file)
+        elif other in present and other.name not in listed:
+            files.append(other)
+            findings.append(f'{NAME}: file {name!r} is not there, {other.name} was read')
+        else:
+            missing.append(name)
+    unlisted = ', '.join(p.name for p in present if p not in files)
+    if missing and not files and unlisted:
+        gone = ', '.join(map(repr, missing))
+        return [], [f'{NAME} lists {gone}, not there; read in its place: {unlisted}']
+    findings += [f'{NAME}: file {name!r} is missing' for name in missing]
+    if names and unlisted:
+        findings.append(f'{NAME} does not list {unlisted}: not read')
+    return files, findings
