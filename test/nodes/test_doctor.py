@@ -6,10 +6,13 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from config.robot_files import YAML, write_robot
 from nodes.live_case import FOLDED, NAMES, Live, imu, joints
+from sensor_msgs.msg import JointState
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
@@ -92,7 +95,6 @@ def test_what_is_wrong_with_an_imu_is_named(
     [
         ({'names': ('a', 'b', 'c', 'd')}, FAIL, 'joint names', 'topic_name'),
         ({'names': ()}, FAIL, 'joint names', 'no names'),
-        ({'position': (0.0, 114.6, 0.0, 0.0)}, WARN, 'shoulder_joint', 'degrees'),
     ],
 )
 def test_what_is_wrong_with_joints_is_named(
@@ -127,6 +129,42 @@ def test_what_is_wrong_with_a_topic_is_named(
     assert [f for f in found if f.level == level and advice in f.do], found
 
 
+LIFT = YAML.replace('limit_nm: 30', 'limit_nm: 30\n    sign: -1\n    offset_deg: 10')
+
+
+@pytest.mark.parametrize(
+    ('yaml', 'joint', 'told', 'asked'),
+    [
+        (YAML, 'lift', 45.0, True),
+        (YAML, 'lift', -80.0, True),
+        (YAML, 'lift', 3.0, True),
+        (YAML, 'lift', 180.0, False),  # outside in either unit
+        (LIFT, 'lift', -70.0, True),
+        (LIFT, 'lift', -100.0, False),
+        (YAML, 'slide', 5.0, False),  # m are not degrees
+    ],
+)
+def test_degrees_are_asked_of_a_joint_that_they_would_bring_within_its_limits(
+    tmp_path: Path, yaml: str, joint: str, told: float, asked: bool
+) -> None:
+    """Outside its limits a joint FAILs; degrees are asked for only where they would fit."""
+    config = load(write_robot(tmp_path, yaml))
+    position = {'lift': 0.0, 'slide': 0.0, joint: told}
+    sample = joint_state(names=tuple(position), position=tuple(position.values()))
+    (found,) = [f for f in examine(healthy(joint=sample), config) if f.about == joint]
+    assert found.level == FAIL
+    assert 'sign and offset' in found.do
+    assert ('degrees' in found.do) is asked
+
+
+@pytest.mark.parametrize('angle', [3 * math.tau, -3 * math.tau, 114.6, 1e4])
+@pytest.mark.parametrize('which', range(len(NAMES)))
+def test_an_endless_joint_may_stand_at_any_angle(angle: float, which: int) -> None:
+    """A wheel at three turns, or many, is no sign of degrees: nothing is said."""
+    position = tuple(angle if k == which else q for k, q in enumerate(FOLDED))
+    assert findings(healthy(joint=joint_state(position=position))) == []
+
+
 def doctor(*options: str) -> 'subprocess.Popen[str]':
     """Start the verb in a process of its own."""
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
@@ -146,6 +184,29 @@ def test_it_says_that_nobody_publishes() -> None:
     assert process.returncode == 1
     assert 'nobody publishes /joint_states' in text
     assert 'nobody publishes /imu/data' in text
+
+
+@pytest.mark.parametrize('arguments', [(), ('-r', '__node:=watch'), ('-r', '__ns:=/robot1')])
+def test_what_a_monitor_publishes_is_no_input(live: Live, arguments: tuple[str, ...]) -> None:
+    """Its margins are JointStates too: they are never what the doctor says to listen to."""
+    monitor = live.monitor(arguments=arguments)
+    process = doctor('--seconds', '1', '--ros-args', '-r', '__ns:=/nobody')
+    live.until(lambda: process.poll() is not None)
+    text, _ = process.communicate(timeout=60)
+    (line,) = [x for x in text.splitlines() if 'nobody publishes /nobody/joint_states' in x]
+    assert 'start its driver' in line, (line, monitor.get_name())
+
+
+def test_the_robot_is_advised_where_a_monitor_publishes_too(live: Live) -> None:
+    """Beside the margins of a monitor, live or played again, the one topic of a driver is named."""
+    live.monitor()
+    driver = live.driver(namespace='/zoo')
+    again = driver.create_publisher(JointState, '/old/acceptance_monitor/stability', 10)
+    process = doctor('--seconds', '1', '--ros-args', '-r', '__ns:=/nobody')
+    live.until(lambda: process.poll() is not None, driver.send)
+    text, _ = process.communicate(timeout=60)
+    assert 'topics.joint_states.name: zoo/joint_states' in text
+    assert again.topic_name not in text
 
 
 def test_it_hears_a_real_robot(live: Live) -> None:

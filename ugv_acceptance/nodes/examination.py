@@ -13,6 +13,7 @@ from ugv_acceptance.model.attitude import (
     up_from_acceleration,
     up_from_orientation,
 )
+from ugv_acceptance.model.robot import Joint
 from ugv_acceptance.nodes.listening import Heard, Surroundings
 
 OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
@@ -23,8 +24,6 @@ SLOWEST = 10.0
 LEVEL = math.radians(15)
 # A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
 OUTSIDE = 0.1
-# An arm or flipper joint (rad) that has turned further is more likely told in degrees.
-MANY_TURNS = 2 * math.tau
 Vector = tuple[float, float, float]
 
 
@@ -114,7 +113,7 @@ def _clock(name: str, heard: Heard) -> Iterator[Finding]:
     elif not any(sample.stamp for sample in heard.samples):
         yield Finding(WARN, about, 'stamps are all zero', 'let the driver fill header.stamp')
     else:
-        do = 'synchronise the clocks; for a simulation set use_sim_time; for a replay use --restamp'
+        do = 'synchronise the clocks; for a simulation set use_sim_time; play a recording restamped'
         yield Finding(WARN, about, f'stamps are {offset:.1f} s before receipt', do)
 
 
@@ -141,14 +140,20 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
     for topic_name, (name, how) in wanted.items():
         if topic_name not in newest:
             continue
-        q, joint = how.sign * newest[topic_name] + how.offset, settings.robot.joint(name)
-        if not joint.lower - OUTSIDE <= q <= joint.upper + OUTSIDE:
+        told, joint = newest[topic_name], settings.robot.joint(name)
+        q = how.sign * told + how.offset
+        if not _within(joint, q):
             text = f'at {q:.3f}, limits {joint.lower:.3f} to {joint.upper:.3f}'
-            do = f'check joints.{name}.sign and offset; are degrees sent in place of radians?'
+            do = f'check joints.{name}.sign and offset'
+            # An endless joint has no limits: at any angle it says nothing of the unit.
+            in_degrees = how.sign * math.radians(told) + how.offset
+            if joint.kind != 'prismatic' and _within(joint, in_degrees):
+                do += '; are degrees sent in place of radians?'
             yield Finding(FAIL, name, text, do)
-        elif joint.kind != 'prismatic' and abs(q) > MANY_TURNS:
-            text = f'at {q:.1f} rad, {abs(q) / math.tau:.0f} turns'
-            yield Finding(WARN, name, text, 'are degrees sent in place of radians?')
+
+
+def _within(joint: Joint, q: float) -> bool:
+    return joint.lower - OUTSIDE <= q <= joint.upper + OUTSIDE
 
 
 def _imu(samples: Sequence[ImuSample], config: Config) -> Iterator[Finding]:

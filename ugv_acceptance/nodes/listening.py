@@ -15,6 +15,7 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointStateSample
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.nodes.inputs import qos_of
+from ugv_acceptance.nodes.outputs import MARGIN_TOPICS
 from ugv_acceptance.nodes.player import message_type
 from ugv_acceptance.nodes.running import RANGE, ros, spin
 
@@ -22,13 +23,16 @@ from ugv_acceptance.nodes.running import RANGE, ros, spin
 KEPT = 5000
 # Seconds until all publishers should be known; then the listening begins.
 DISCOVERY = 4.0
+# What a monitor calls its margins, whatever it is called itself.
+_MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
 
 
 @dataclass(slots=True)
 class Heard:
     """What came on one input: receipt times and samples; publishers as (node, type, why no match).
 
-    `alike` are the other topics that carry messages of the input's type.
+    `alike` are the other topics that carry messages of the input's type, but for what a monitor
+    publishes itself.
     """
 
     topic: str
@@ -137,5 +141,17 @@ def _look(node: Node, heard: Heard, topic: Topic) -> None:
     heard.alike = [
         name
         for name, types in node.get_topic_names_and_types()
-        if topic.type in types and name != heard.topic and node.count_publishers(name)
+        if topic.type in types
+        and name != heard.topic
+        and node.count_publishers(name)
+        and not _told_by_a_monitor(node, name)
     ]
+
+
+def _told_by_a_monitor(node: Node, topic: str) -> bool:
+    """Return whether a topic is what a monitor makes of its inputs, live or played again."""
+    if topic.rpartition('/')[2] in _MARGINS:
+        return True
+    infos = node.get_publishers_info_by_topic(topic)
+    names = {f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos}
+    return bool(names) and all(node.count_publishers(f'{name}/verdict') for name in names)
