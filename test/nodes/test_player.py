@@ -1,17 +1,18 @@
 """The player: every message, its bytes, order, quality of service and time."""
 
+import os
 import struct
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from mcap.writer import Writer as McapWriter
-from nodes.live_case import Live, joints
+from nodes.live_case import OK, Live, imu, joints, levels, parameter, session_of
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -20,10 +21,10 @@ from sensor_msgs.msg import Imu, JointState
 from ugv_acceptance import BadBag, BadConfig
 from ugv_acceptance.bag.raw import Offered
 from ugv_acceptance.bag.writer import BagWriter, Qos
-from ugv_acceptance.nodes.player import Play, Player, qos_of, restamped
+from ugv_acceptance.nodes.player import Play, Player, play_from, qos_of
 from ugv_acceptance.nodes.running import Stop
+from ugv_acceptance.nodes.stamps import NS
 
-NS = 1_000_000_000
 T0 = 1_700_000_000 * NS
 
 
@@ -70,7 +71,7 @@ def play_all(live: Live, play: Play) -> list[bytes]:
 def test_every_message_comes_as_it_was_recorded(live: Live, tmp_path: Path) -> None:
     """Bytes and order are those of the recording."""
     path, sent = write(tmp_path)
-    assert play_all(live, Play(path)) == sent
+    assert play_all(live, Play(path, restamp=False)) == sent
 
 
 def test_topics_can_be_chosen(live: Live, tmp_path: Path) -> None:
@@ -100,7 +101,7 @@ def test_restamped_messages_carry_the_time_of_replay(live: Live, tmp_path: Path)
     """All stamps move by the same time, to now; all other bytes stay."""
     path, sent = write(tmp_path)
     before = time.time_ns()
-    heard = play_all(live, Play(path, restamp=True))
+    heard = play_all(live, Play(path))
     shifts = {stamp_of(a) - stamp_of(b) for a, b in zip(heard, sent, strict=True)}
     assert len(shifts) == 1
     assert before <= stamp_of(heard[0]) <= time.time_ns()
@@ -113,12 +114,99 @@ def stamp_of(data: bytes) -> int:
     return int(sec) * NS + int(nanosec)
 
 
-@given(st.integers(0, 2**31 - 1), st.integers(0, NS - 1), st.integers(-(2**40), 2**40))
-def test_a_stamp_moves_by_the_shift(sec: int, nanosec: int, shift: int) -> None:
-    """The stamp moves by the shift, but not before 1970 or beyond what it can tell."""
-    stamp = sec * NS + nanosec
-    moved = stamp_of(restamped(joints(stamp=stamp), shift))
-    assert moved == min(max(stamp + shift, 0), 2**31 * NS - 1)
+@pytest.mark.parametrize(
+    ('given_', 'expected'),
+    [
+        ({}, True),
+        ({'clock': True}, False),
+        ({'clock': True, 'restamp': True}, True),
+        ({'restamp': False}, False),
+        ({'clock': False, 'restamp': False}, False),
+    ],
+)
+def test_stamps_move_unless_the_clock_is_told(
+    live: Live, given_: dict[str, bool], expected: bool
+) -> None:
+    """The node's stamps are told anew by default, not with `clock`; what is given counts."""
+    values = [parameter(name, value) for name, value in ({'bag': 'run'} | given_).items()]
+    node = live.add(Node('bag_player', parameter_overrides=values))
+    assert play_from(node).restamp is expected
+    assert node.get_parameter('restamp').value is expected
+
+
+@pytest.mark.parametrize('options', [(), ('--clock',), ('--clock', '--restamp'), ('--no-restamp',)])
+def test_the_verb_moves_stamps_unless_the_clock_is_told(
+    live: Live, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    """`replay` alone tells stamps anew, with --clock it leaves them, and either can be asked for."""
+    path, sent = write(tmp_path)
+    heard: list[bytes] = []
+    before = time.time_ns()
+    listener(live, heard)
+    with replaying(path, *options) as process:
+        live.until(lambda: len(heard) == len(sent))
+        process.wait(timeout=60)
+    if options in {(), ('--clock', '--restamp')}:
+        assert before < stamp_of(heard[0]) < time.time_ns()
+    else:
+        assert heard == sent
+
+
+@contextmanager
+def replaying(*words: str | Path) -> Iterator['subprocess.Popen[bytes]']:
+    """Run `replay` in a process of its own, which ends with the test."""
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    code = 'from ugv_acceptance.cli import main; main()'
+    command = [sys.executable, '-c', code, 'replay', *map(str, words)]
+    with subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
+def simulated(folder: Path) -> Path:
+    """Record 6 s of a robot at rest, logged in real time, whose stamps begin at 12.3 s."""
+    path, began = folder / 'simulated', 12_300_000_000
+    with BagWriter(path) as writer:
+        writer.add_topic('/joint_states', 'sensor_msgs/msg/JointState', Qos())
+        writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu', Qos(reliability='best_effort'))
+        for k in range(600):
+            now = k * 10_000_000
+            writer.write('/joint_states', T0 + now, joints(stamp=began + now))
+            writer.write('/imu/data', T0 + now + 2_000_000, imu(stamp=began + now))
+    return path
+
+
+@pytest.mark.parametrize('options', [(), ('--rate', '3'), ('--rate', '0.5'), ('--loop',)])
+@pytest.mark.parametrize('which', ['recorded', 'simulated'])
+def test_a_live_monitor_beside_a_replay_says_ok(
+    live: Live, tmp_path: Path, repository: Path, options: tuple[str, ...], which: str
+) -> None:
+    """A run that passes is OK live, at any rate and again and again: no word of stamps."""
+    live.alone()
+    path = repository / 'bags' / 'packbot_pass' if which == 'recorded' else simulated(tmp_path)
+    ears, monitor = live.driver('ears'), live.monitor()
+    for publisher in (ears.joints, ears.imu):
+        ears.destroy_publisher(publisher)
+    counts = session_of(monitor).counts
+    with replaying(path, *options) as process:
+        enough = 1000 if '--loop' in options and which == 'simulated' else 500
+        live.until(lambda: counts['imu'].taken > enough and OK in levels(ears))
+        live.until(lambda: process.poll() is not None or counts['imu'].taken > 2 * enough)
+        verdict = monitor.verdict()
+    assert not [a.name for a in ears.alerts if 'CLOCK' in a.name]
+    assert verdict.level == OK or process.poll() is not None, verdict.message
+
+
+def test_a_recorded_clock_is_left_out_of_a_replay_of_now(live: Live, tmp_path: Path) -> None:
+    """It tells another time than the stamps do: it is played when asked for, or without restamp."""
+    path = foreign(tmp_path / 'run.mcap', 'sensor_msgs/msg/Imu', clock=True)
+    playing = player(live, Play(path))
+    assert list(playing.publishers) == ['/t0']
+    assert list(playing.skipped) == ['/clock']
+    assert '/clock' in player(live, Play(path, restamp=False)).publishers
+    assert '/clock' in player(live, Play(path, topics=('/clock',))).publishers
 
 
 @pytest.mark.parametrize(
@@ -168,7 +256,7 @@ def test_a_loop_begins_again_and_the_clock_with_it(live: Live, tmp_path: Path) -
         clocks.append(message.clock.sec * NS + message.clock.nanosec)
 
     node.create_subscription(Clock, '/clock', on_clock, 1000)
-    playing = player(live, Play(path, loop=True, clock=True))
+    playing = player(live, Play(path, loop=True, clock=True, restamp=False))
 
     def third_time(_: float) -> None:
         stop.asked = playing.published >= 2.5 * len(sent)
@@ -181,14 +269,16 @@ def test_a_loop_begins_again_and_the_clock_with_it(live: Live, tmp_path: Path) -
     assert {T0 <= now < T0 + NS for now in clocks} == {True}
 
 
-def foreign(path: Path, *kinds: str) -> Path:
+def foreign(path: Path, *kinds: str, clock: bool = False) -> Path:
     """Write an MCAP with a message of each of these types, whose content means nothing."""
+    names = {f'/t{k}': kind for k, kind in enumerate(kinds)}
+    names |= {'/clock': 'rosgraph_msgs/msg/Clock'} if clock else {}
     with path.open('wb') as file:
         writer = McapWriter(file)
         writer.start('ros2', 'test')
-        for k, kind in enumerate(kinds):
+        for name, kind in names.items():
             schema = writer.register_schema(kind, 'ros2msg', b'')
-            channel = writer.register_channel(f'/t{k}', 'cdr', schema)
+            channel = writer.register_channel(name, 'cdr', schema)
             writer.add_message(channel, T0, bytes([0, 1, 0, 0]), T0)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
@@ -216,9 +306,7 @@ def test_a_message_without_room_for_a_stamp_does_not_end_the_replay(
     live: Live, tmp_path: Path
 ) -> None:
     """With restamp, a message that was cut off goes out as it is."""
-    playing = player(
-        live, Play(foreign(tmp_path / 'run.mcap', 'sensor_msgs/msg/Imu'), restamp=True)
-    )
+    playing = player(live, Play(foreign(tmp_path / 'run.mcap', 'sensor_msgs/msg/Imu')))
     playing.run(Stop())
     assert playing.published == 1
 
@@ -231,7 +319,7 @@ def test_the_node_plays_what_its_parameters_say(live: Live, tmp_path: Path) -> N
     path, sent = write(tmp_path)
     heard: list[bytes] = []
     listener(live, heard)
-    given = (f'bag:={path}', 'topics:=["/joint_states"]', 'rate:=2.0')
+    given = (f'bag:={path}', 'topics:=["/joint_states"]', 'rate:=2.0', 'restamp:=false')
     options = [word for text in given for word in ('-p', text)]
     command = [sys.executable, '-c', PROGRAM, '--ros-args', *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:

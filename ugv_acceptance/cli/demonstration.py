@@ -75,7 +75,7 @@ def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Rai
     """Play the recording into the monitor; return its alerts and whether the player succeeded."""
     from ugv_acceptance.cli.live_view import watch
 
-    play = ('replay', str(path), '--restamp', '--rate', str(rate))
+    play = ('replay', str(path), '--rate', str(rate))
     with ExitStack() as stack:
         if page:
             announce(stack.enter_context(verb('console', '--port', '0')), console)

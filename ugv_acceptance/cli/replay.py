@@ -22,26 +22,38 @@ def replay(
     topics: Annotated[
         list[str] | None, typer.Option(help='A topic to play; may be given several times.')
     ] = None,
-    clock: Annotated[bool, typer.Option('--clock', help='Publish /clock.')] = False,
-    restamp: Annotated[
-        bool, typer.Option('--restamp', help='Move header stamps to the time of replay.')
+    clock: Annotated[
+        bool,
+        typer.Option('--clock', help='Publish the time of the recording on /clock.'),
     ] = False,
+    restamp: Annotated[
+        bool | None,
+        typer.Option(
+            '--restamp/--no-restamp',
+            help='Move header stamps to the time of replay, or leave them as recorded. '
+            'Moved by default, but not with --clock.',
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Publish a recording byte for byte, with its timing and quality of service.
+    """Publish a recording with its timing and quality of service, for a live monitor to watch.
 
-    A live monitor compares header stamps with its clock: play with --restamp, or with --clock and
-    use_sim_time in the monitor.
+    A live monitor compares header stamps with its clock, so they move to the time of replay, those
+    of a simulation too; at --rate 2 they advance as fast as real time does. All else is published
+    byte for byte. With --clock, set use_sim_time in the monitor: stamps then stay as recorded.
 
     \b
     Examples:
-      ugv-acceptance replay bags/packbot_fail --restamp
+      ugv-acceptance replay bags/packbot_fail
       ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data --topics /joint_states
       ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
+      ugv-acceptance replay run --no-restamp
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.nodes.player import Play, player_of
     from ugv_acceptance.nodes.running import end, ros
 
-    play = Play(bag, rate, loop, tuple(topics or ()), clock, restamp)
+    anew = not clock if restamp is None else restamp
+    play = Play(bag, rate, loop, tuple(topics or ()), clock, anew)
     with ros(ros_arguments(context)) as stop:
         player = player_of(play)
         for topic, reason in player.skipped.items():

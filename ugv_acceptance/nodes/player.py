@@ -1,10 +1,9 @@
 """`bag_player`: a node that publishes a recording, byte for byte, with its timing and QoS.
 
-Messages keep their header stamps unless `restamp`: then all stamps move by the time between
-recording and replay, so that a monitor does not take them for those of a wrong clock.
+Header stamps are told anew (stamps.py), so that a monitor does not take them for those of a wrong
+clock; without `restamp` they stay as recorded.
 """
 
-import struct
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -23,15 +22,14 @@ from ugv_acceptance.bag.raw import Logged, Offered, messages, offered
 from ugv_acceptance.bag.reader import Bag, open_bag
 from ugv_acceptance.nodes.parameters import described
 from ugv_acceptance.nodes.running import BAD_INPUT, Stop, ros
+from ugv_acceptance.nodes.stamps import NS, Stamped, Stamps, stamped
 
 # Seconds to wait for subscribers at the start: discovery takes one to three.
 DISCOVERY = 5.0
 # Seconds until a subscriber that we know of knows of us too, and until it has what was on its way.
 SETTLING = 0.7
-_NS = 1_000_000_000
-# The last moment (ns) that a stamp can tell.
-_LAST = 2**31 * _NS - 1
-# Seconds between two messages on /clock.
+CLOCK = '/clock'
+# Seconds between two messages on it.
 _CLOCK_STEP = 0.01
 
 
@@ -44,7 +42,7 @@ class Play:
     loop: bool = False
     topics: tuple[str, ...] = ()
     clock: bool = False
-    restamp: bool = False
+    restamp: bool = True
 
 
 @dataclass(slots=True)
@@ -57,7 +55,8 @@ class Player:
     publishers: dict[str, Publisher] = field(default_factory=dict)
     skipped: dict[str, str] = field(default_factory=dict)
     published: int = 0
-    _stamped: set[str] = field(default_factory=set)
+    _stamped: dict[str, Stamped] = field(default_factory=dict)
+    _leaders: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.play.rate > 0:
@@ -69,19 +68,30 @@ class Player:
             raise BadBag(f'{self.play.bag}: expected topic {unknown[0]}; the bag holds: {held}')
         profiles = offered(self.bag)
         for name, topic in self.bag.topics.items():
-            if self.play.topics and name not in self.play.topics:
-                continue
-            kind = message_type(topic.type)
-            if kind is None:
-                self.skipped[name] = f'type {topic.type or "unknown"} is not installed'
-                continue
-            qos = qos_of(profiles.get(name, Offered()))
-            # Relative, so that a namespace and remaps work.
-            self.publishers[name] = self.node.create_publisher(kind, name.lstrip('/'), qos)
-            if next(iter(kind.get_fields_and_field_types().values()), '') == 'std_msgs/Header':
-                self._stamped.add(name)
+            if not self.play.topics or name in self.play.topics:
+                self._offer(name, topic.type, profiles.get(name, Offered()))
         if not self.publishers:
             raise BadBag(f'{self.play.bag}: expected a topic that can be published: {self.skipped}')
+        # What is told once, such as a map, has an old stamp and no clock.
+        self._leaders = frozenset(
+            name
+            for name in self.publishers
+            if self.bag.topics[name].count > 1
+            and profiles.get(name, Offered()).durability == 'volatile'
+        )
+
+    def _offer(self, name: str, type_: str, offer: Offered) -> None:
+        kind = message_type(type_)
+        if kind is None:
+            self.skipped[name] = f'type {type_ or "unknown"} is not installed'
+            return
+        if self.play.restamp and name == CLOCK and CLOCK not in self.play.topics:
+            self.skipped[name] = 'header stamps tell the time of replay (see --no-restamp)'
+            return
+        # Relative, so that a namespace and remaps work.
+        self.publishers[name] = self.node.create_publisher(kind, name.lstrip('/'), qos_of(offer))
+        if self.play.restamp:
+            self._stamped[name] = stamped(kind)
 
     def wait_for_subscribers(self, stop: Stop, seconds: float = DISCOVERY) -> None:
         """Wait until every topic has a subscriber, but not longer than `seconds`."""
@@ -94,7 +104,7 @@ class Player:
 
     def run(self, stop: Stop, progress: Callable[[float], None] = lambda _: None) -> None:
         """Play to the end, or for ever with `loop`; `progress` takes seconds of the recording."""
-        clock = self.node.create_publisher(Clock, '/clock', 10) if self.play.clock else None
+        clock = self.node.create_publisher(Clock, CLOCK, 10) if self.play.clock else None
         while not stop.asked:
             self._once(stop, clock, progress)
             if not self.play.loop:
@@ -103,7 +113,7 @@ class Player:
 
     def _once(self, stop: Stop, clock: Publisher | None, progress: Callable[[float], None]) -> None:
         first, began = self.bag.start_ns, time.monotonic_ns()
-        shift = time.time_ns() - first
+        stamps = Stamps(first, time.time_ns(), self.play.rate, self._leaders)
         told = clocked = 0.0
         for message in messages(self.bag, self.publishers):
             elapsed = message.log_time - first
@@ -116,31 +126,18 @@ class Player:
             if clock is not None and seconds >= clocked:
                 clock.publish(_clock_at(message.log_time))
                 clocked = seconds + _CLOCK_STEP
-            self._publish(message, shift)
+            self._publish(message, stamps)
             if seconds >= told:
                 progress(seconds)
                 told = seconds + 0.1 * self.play.rate
         progress(self.bag.duration_s)
 
-    def _publish(self, message: Logged, shift: int) -> None:
-        data = message.data
-        if self.play.restamp and message.topic in self._stamped:
-            data = restamped(data, shift)
-        self.publishers[message.topic].publish(data)
+    def _publish(self, message: Logged, stamps: Stamps) -> None:
+        topic, data = message.topic, message.data
+        if topic in self._stamped:
+            data = self._stamped[topic].moved(data, topic, message.log_time, stamps)
+        self.publishers[topic].publish(data)
         self.published += 1
-
-
-def restamped(data: bytes, shift: int) -> bytes:
-    """Return a serialised message that begins with a Header, its stamp moved by `shift` (ns).
-
-    A stamp cannot be before 1970 or after 2038. A message too short for one stays as it is.
-    """
-    if len(data) < 12:
-        return data
-    order = '<' if data[1] & 1 else '>'
-    sec, nanosec = struct.unpack_from(f'{order}iI', data, 4)
-    moved = min(max(sec * _NS + nanosec + shift, 0), _LAST)
-    return data[:4] + struct.pack(f'{order}iI', moved // _NS, moved % _NS) + data[12:]
 
 
 def player_of(play: Play) -> Player:
@@ -169,7 +166,7 @@ def qos_of(offer: Offered) -> QoSProfile:
 
 def _clock_at(now: int) -> Clock:
     message = Clock()
-    message.clock.sec, message.clock.nanosec = divmod(now, _NS)
+    message.clock.sec, message.clock.nanosec = divmod(now, NS)
     return message
 
 
@@ -181,7 +178,11 @@ def play_from(node: Node) -> Play:
     declare('loop', False, described('start again at the end'))
     declare('topics', [''], described('topics to play; empty: all'))
     declare('clock', False, described('publish the time of the recording on /clock'))
-    declare('restamp', False, described('move header stamps to the time of replay'))
+    what = described('move header stamps to the time of replay; by default unless clock')
+    if node.get_parameter('clock').value:
+        declare('restamp', False, what)
+    else:
+        declare('restamp', True, what)
     names = ('bag', 'rate', 'loop', 'topics', 'clock', 'restamp')
     bag, rate, loop, topics, clock, restamp = (node.get_parameter(n).value for n in names)
     if not bag:
