@@ -37,6 +37,17 @@ def test_the_demo_shows_live_alerts_and_the_verdict(repository: Path) -> None:
     assert 'FAIL is the right verdict' in text
 
 
+def test_the_demo_played_fast_warns_neither_of_stamps_nor_of_the_load(repository: Path) -> None:
+    """What is shown is about the robot, at any rate: stamps and load are as they should be."""
+    bag = str(repository / 'bags' / 'packbot_pass')
+    process = start('demo', '--no-console', '--rate', '4', '--bag', bag)
+    text, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, text + errors
+    assert 'all margins kept' in text.partition('2. The same run')[0]
+    assert 'raised: header stamps' not in text
+    assert 'were in the hand' not in text
+
+
 def test_the_monitor_prints_lines_and_ends_when_asked() -> None:
     """Without a terminal it prints lines; SIGINT ends it with exit code 0."""
     process = start('monitor', '--every', '1', '--ros-args', '-r', '__ns:=/alone')

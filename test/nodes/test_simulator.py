@@ -1,12 +1,13 @@
 """The simulated robot over real DDS: it publishes as a robot does and obeys as one."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
 from geometry_msgs.msg import Inertia, Twist, Vector3
-from nodes.live_case import Live, parameter
+from nodes.live_case import Live, parameter, session_of
 from rclpy.qos import qos_profile_sensor_data
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
@@ -118,6 +119,41 @@ def test_the_clock_is_told_when_asked(live: Live) -> None:
     assert robot.joints[-1].header.stamp.sec < 1000
     first = robot.clock[0].clock
     live.until(lambda: robot.clock[-1].clock.nanosec != first.nanosec)
+
+
+def warned(live: Live, robot: Controller, monitor: Any) -> set[str]:
+    """Watch the robot stand for six looks at its motors, one a second; return the alerts' codes."""
+    heard = len(robot.joints)
+    live.until(lambda: session_of(monitor).evaluator.margins is not None)
+    live.until(lambda: len(robot.joints) > heard + 600)
+    codes = {status.values['code'] for kind, status in live.heard if kind == 'alert'}
+    return {str(code) for code in codes} - {'INPUT_STALE'}  # what the start may be
+
+
+@pytest.mark.parametrize('declared', ['4', '1.5', '0'])
+def test_a_monitor_beside_the_simulator_has_nothing_to_warn_of(
+    live: Live, repository: Path, tmp_path: Path, declared: str
+) -> None:
+    """Its hand holds what the configuration declares, from the start and after a reset."""
+    live.alone()
+    text = (repository / 'msg_configs' / 'packbot.yaml').read_text(encoding='utf-8')
+    text = text.replace('../urdf', str(repository / 'urdf'))
+    config = tmp_path / 'packbot.yaml'
+    config.write_text(text.replace('mass_kg: 4\n', f'mass_kg: {declared}\n'), encoding='utf-8')
+    monitor = live.monitor(config=str(config))
+    robot = Controller(live, config=str(config))
+    assert warned(live, robot, monitor) == set()
+    assert live.call(Trigger, 'packbot_simulator/reset').success
+    assert warned(live, robot, monitor) == set()
+    assert session_of(monitor).settings.robot.payload.mass == float(declared)
+
+
+def test_a_load_that_nobody_declared_is_still_warned_of(live: Live) -> None:
+    """What is put into the hand is not told to the monitor: declaring it is a person's part."""
+    live.alone()
+    monitor, robot = live.monitor(), Controller(live)
+    robot.load.publish(Inertia(m=0.0))
+    live.until(lambda: 'PAYLOAD_DIFFERS' in {a.rule.code for a in session_of(monitor).active})
 
 
 def test_a_fault_is_injected_live(live: Live) -> None:

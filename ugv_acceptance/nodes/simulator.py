@@ -3,7 +3,8 @@
 It publishes joint_states and imu/data (and /clock when asked) and obeys cmd_vel and
 arm_controller/joint_trajectory. What a person does on a test ground comes on topics of its own:
 ~/ground tilts what it stands on, ~/load puts a load into its hand, ~/pull pulls it backwards (x: N,
-z: height in m), ~/reset stands it up again.
+z: height in m), ~/reset stands it up again. At the start and after a reset its hand holds the load
+that the configuration declares, for that is what a monitor takes it to hold.
 """
 
 import math
@@ -62,6 +63,7 @@ class Simulator(Node):
             self._value('imu_rate'),
             epoch=0,
         )
+        self._hold_declared()
         self._clocked = bool(self._value('clock'))
         topics = config.topics
         self._outputs: dict[str, Publisher] = {
@@ -156,8 +158,17 @@ class Simulator(Node):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self.virtual.remote.reset()
-        response.success, response.message = True, 'stands on level ground, arm stowed, no load'
+        self._hold_declared()
+        held = self.virtual.config.settings.robot.payload.mass
+        text = f'stands on level ground, arm as at the start, {held:g} kg in its hand'
+        response.success, response.message = True, text
         return response
+
+    def _hold_declared(self) -> None:
+        """Put the load of the configuration into the hand: what a monitor reckons with."""
+        declared = self.virtual.config.settings.robot.payload
+        if declared.mass > 0.0:
+            self.virtual.remote.take(declared)
 
     # Time
 

@@ -94,6 +94,7 @@ class Hands:
         """Bring a robot that tipped over, or whose arm gave way, back to its start."""
         if self.mode == SIM:
             self.world.commands.stand_up()
+            self.world.commands.load(0.0)
             self._tilt = 0.0
         elif not self.told('stand the robot on its tracks on level ground, arm folded, hand empty'):
             return False
