@@ -96,9 +96,7 @@ def test_a_renamed_recording_is_said_to_be_read(tmp_path: Path, storage: Storage
 
 @pytest.mark.parametrize('parts', [1, 2])
 @pytest.mark.parametrize('listed', ['packed', 'unpacked'])
-def test_a_part_packed_or_unpacked_later_is_read(
-    tmp_path: Path, parts: int, listed: str
-) -> None:
+def test_a_part_packed_or_unpacked_later_is_read(tmp_path: Path, parts: int, listed: str) -> None:
     """A file that is there with or without .zstd is the one that metadata.yaml lists."""
     messages = run(20)
     folder = write_folder(tmp_path / 'bag', messages[::parts], StoragePlugin.MCAP)

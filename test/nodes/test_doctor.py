@@ -145,7 +145,7 @@ LIFT = YAML.replace('limit_nm: 30', 'limit_nm: 30\n    sign: -1\n    offset_deg:
     ],
 )
 def test_degrees_are_asked_of_a_joint_that_they_would_bring_within_its_limits(
-    tmp_path: Path, yaml: str, joint: str, told: float, asked: bool
+    tmp_path: Path, yaml: str, joint: str, told: float, *, asked: bool
 ) -> None:
     """Outside its limits a joint FAILs; degrees are asked for only where they would fit."""
     config = load(write_robot(tmp_path, yaml))

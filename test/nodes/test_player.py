@@ -125,7 +125,7 @@ def stamp_of(data: bytes) -> int:
     ],
 )
 def test_stamps_move_unless_the_clock_is_told(
-    live: Live, given_: dict[str, bool], expected: bool
+    live: Live, given_: dict[str, bool], *, expected: bool
 ) -> None:
     """The node's stamps are told anew by default, not with `clock`; what is given counts."""
     values = [parameter(name, value) for name, value in ({'bag': 'run'} | given_).items()]
@@ -138,7 +138,7 @@ def test_stamps_move_unless_the_clock_is_told(
 def test_the_verb_moves_stamps_unless_the_clock_is_told(
     live: Live, tmp_path: Path, options: tuple[str, ...]
 ) -> None:
-    """`replay` alone tells stamps anew, with --clock it leaves them, and either can be asked for."""
+    """`replay` alone tells stamps anew, with --clock it leaves them; either can be asked for."""
     path, sent = write(tmp_path)
     heard: list[bytes] = []
     before = time.time_ns()

@@ -179,7 +179,7 @@ def _pose(second: int) -> PoseStamped:
         (String, False, False),
     ],
 )
-def test_where_headers_are_is_known_of_a_type(kind: Any, first: bool, inside: bool) -> None:
+def test_where_headers_are_is_known_of_a_type(kind: Any, *, first: bool, inside: bool) -> None:
     """At the begin, in its parts, in both, or nowhere."""
     found = stamped(kind)
     assert (found.first, found.inside) == (first, inside)
