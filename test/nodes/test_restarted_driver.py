@@ -45,7 +45,7 @@ def started(name: str) -> Iterator['subprocess.Popen[bytes]']:
 def taken(monitor: Monitor) -> int:
     """Return how many messages of the input that has fewest were taken."""
     counts = session_of(monitor).counts
-    return min(counts[name].taken for name in INPUTS)
+    return min(int(counts[name].taken) for name in INPUTS)
 
 
 def more(monitor: Monitor, messages: int = 100) -> Callable[[], bool]:

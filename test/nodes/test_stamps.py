@@ -4,16 +4,19 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
 from hypothesis import given
 from hypothesis import strategies as st
-from nav_msgs.msg import Path as NavPath
 from nodes.live_case import joints
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import (
+    InteractiveMarker,
+    InteractiveMarkerControl,
+    Marker,
+    MarkerArray,
+)
 
 from ugv_acceptance.nodes.stamps import NS, Stamps, restamped, stamp_of, stamped
 
@@ -153,19 +156,14 @@ def test_headers_inside_a_message_move_too() -> None:
 
 
 def test_the_header_of_a_whole_and_of_its_parts_move_alike() -> None:
-    """A path has a header, and each of its poses: what they tell of each other stays."""
-    path = NavPath()
-    path.header.stamp.sec = 15
-    path.poses = [_pose(k) for k in (15, 16)]
-    found = moved(path, 15 * NS)
-    assert found.header.stamp == found.poses[0].header.stamp
-    assert found.poses[1].header.stamp.sec - found.header.stamp.sec == 1
-
-
-def _pose(second: int) -> PoseStamped:
-    pose = PoseStamped()
-    pose.header.stamp.sec = second
-    return pose
+    """One header for all, and one for each part two levels down: their differences stay."""
+    handle = InteractiveMarker(controls=[InteractiveMarkerControl(markers=deep(15, 16).markers)])
+    handle.header.stamp.sec = 15
+    found = moved(handle, 15 * NS)
+    parts = [marker.header.stamp for marker in found.controls[0].markers]
+    assert found.header.stamp == parts[0]
+    assert found.header.stamp.sec == NOW // NS + 15
+    assert parts[1].sec - parts[0].sec == 1
 
 
 @pytest.mark.parametrize(
@@ -174,7 +172,7 @@ def _pose(second: int) -> PoseStamped:
         (JointState, True, False),
         (DiagnosticArray, True, False),
         (JointTrajectory, True, False),
-        (NavPath, True, True),
+        (InteractiveMarker, True, True),
         (MarkerArray, False, True),
         (String, False, False),
     ],
@@ -186,7 +184,7 @@ def test_where_headers_are_is_known_of_a_type(kind: Any, *, first: bool, inside:
 
 
 @pytest.mark.parametrize('data', [b'', b'\0\1\0\0', b'\0\1\0\0\xff\xff\xff\xff'])
-@pytest.mark.parametrize('kind', [JointState, MarkerArray, NavPath])
+@pytest.mark.parametrize('kind', [JointState, MarkerArray, InteractiveMarker])
 def test_a_message_that_is_broken_stays_as_it_is(kind: Any, data: bytes) -> None:
     """Too short, or not what its type says: a listener gets it as it was recorded."""
     assert stamped(kind).moved(data, '/a', LOG, stamps()) == data
