@@ -73,7 +73,8 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
     several = not listed and len(numbered([p.name for p in files])) > 1
     if several and (path / NAME).is_file():
         held = ', '.join(p.name for p in files)
-        raise BadBag(f'{path}: expected the files that {NAME} lists, found others: {held}; give one')
+        expected = f'expected the files that {NAME} lists'
+        raise BadBag(f'{path}: {expected}, found others: {held}; give one of them')
     if several or not files:
         _refuse_several(path)
     if not files:
