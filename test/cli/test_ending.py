@@ -198,6 +198,39 @@ def end_it(run: Started, number: signal.Signals, ready: Ready) -> None:
     until(lambda: all(map(gone, helpers)), lambda: 'a process it started goes on')
 
 
+# Loses the first signal as a callback of an import does, and the second as a careless library.
+LOSES = """
+import signal, time, weakref
+from ugv_acceptance.cli.ending import ended_by_signals
+class Thing: pass
+def callback(_):
+    signal.raise_signal(signal.SIGTERM)
+with ended_by_signals() as told:
+    thing = Thing()
+    watched = weakref.ref(thing, callback)
+    del thing
+    assert told() == 143
+    try:
+        time.sleep(1000)
+    except BaseException:
+        pass
+    try:
+        time.sleep(1000)
+    finally:
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end: pass
+        print('closed')
+"""
+
+
+def test_a_signal_is_not_lost() -> None:
+    """Where its exception is swallowed it is raised again, but not into what is being closed."""
+    done = subprocess.run(
+        [sys.executable, '-c', LOSES], capture_output=True, text=True, check=False, timeout=PATIENCE
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (143, 'closed\n', '')
+
+
 @dataclass
 class Screen:
     """A terminal with a verb on it; `text` is what came to it, `modes` what it had before."""

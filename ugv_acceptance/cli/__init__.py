@@ -11,7 +11,7 @@ from importlib import import_module
 import typer
 
 from ugv_acceptance import AcceptanceError, __version__
-from ugv_acceptance.cli.ending import end_on_signals
+from ugv_acceptance.cli.ending import ended_by_signals
 
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 # A disk that is full, a quota or a limit that is reached, a file system that is read-only.
@@ -69,22 +69,22 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error a user can act on is one line and exit code 2."""
-    told = end_on_signals()
-    for verb in VERBS:
-        module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
-        settings = getattr(module, 'CONTEXT', None)
-        app.command(verb, context_settings=settings)(getattr(module, verb.replace('-', '_')))
-    try:
-        app()
-    except Exception as error:
-        # A library that was being loaded makes an error of its own of the signal.
-        if told():
-            sys.exit(told())
-        sentence = _sentence(error)
-        if not sentence:
-            raise
-        typer.echo(f'ugv-acceptance: {sentence}', err=True)
-        sys.exit(BAD_INPUT)
+    with ended_by_signals() as told:
+        for verb in VERBS:
+            module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
+            settings = getattr(module, 'CONTEXT', None)
+            app.command(verb, context_settings=settings)(getattr(module, verb.replace('-', '_')))
+        try:
+            app()
+        except Exception as error:
+            # A library that was being loaded makes an error of its own of the signal.
+            if told():
+                sys.exit(told())
+            sentence = _sentence(error)
+            if not sentence:
+                raise
+            typer.echo(f'ugv-acceptance: {sentence}', err=True)
+            sys.exit(BAD_INPUT)
 
 
 def _sentence(error: Exception) -> str:

@@ -5,26 +5,49 @@ with 128 and the signal's number, as a shell tells of it: neither a pass nor a f
 """
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Seconds between the attempts to end.
+AGAIN = 0.2
 
 
-def end_on_signals() -> Callable[[], int]:
+@contextmanager
+def ended_by_signals() -> Iterator[Callable[[], int]]:
     """Let a signal end this process wherever it is; what is open is closed, and nothing printed.
 
-    Return what gives the exit code once a signal came, 0 before.
+    Yield what gives the exit code once a signal came, 0 before. An exception that is raised where
+    none can be, as in a callback of an import, is lost: it is raised again until it takes.
     """
-    codes = [0]
+    codes, hook = [0], sys.unraisablehook
 
     def leave(number: int, _: object) -> None:
         codes.append(128 + number)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
         raise SystemExit(codes[-1])
 
+    def again(*_: object) -> None:
+        error = sys.exc_info()[1]
+        while error is not None and not isinstance(error, SystemExit):
+            error = error.__context__
+        # While it is handled, what is open is being closed.
+        if error is None:
+            raise SystemExit(codes[-1])
+
+    def lost(what: 'sys.UnraisableHookArgs') -> None:
+        if not isinstance(what.exc_value, SystemExit):
+            hook(what)
+
+    sys.unraisablehook = lost
+    signal.signal(signal.SIGALRM, again)
     for number in SIGNALS:
         signal.signal(number, leave)
-    return lambda: codes[-1]
+    try:
+        yield lambda: codes[-1]
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 @contextmanager
