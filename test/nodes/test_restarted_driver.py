@@ -141,6 +141,8 @@ def test_two_publishers_of_one_process_are_named(live: Live) -> None:
 
 
 OLD, NEW = Publisher('/driver', bytes(16)), Publisher('/driver', bytes([1] * 16))
+UNNAMED = Publisher('unknown', bytes([1] * 16), named=False)
+STRANGER = Publisher('/stranger', bytes([2] * 16))
 
 
 def both(*runs: list[int]) -> Voices:
@@ -191,6 +193,28 @@ def test_a_driver_that_dies_again_and_again_is_one_source() -> None:
         alive = range(max(0, life - 20), life + 1)
         known_now = [Publisher('/driver', bytes([k] * 16)) for k in alive]
         assert voices.present(life * second_ns, known_now) == ['/driver']
+
+
+def test_a_driver_that_came_back_is_one_source_before_its_name_comes() -> None:
+    """DDS may tell a name seconds after the messages: till then it is no stranger."""
+    voices = both(list(range(1, 100)), list(range(1, 50)))
+    assert voices.present(1, [OLD, UNNAMED]) == ['/driver']
+    assert voices.present(2, [OLD, NEW]) == ['/driver']
+
+
+def test_a_voice_without_a_name_beside_a_driver_that_speaks_is_a_second() -> None:
+    """Heard by turns it is a second source, whatever it will be called; alone it is one."""
+    voices = both([1, 2, 100, 3, 101, 4, 102, 5])
+    assert voices.present(1, [OLD, UNNAMED]) == ['/driver', 'unknown']
+    assert Voices().present(1, [UNNAMED]) == ['unknown']
+    assert len(Voices().present(1, [OLD, UNNAMED, STRANGER])) == 3
+
+
+def test_a_name_that_comes_and_is_another_is_a_second_source_at_once() -> None:
+    """A stranger that has said nothing yet is named as soon as its name is known."""
+    voices = both(list(range(1, 100)))
+    assert voices.present(1, [OLD, UNNAMED]) == ['/driver']
+    assert voices.present(2, [OLD, STRANGER]) == ['/driver', '/stranger']
 
 
 def test_without_numbers_two_of_one_name_are_two() -> None:

@@ -133,7 +133,11 @@ class Inputs:
         for name, subscription in self.subscriptions.items():
             infos = self._node.get_publishers_info_by_topic(subscription.topic_name)
             known = [
-                Publisher(_node_name(i.node_namespace, i.node_name), bytes(i.endpoint_gid))
+                Publisher(
+                    _node_name(i.node_namespace, i.node_name),
+                    bytes(i.endpoint_gid),
+                    named=_UNKNOWN not in i.node_name,
+                )
                 for i in infos
             ]
             if self._nameless(name, now, [publisher.node for publisher in known]):

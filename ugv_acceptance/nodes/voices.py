@@ -5,7 +5,7 @@ again is known twice. Each publisher numbers its messages: a voice that speaks a
 has spoken is alive, and so are both.
 """
 
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -21,10 +21,14 @@ _PROCESS = 12
 
 @dataclass(frozen=True, slots=True)
 class Publisher:
-    """A publisher as ROS knows it: the full name of its node, and its DDS identity."""
+    """A publisher as ROS knows it: the full name of its node, and its DDS identity.
+
+    While it is not `named`, its node is some word that says so: a name can come seconds later.
+    """
 
     node: str
     gid: bytes
+    named: bool = True
 
 
 @dataclass(slots=True)
@@ -65,17 +69,17 @@ class Voices:
         """Return the nodes that publish at `now` (ns), sorted: one that came back counts once."""
         seen = {p.gid: self._since.get(p.gid, now) for p in publishers}
         self._since = seen
-        counts, nodes, self.restarted = Counter(p.node for p in publishers), list[str](), []
-        for node, count in sorted(counts.items()):
-            there = count
-            if count > 1 and not self._together(now, [p.gid for p in publishers if p.node == node]):
+        groups, nodes, self.restarted = _by_name(publishers), list[str](), []
+        for node, group in groups.items():
+            if len(group) > 1 and not self._together(now, [p.gid for p in group]):
                 self.restarted.append(node)
-                there = 1
-            nodes += [node] * there
-        if len(counts) == len(publishers):
-            del self._heads[len(counts) :]
+                nodes.append(node)
+            else:
+                nodes += [p.node for p in group]
+        if len(groups) == len(publishers):
+            del self._heads[len(groups) :]
             self._returns = 0
-        return nodes
+        return sorted(nodes)
 
     def _together(self, now: int, gids: Sequence[bytes]) -> bool:
         """Return whether publishers of one name are there at the same time."""
@@ -84,3 +88,13 @@ class Voices:
         if len({gid[:_PROCESS] for gid in gids}) < len(gids):
             return True
         return now - sorted(self._since[gid] for gid in gids)[1] > OUTLIVED
+
+
+def _by_name(publishers: Sequence[Publisher]) -> dict[str, list[Publisher]]:
+    """Return publishers by node; one without a name yet may be the only node there is, again."""
+    names = {p.node for p in publishers if p.named}
+    only = names.pop() if len(names) == 1 else ''
+    groups = defaultdict[str, list[Publisher]](list)
+    for publisher in publishers:
+        groups[publisher.node if publisher.named else only or publisher.node].append(publisher)
+    return groups
