@@ -147,9 +147,9 @@ setup(
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',
-            'acceptance_monitor = ugv_acceptance.nodes.monitor:main',
-            'bag_player = ugv_acceptance.nodes.player:main',
-            'packbot_simulator = ugv_acceptance.nodes.simulator:main',
+            'acceptance_monitor = ugv_acceptance.nodes.monitor.node:main',
+            'bag_player = ugv_acceptance.nodes.bag_player:main',
+            'packbot_simulator = ugv_acceptance.nodes.packbot_simulator:main',
         ],
     },
     zip_safe=True,

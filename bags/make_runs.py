@@ -14,10 +14,10 @@ import numpy as np
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config, load
-from ugv_acceptance.simulation.run import run
 from ugv_acceptance.simulation.scenario import Noise, Recording
 from ugv_acceptance.simulation.scenarios import SCENARIOS
 from ugv_acceptance.simulation.simulation import BUILD
+from ugv_acceptance.simulation.stretches import run
 
 # 2025-06-02 09:00:00 UTC: stamps look like those of a real clock.
 EPOCH_NS = 1_748_854_800_000_000_000

@@ -14,11 +14,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bench.advice_trial import Trial, trials
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.advice import advise
+from ugv_acceptance.evaluation.advice.search import advise
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.run.advice_trial import Trial, trials
 from ugv_acceptance.simulation.tip_cases import random_cases
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 

@@ -15,8 +15,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from ugv_acceptance.campaign.carry_out import Place, carry_out
 from ugv_acceptance.campaign.pool import cores
-from ugv_acceptance.campaign.run import Place, carry_out
 from ugv_acceptance.campaign.sources import find_sources
 from ugv_acceptance.campaign.work import Brief
 from ugv_acceptance.config import load

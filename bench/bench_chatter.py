@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.alerts import Alert, Rule, Signal
+from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.state_machine import Alert, Rule, Signal
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.watch import Watch
 
 RATE, LENGTH = 50, 600.0
 NOISE, SWING = math.radians(0.5), math.radians(1.0)

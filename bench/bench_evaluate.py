@@ -18,11 +18,11 @@ from pathlib import Path
 
 from bench_reading import floor, make  # type: ignore[import-not-found]
 
-from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.offline.evaluate import judge
 
 Stage = Callable[[], object]
 LIVE_MESSAGES = 40_000

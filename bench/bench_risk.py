@@ -8,9 +8,9 @@ import resource
 import sys
 import time
 
+from bench.quadrature import saturation_probability
 from ugv_acceptance.config import load
 from ugv_acceptance.studies.planar import PAPER, arm_robot
-from ugv_acceptance.studies.quadrature import saturation_probability
 from ugv_acceptance.studies.risk import BLOCK, Study, run
 from ugv_acceptance.studies.spread import Spread, generators, normal, uniform
 

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.labelled_runs import Event, Labelled, cases, label, work_cases
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.run.catalogue import Case
-from ugv_acceptance.run.labelled import Event, Labelled, cases, label, work_cases
 
 # A warning this long (s) before a tip-over is in time.
 IN_TIME = 0.5

@@ -21,10 +21,10 @@ import mujoco
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.run.catalogue import Case
 from ugv_acceptance.run.record import record
-from ugv_acceptance.simulation.run import run
 from ugv_acceptance.simulation.scenario import Scenario
 from ugv_acceptance.simulation.scenarios import SCENARIOS
 from ugv_acceptance.simulation.simulation import BUILD
+from ugv_acceptance.simulation.stretches import run
 from ugv_acceptance.simulation.vehicle import vehicle_of
 
 ROUNDS = 3

@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from bench.arm_motion import MARGINS, random_motions, static_margin, tips_all
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.simulation.arm_motion import MARGINS, random_motions, static_margin, tips_all
 from ugv_acceptance.simulation.tip_cases import Judged, confusion, judge_all, random_cases
 
 ARM = ('turret_joint', 'shoulder_joint', 'elbow_joint')

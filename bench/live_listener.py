@@ -16,8 +16,8 @@ from sensor_msgs.msg import Imu, JointState
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from bench.naive_monitor import NaiveMonitor, best_effort
 from ugv_acceptance.evaluation.live import Margins
-from ugv_acceptance.nodes.monitor import Monitor
-from ugv_acceptance.nodes.running import end, ros, spin
+from ugv_acceptance.nodes.executor import end, ros, spin
+from ugv_acceptance.nodes.monitor.node import Monitor
 
 STAMP = struct.Struct('<iI')
 DEPTH = 1000

@@ -14,8 +14,8 @@ from std_msgs.msg import Float64MultiArray
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.raw import Offered
-from ugv_acceptance.nodes.player import qos_of
-from ugv_acceptance.nodes.running import end
+from ugv_acceptance.nodes.bag_player import qos_of
+from ugv_acceptance.nodes.executor import end
 
 NAMES = (
     'turret_joint',

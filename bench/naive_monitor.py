@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
-Floats = NDArray[np.float64]
+from ugv_acceptance.type_aliases import Floats
 
 G = 9.81
 LENGTH_1, LENGTH_2, LINK_MASS, LOAD = 0.55, 0.64, 2.5, 4.0

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Matrix, Payload, Robot
-
-Floats = NDArray[np.float64]
+from ugv_acceptance.type_aliases import Floats
 
 DOWN = (0.0, 0.0, -9.81)
 LIFT = (0.0, -1.0, 0.0)  # a positive angle lifts what points forward

@@ -19,7 +19,7 @@ from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Settings

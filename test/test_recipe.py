@@ -26,12 +26,15 @@ ASKS_FOR: dict[str, tuple[list[str], str]] = {
         'from ugv_acceptance.campaign.sources import _opened as f; f("s3://b/")',
     ),
     'console': (['textual'], 'from ugv_acceptance.cli.watch import need; need("textual")'),
-    'foxglove': (['foxglove'], 'from ugv_acceptance.nodes.foxglove import _foxglove as f; f()'),
-    'pdf': (['weasyprint'], 'from ugv_acceptance.report.pdf import pdf_of; pdf_of("")'),
-    'sim': (['mujoco'], 'from ugv_acceptance.nodes.simulator import main; main([])'),
+    'foxglove': (
+        ['foxglove'],
+        'from ugv_acceptance.nodes.foxglove_bridge import _foxglove as f; f()',
+    ),
+    'pdf': (['weasyprint'], 'from ugv_acceptance.report.acceptance import pdf_of; pdf_of("")'),
+    'sim': (['mujoco'], 'from ugv_acceptance.nodes.packbot_simulator import main; main([])'),
     'table': (
         ['pyarrow'],
-        'from ugv_acceptance.bag.table import ParquetSink as P; P("m.parquet", None, 0)',
+        'from ugv_acceptance.offline.parquet import ParquetSink as P; P("m.parquet", None, 0)',
     ),
 }
 

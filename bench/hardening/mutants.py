@@ -23,9 +23,9 @@ _BINARY: dict[type[ast.operator], type[ast.operator]] = {
 EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('model/blocks.py', '', '65536 -> 131072'): 'larger blocks give the same values',
     ('model/hull.py', '', '50 -> 51'): 'the hulls of the rest are found one by one',
-    ('model/rows.py', '', '4096 -> 8192'): 'counted or sorted, the values are the same',
-    ('model/rows.py', 'groups', 'high - low < _FEW -> high - low <= _FEW'): 'the same',
-    ('model/rows.py', 'groups', 'high - low -> high + low'): 'the same',
+    ('model/row_selection.py', '', '4096 -> 8192'): 'counted or sorted, the values are the same',
+    ('model/row_selection.py', 'groups', 'high - low < _FEW -> high - low <= _FEW'): 'the same',
+    ('model/row_selection.py', 'groups', 'high - low -> high + low'): 'the same',
     ('model/support.py', '', '4 -> 5'): 'tried on all or searched one by one, faces are the same',
     ('model/support.py', '_faces_under', 'h >= -_LEVEL -> h > -_LEVEL'): 'the same',
     ('model/support.py', '_faces_under', '-_LEVEL -> +_LEVEL'): 'the same',
@@ -38,33 +38,41 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('model/expressions.py', '_order', '0 -> 1'):
         'numbers still come before nodes: these are ordered by their address, which is larger',
     ('model/expressions.py', '_order', '1 -> 2'): 'the same',
-    ('evaluation/joints.py', 'JointMerger.merge_columns', 'len(useful) > 1 -> len(useful) >= 1'):
+    ('evaluation/inputs/joints.py', 'JointMerger.merge_columns',
+     'len(useful) > 1 -> len(useful) >= 1'):
         'one segment is in order already',
-    ('evaluation/alerts.py', 'Signal', '-np.inf -> +np.inf'):
+    ('evaluation/alerts/state_machine.py', 'Signal', '-np.inf -> +np.inf'):
         'a peak is set before it is read',
-    ('evaluation/alerts.py', 'Signal.step', 'value > self.peak -> value >= self.peak'):
+    ('evaluation/alerts/state_machine.py', 'Signal.step',
+     'value > self.peak -> value >= self.peak'):
         'a value as bad as the peak leaves everything as it is',
-    ('evaluation/alerts.py', 'Signal.set', 'peak > self.peak -> peak >= self.peak'): 'the same',
-    ('evaluation/foresight.py', '', '3 -> 4'): 'FEW only chooses between two ways to one result',
-    ('evaluation/foresight.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
-    ('evaluation/sampling.py', 'Sampler', '1 -> 2'): 'no slot is below 0',
-    ('evaluation/low_pass.py', 'LowPass', '0 -> 1'): 'nothing is carried to the first sample',
-    ('evaluation/low_pass.py', 'LowPass.columns', '8.0 -> 9.0'): 'longer stretches, same values',
-    ('evaluation/low_pass.py', 'LowPass.columns', 'elapsed / 8.0 -> elapsed * 8.0'):
+    ('evaluation/alerts/state_machine.py', 'Signal.set', 'peak > self.peak -> peak >= self.peak'):
+        'the same',
+    ('evaluation/alerts/prediction.py', '', '3 -> 4'):
+        'FEW only chooses between two ways to one result',
+    ('evaluation/alerts/prediction.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
+    ('evaluation/downsampling.py', 'Sampler', '1 -> 2'): 'no slot is below 0',
+    ('evaluation/inputs/low_pass.py', 'LowPass', '0 -> 1'):
+        'nothing is carried to the first sample',
+    ('evaluation/inputs/low_pass.py', 'LowPass.columns', '8.0 -> 9.0'):
+        'longer stretches, same values',
+    ('evaluation/inputs/low_pass.py', 'LowPass.columns', 'elapsed / 8.0 -> elapsed * 8.0'):
         'shorter stretches, same values',
-    ('evaluation/low_pass.py', 'LowPass.columns',
+    ('evaluation/inputs/low_pass.py', 'LowPass.columns',
      'np.diff(np.floor(elapsed / 8.0)) > 0 -> np.diff(np.floor(elapsed / 8.0)) >= 0'): 'the same',
-    ('evaluation/value_outcome.py', '_measured',
+    ('evaluation/criteria/verdict.py', '_measured',
      "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
         'a distance of 0 is false before that',
-    ('evaluation/freshness.py', 'Freshness', '0 -> 1'): 'the first message sets both',
-    ('evaluation/imu.py', 'ImuTracker', '0.0 -> 1.0'): 'the first message sets it',
-    ('evaluation/imu.py', 'ImuTracker', 'False -> True'):
+    ('evaluation/inputs/timeouts.py', 'Freshness', '0 -> 1'): 'the first message sets both',
+    ('evaluation/inputs/imu.py', 'ImuTracker', '0.0 -> 1.0'): 'the first message sets it',
+    ('evaluation/inputs/imu.py', 'ImuTracker', 'False -> True'):
         'what is quiet is judged quiet, a call is saved',
-    ('evaluation/imu.py', 'ImuTracker.columns', 'none != 0 -> none == 0'): 'there are no rows',
-    ('evaluation/joints.py', 'JointMerger.layout', '64 -> 65'): "a cache's size changes no value",
-    ('evaluation/joints.py', '', '1 -> 2'): 'no time is below 0',
-    ('evaluation/instructions.py', 'joint_words',
+    ('evaluation/inputs/imu.py', 'ImuTracker.columns', 'none != 0 -> none == 0'):
+        'there are no rows',
+    ('evaluation/inputs/joints.py', 'JointMerger.layout',
+     '64 -> 65'): "a cache's size changes no value",
+    ('evaluation/inputs/joints.py', '', '1 -> 2'): 'no time is below 0',
+    ('evaluation/advice/search.py', 'joint_words',
      'amount * joint.axis[2] -> amount / joint.axis[2]'): 'only the sign counts',
     ('evaluation/recorded.py', 'RecordedEvaluator._table', '0.0 -> 1.0'):
         'what stands in for a posture that is not whole is not read',
@@ -83,25 +91,28 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/live.py', 'LiveEvaluator.joint_state', '-signal.on -> +signal.on'):
         'a small value changes nothing, calls are saved',
     ('evaluation/summary.py', 'Extreme', '0 -> 1'): 'a time is set with the first value',
-    ('evaluation/examination.py', 'ValueMeasure._see', '1.0 -> 2.0'):
+    ('evaluation/criteria/measurement.py', 'ValueMeasure._see', '1.0 -> 2.0'):
         'the size of a sign changes no order',
-    ('evaluation/examination.py', 'ValueMeasure._see',
+    ('evaluation/criteria/measurement.py', 'ValueMeasure._see',
      'order[k] >= sign * self.worst[-1].value -> order[k] > sign * self.worst[-1].value'):
         'of equal moments nsmallest keeps the earlier',
-    ('evaluation/alerts.py', 'Signal', 'True -> False'): 'quiet saves work: no value depends on it',
-    ('evaluation/alerts.py', 'Signal.advance', 'self.alert is None -> self.alert is not None'):
+    ('evaluation/alerts/state_machine.py', 'Signal', 'True -> False'):
+        'quiet saves work: no value depends on it',
+    ('evaluation/alerts/state_machine.py', 'Signal.advance',
+     'self.alert is None -> self.alert is not None'):
         'never quiet, and the same',
-    ('evaluation/alerts.py', 'Signal.advance', 'self.due is None -> self.due is not None'):
+    ('evaluation/alerts/state_machine.py', 'Signal.advance',
+     'self.due is None -> self.due is not None'):
         'the same',
-    ('evaluation/foresight.py', '_ahead', 'len(time) > OVER -> len(time) >= OVER'):
+    ('evaluation/alerts/prediction.py', '_ahead', 'len(time) > OVER -> len(time) >= OVER'):
         'of so few looks there is no rate: empty arrays',
-    ('evaluation/foresight.py', 'Foresight._judge', '0.0 -> 1.0'):
+    ('evaluation/alerts/prediction.py', 'Foresight._judge', '0.0 -> 1.0'):
         'where there is no limit a warning begins at infinity',
-    ('evaluation/effort.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
+    ('evaluation/effort/plateaus.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
         'only efforts above ten are held to the largest of the run',
-    ('evaluation/comparison.py', '_sign', 'scale.value[0] > 0.0 -> scale.value[0] >= 0.0'):
+    ('evaluation/effort/model_check.py', '_sign', 'scale.value[0] > 0.0 -> scale.value[0] >= 0.0'):
         'a scale of zero is unknown before',
-    ('evaluation/advice.py', '_loads',
+    ('evaluation/advice/search.py', '_loads',
      'cases[0].payload.mass <= 0.0 -> cases[0].payload.mass < 0.0'):
         'an empty hand gains nothing by being emptied',
 }  # fmt: skip

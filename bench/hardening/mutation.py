@@ -37,7 +37,7 @@ from bench.hardening.mutants import EQUIVALENT, Mutant, mutants, mutated
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'ugv_acceptance'
-FILES = ('model/*.py', 'evaluation/*.py')
+FILES = ('model/*.py', 'evaluation/**/*.py')
 # A part for each job; what a mutant is tried by is chosen among these.
 TESTS = (
     ('test/model', 'test/studies'),

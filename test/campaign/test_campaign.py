@@ -11,9 +11,9 @@ from campaign.fleet import brief, campaign, exit_at_b, said, write_run
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.campaign.batches import batches
+from ugv_acceptance.campaign.carry_out import Place, carry_out
 from ugv_acceptance.campaign.groups import comparison
 from ugv_acceptance.campaign.pool import in_processes, judge_all
-from ugv_acceptance.campaign.run import Place, carry_out
 from ugv_acceptance.campaign.sources import Source, find_sources, sorted_out
 from ugv_acceptance.campaign.work import judge_source
 

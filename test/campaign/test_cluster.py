@@ -9,10 +9,10 @@ import jsonschema
 import pytest
 from campaign.fleet import brief, campaign, exit_at_b, said, write_run
 
+from ugv_acceptance.campaign.carry_out import Place, all_failures, carry_out
 from ugv_acceptance.campaign.cluster import on_cluster
 from ugv_acceptance.campaign.failure_log import Entry
-from ugv_acceptance.campaign.rows import Row
-from ugv_acceptance.campaign.run import Place, all_failures, carry_out
+from ugv_acceptance.campaign.run_table import Row
 from ugv_acceptance.campaign.sources import Source, find_sources
 from ugv_acceptance.campaign.work import Done
 

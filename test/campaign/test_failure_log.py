@@ -7,10 +7,10 @@ import pytest
 from campaign.fleet import brief
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.campaign.carry_out import Place, all_failures, carry_out
 from ugv_acceptance.campaign.failure_log import read_log
 from ugv_acceptance.campaign.failures import Failure
-from ugv_acceptance.campaign.rows import Row
-from ugv_acceptance.campaign.run import Place, all_failures, carry_out
+from ugv_acceptance.campaign.run_table import Row
 from ugv_acceptance.campaign.sources import find_sources
 from ugv_acceptance.campaign.statement import Origin, Question, failure_times, statement
 from ugv_acceptance.report.campaign import campaign_page, closing

@@ -11,7 +11,7 @@ import pytest
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.config.criteria import load_criteria
-from ugv_acceptance.evaluation.criteria import (
+from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
     AlertDemand,
     CriteriaSet,

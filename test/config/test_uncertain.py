@@ -8,7 +8,7 @@ import pytest
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.config.uncertain import sources_from
-from ugv_acceptance.evaluation.uncertainty import Source
+from ugv_acceptance.evaluation.criteria.uncertainty import Source
 
 CONFIG = load()
 

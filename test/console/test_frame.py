@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
 from ugv_acceptance.console.frame import describe_robot, frame_of
-from ugv_acceptance.console.skeleton import figure_of
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
-from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE, WARN
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import STANDING
+from ugv_acceptance.monitoring.drawing import figure_of
 
 SETTINGS = load().settings
 FIGURE = figure_of(SETTINGS.robot)

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.console.playhead import Playhead
+from ugv_acceptance.console.recording import Playhead
 
 
 def test_it_moves_with_time_and_speed() -> None:

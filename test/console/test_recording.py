@@ -15,7 +15,7 @@ from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
 from ugv_acceptance.console.recording import Recording, RecordingFeed, judge_for_console
-from ugv_acceptance.evaluation.alerts import ERROR, OK, STALE
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
 from ugv_acceptance.evaluation.live import LiveEvaluator
 
 SETTINGS = load().settings

@@ -10,10 +10,10 @@ from ugv_acceptance.cli.watch import recording_feed
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.console.frame import frame_of
 from ugv_acceptance.console.recording import RecordingFeed
-from ugv_acceptance.console.skeleton import figure_of
 from ugv_acceptance.console.snapshot import AlertRow, Snapshot
 from ugv_acceptance.console.terminal import Terminal, alerts_of, margins_of, verdict_of
-from ugv_acceptance.evaluation.alerts import ERROR
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR
+from ugv_acceptance.monitoring.drawing import figure_of
 
 CONFIG: Config = load()
 BAG = Path(__file__).parents[2] / 'bags' / 'packbot_fail'

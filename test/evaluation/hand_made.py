@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts import WARN, Alert, Rule
-from ugv_acceptance.evaluation.bounds import Bounds
-from ugv_acceptance.evaluation.criteria import CriteriaSet, Criterion, Demand, Window
-from ugv_acceptance.evaluation.examination import Examination
-from ugv_acceptance.evaluation.imu import ImuRows
-from ugv_acceptance.evaluation.joints import JointRows
-from ugv_acceptance.evaluation.outcomes import Findings
-from ugv_acceptance.evaluation.rows import MarginRows, Pairs
+from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Rule
+from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, Criterion, Demand, Window
+from ugv_acceptance.evaluation.criteria.measurement import Examination
+from ugv_acceptance.evaluation.criteria.uncertainty import Bounds
+from ugv_acceptance.evaluation.criteria.verdict import Findings
+from ugv_acceptance.evaluation.inputs.imu import ImuRows
+from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.settings import Settings
 
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ugv_acceptance.evaluation.imu import ImuRows
-from ugv_acceptance.evaluation.joints import JointRows
-from ugv_acceptance.evaluation.rows import MarginRows, Pairs
+from ugv_acceptance.evaluation.inputs.imu import ImuRows
+from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 
 S = 1_000_000_000
 

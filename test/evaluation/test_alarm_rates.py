@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.alarm_rates import alarm_rates, rates_result
+from ugv_acceptance.evaluation.summary import alarm_rates, rates_result
 
 S = 1_000_000_000
 WINDOW = 600 * S

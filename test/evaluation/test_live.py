@@ -28,7 +28,7 @@ from evaluation.streams import (
 )
 from robots import tracked
 
-from ugv_acceptance.evaluation.alerts import ERROR, OK, WARN, Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, WARN, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings

@@ -29,9 +29,9 @@ from evaluation.streams import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.alerts import Alert
+from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
-from ugv_acceptance.evaluation.wording import describe
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 

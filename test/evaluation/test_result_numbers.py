@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from evaluation.streams import MS, T0, S, settings
 
-from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.evaluation.summary import Extreme, Summary, alert_result, result_of
 

@@ -21,9 +21,9 @@ from evaluation.streams import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ugv_acceptance.evaluation.downsampling import MOST_STRIPS, WIDTH, StripRecorder, Strips
+from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
-from ugv_acceptance.evaluation.rows import MarginRows
-from ugv_acceptance.evaluation.strips import MOST, WIDTH, StripRecorder, Strips
 
 TOLD = settings()
 
@@ -53,7 +53,7 @@ def test_the_worst_of_a_run_is_in_its_strips(messages: list[Message], cuts: list
 
 
 def test_a_long_run_has_wider_columns_and_the_same_worst() -> None:
-    """Columns are merged: fewer than MOST, as wide as each other, no peak of the run lost."""
+    """Columns are merged: at most MOST_STRIPS, as wide as each other, no peak of the run lost."""
     evaluator, recorder = RecordedEvaluator(TOLD), StripRecorder(TOLD, T0)
     evaluator.start(T0)
     worst = np.zeros(2)
@@ -69,7 +69,7 @@ def test_a_long_run_has_wider_columns_and_the_same_worst() -> None:
         recorder.add(rows)
         worst = np.fmax(worst, np.nanmax(np.abs(rows.torque), axis=0))
     strips = recorder.strips()
-    assert MOST / 2 < len(strips.time) <= MOST
+    assert MOST_STRIPS / 2 < len(strips.time) <= MOST_STRIPS
     assert np.diff(strips.time).max() < 2.1 * 2 * WIDTH / 1e9
     np.testing.assert_array_equal(np.nanmax(strips.torque, axis=0), worst.astype(np.float32))
 

@@ -30,12 +30,12 @@ from evaluation.streams import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
+from ugv_acceptance.evaluation.alerts.messages import WORDS, advice, describe
+from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.settings import Delays, Limits, Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
-from ugv_acceptance.evaluation.watch import Watch
-from ugv_acceptance.evaluation.wording import WORDS, advice, describe
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 
 

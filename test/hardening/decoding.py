@@ -9,7 +9,7 @@ from nodes.live_case import FOLDED, NAMES
 
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
 from ugv_acceptance.config import load
-from ugv_acceptance.nodes.session import Session
+from ugv_acceptance.monitoring.session import Session
 
 ZERO = (0.0,) * 3
 LEVEL = (0.0, 0.0, 0.0, 1.0)

@@ -8,10 +8,10 @@ from random import Random
 from evaluation.streams import T0, Imu, Joints, Message, S, give, settings, tilted, upright
 from hardening.outcome import Outcome, memory
 
-from ugv_acceptance.evaluation.alerts import ERROR, Alert
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
-from ugv_acceptance.evaluation.watch import FAILURES
-from ugv_acceptance.nodes.following import Follower
+from ugv_acceptance.monitoring.alarm_tracker import Follower
 
 HZ = 50
 STEP = S // HZ

@@ -6,10 +6,10 @@ from random import Random
 from bag.bag_cases import Message, write_mcap
 from hardening.outcome import Outcome
 
-from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
+from ugv_acceptance.offline.evaluate import judge
 
 MS = 1_000_000
 # Share of messages lost one by one, bursts lost a minute and their length (s), jitter (s).

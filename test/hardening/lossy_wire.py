@@ -11,17 +11,17 @@ from hardening.wire import Ears, child, line_of
 from nodes.live_case import live_nodes, ros_context
 from rclpy.node import Node
 
-from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.watch import FAILURES
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
+from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.type_aliases import Json
 
 PLAYER = 'from ugv_acceptance.cli import main; main()'
-MONITOR = 'from ugv_acceptance.nodes.monitor import main; main()'
+MONITOR = 'from ugv_acceptance.nodes.monitor.node import main; main()'
 # The lane on which the monitor listens: the last, on which everything goes wrong.
 HEARD = len(LANES) - 1
-Json = dict[str, Any]
 Failures = set[tuple[str, str]]
 
 

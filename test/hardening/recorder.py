@@ -14,7 +14,7 @@ from hardening.robot import imu_of, joints_of, say
 
 from ugv_acceptance.bag.writer import BagWriter
 
-# Seconds between flushes: that of nodes/black_box.py and of a run.
+# Seconds between flushes: that of nodes/monitor/black_box.py and of a run.
 FLUSH = 0.25
 TOPICS = ('/joint_states', 'sensor_msgs/msg/JointState'), ('/imu/data', 'sensor_msgs/msg/Imu')
 

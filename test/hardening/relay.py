@@ -23,8 +23,8 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.raw import Offered
-from ugv_acceptance.nodes.player import qos_of
-from ugv_acceptance.nodes.running import end
+from ugv_acceptance.nodes.bag_player import qos_of
+from ugv_acceptance.nodes.executor import end
 
 # Way -> share lost, bursts a minute, their length (s), jitter (s). The first is the control.
 LANES = {'nothing lost': (0.0, 0.0, 0.0, 0.0), **WAYS}

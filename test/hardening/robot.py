@@ -21,8 +21,8 @@ from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
 from ugv_acceptance.bag.raw import Offered
-from ugv_acceptance.nodes.player import qos_of
-from ugv_acceptance.nodes.running import end
+from ugv_acceptance.nodes.bag_player import qos_of
+from ugv_acceptance.nodes.executor import end
 
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 # Folded; the arm stretched out, which with LOAD (kg) in the hand is too much for the shoulder.

@@ -18,12 +18,12 @@ from ugv_acceptance.bag.cdr import (
     joint_state_decoder,
     payload_decoder,
 )
-from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import Bag, Topics, choose_topics, open_bag
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
+from ugv_acceptance.offline.evaluate import judge
 
 
 @dataclass(frozen=True, slots=True)

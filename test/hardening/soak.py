@@ -9,7 +9,7 @@ from hardening.outcome import Outcome
 from hardening.robot import Sent, Task
 from hardening.wire import NS, Ears, Heard, line_of, listening, memory_of, monitor, robot
 
-from ugv_acceptance.evaluation.watch import FAILURES
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
 
 JOINTS_HZ, IMU_HZ = 200.0, 400.0
 # What goes wrong -> how long (s). A jolt is shorter than the delay of a torque alert.

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from evaluation.streams import MS, REST, T0, Imu, Joints, give, settings, tilted, upright
 from hardening.outcome import Outcome
 
+from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
-from ugv_acceptance.evaluation.wording import advice
 
 LEAN = tilted(0.1, 0.05)
 GOOD_JOINTS, GOOD_IMU = Joints(0), Imu(0, LEAN, acceleration=upright(LEAN))

@@ -19,11 +19,11 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.raw import Offered
-from ugv_acceptance.nodes.outputs import LATCHED
-from ugv_acceptance.nodes.player import qos_of
+from ugv_acceptance.nodes.bag_player import qos_of
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
 HERE = Path(__file__).parents[1]
-MONITOR = 'from ugv_acceptance.nodes.monitor import main; main()'
+MONITOR = 'from ugv_acceptance.nodes.monitor.node import main; main()'
 NS = 1_000_000_000
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ugv_acceptance.model.attitude import (
@@ -19,8 +18,7 @@ from ugv_acceptance.model.attitude import (
     up_from_orientation,
 )
 from ugv_acceptance.model.robot import IDENTITY, Matrix
-
-Floats = NDArray[np.float64]
+from ugv_acceptance.type_aliases import Floats
 
 component = st.floats(-1.0, 1.0)
 quaternions = st.tuples(component, component, component, component)

@@ -11,12 +11,12 @@ from robots import DOWN, at, places, random_robot, tracked
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.attitude import is_rotation
-from ugv_acceptance.model.blocks import BLOCK, Floats, in_blocks
+from ugv_acceptance.model.blocks import BLOCK, in_blocks
 from ugv_acceptance.model.expressions import Scalar
 from ugv_acceptance.model.kernels import compile_kernel
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Matrix, Payload, Robot, Vector
-from ugv_acceptance.model.rows import ALL, groups, inner, pick
+from ugv_acceptance.model.row_selection import ALL, groups, inner, pick
 from ugv_acceptance.model.stability import (
     FREE_FALL,
     INVERTED,
@@ -35,6 +35,7 @@ from ugv_acceptance.model.statics import (
     utilisation,
 )
 from ugv_acceptance.model.support import support_of
+from ugv_acceptance.type_aliases import Floats
 
 FEET: list[Vector] = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
 

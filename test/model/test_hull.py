@@ -4,7 +4,6 @@ from itertools import combinations, permutations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from ugv_acceptance.model.hull import (
@@ -23,8 +22,8 @@ from ugv_acceptance.model.hull import (
     triples,
     triples_under,
 )
+from ugv_acceptance.type_aliases import Floats
 
-Floats = NDArray[np.float64]
 SQUARE: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
 SLACK = 1e-12  # twice the area (m2) of a triangle that counts as a line
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from robots import DOWN, centre, feet, random_robot, tracked
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -31,8 +30,8 @@ from ugv_acceptance.model.stability import (
     tip_angles_of,
 )
 from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.type_aliases import Floats
 
-Floats = NDArray[np.float64]
 FLAT = [0.0, 0.5, -0.5, 2.5]  # the tracked robot, flippers up
 HIGH = [0.3, 1.2, -0.2, 2.5]
 

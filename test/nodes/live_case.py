@@ -17,10 +17,10 @@ from rclpy.utilities import ok, try_shutdown
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
-from ugv_acceptance.nodes.monitor import Monitor
-from ugv_acceptance.nodes.outputs import LATCHED
-from ugv_acceptance.nodes.running import end
-from ugv_acceptance.nodes.status import Status
+from ugv_acceptance.monitoring.diagnostics import Status
+from ugv_acceptance.nodes.executor import end
+from ugv_acceptance.nodes.monitor.node import Monitor
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 FOLDED = (0.0, 2.0, -2.5, 2.0)

@@ -15,8 +15,8 @@ from rosbags.highlevel import AnyReader
 from ugv_acceptance.bag.encode import inertia_cdr
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import open_bag
-from ugv_acceptance.evaluation.alerts import ERROR, WARN, Alert, Rule
-from ugv_acceptance.nodes.black_box import AFTER, BEFORE, BlackBox, Channel
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
+from ugv_acceptance.nodes.monitor.black_box import AFTER, BEFORE, BlackBox, Channel
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -224,7 +224,7 @@ def test_a_process_killed_after_the_alert_leaves_the_recording(tmp_path: Path, a
 
 MONITOR = """
 import sys
-from ugv_acceptance.nodes.monitor import main
+from ugv_acceptance.nodes.monitor.node import main
 main(['--ros-args', '-p', f'black_box:={sys.argv[1]}'])
 """
 

@@ -10,9 +10,9 @@ from nodes.live_case import FOLDED, Driver, Live, imu, joints
 from ugv_acceptance.bag.encode import joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.console.frame import Plain, frame_of
-from ugv_acceptance.console.skeleton import figure_of
-from ugv_acceptance.nodes.console import ConsoleNode
-from ugv_acceptance.nodes.session import INPUTS, InputCount
+from ugv_acceptance.monitoring.drawing import figure_of
+from ugv_acceptance.monitoring.session import INPUTS, InputCount
+from ugv_acceptance.nodes.console_feed import ConsoleNode
 
 CONFIG = load()
 SECOND = 1_000_000_000

@@ -16,8 +16,8 @@ from sensor_msgs.msg import JointState
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
-from ugv_acceptance.nodes.examination import FAIL, OK, WARN, Finding, examine
-from ugv_acceptance.nodes.listening import Heard, Surroundings
+from ugv_acceptance.nodes.doctor.checks import FAIL, OK, WARN, Finding, examine
+from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
 CONFIG = load()
 MS = 1_000_000

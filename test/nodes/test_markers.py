@@ -7,9 +7,16 @@ from visualization_msgs.msg import MarkerArray
 
 from ugv_acceptance.bag.encode_views import Shape
 from ugv_acceptance.config import load
-from ugv_acceptance.console.shapes import GREEN, LIFETIME, NAMES, RED, shapes_of
-from ugv_acceptance.console.skeleton import figure_of, skeleton_of
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.monitoring.drawing import (
+    GREEN,
+    LIFETIME,
+    NAMES,
+    RED,
+    figure_of,
+    shapes_of,
+    skeleton_of,
+)
 
 SETTINGS = load().settings
 STRETCHED = (0.0, 0.3, 0.2, 2.0)

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.reader import open_bag
-from ugv_acceptance.nodes.outputs import LATCHED
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
 STRETCHED = (0.0, 0.0, 0.0, 2.0)
 
@@ -306,8 +306,8 @@ def test_it_ends_cleanly_when_asked(number: signal.Signals) -> None:
     """SIGINT, SIGTERM, and a second one meanwhile: exit code 0 and no traceback."""
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     code = (
-        'import sys; from ugv_acceptance.nodes.monitor import Monitor\n'
-        'from ugv_acceptance.nodes.running import run\n'
+        'import sys; from ugv_acceptance.nodes.monitor.node import Monitor\n'
+        'from ugv_acceptance.nodes.executor import run\n'
         'sys.exit(run(lambda: Monitor(lambda *_: print("up", flush=True))))'
     )
     process = subprocess.Popen(

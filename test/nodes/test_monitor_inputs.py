@@ -14,8 +14,8 @@ from sensor_msgs.msg import Imu
 
 from ugv_acceptance.bag.encode import joint_state_cdr
 from ugv_acceptance.bag.raw import Offered
-from ugv_acceptance.nodes.player import qos_of
-from ugv_acceptance.nodes.session import INPUTS, Session
+from ugv_acceptance.monitoring.session import INPUTS, Session
+from ugv_acceptance.nodes.bag_player import qos_of
 
 
 def test_a_monitor_with_both_inputs_says_ok(live: Live) -> None:

@@ -26,7 +26,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ugv_acceptance.nodes.child import child
+from ugv_acceptance.nodes.subprocess_node import child
 
 PROMPT = 'press Enter when it is done'
 
@@ -108,7 +108,7 @@ class Terminal:
 def operated(live: Live, tmp_path: Path, *steps: dict[str, Any]) -> Iterator[tuple[Terminal, Arm]]:
     """Start the robot and the verb for a plan of these steps."""
     home = ', '.join(str(math.radians(HOME[f'{n}_joint'])) for n in JOINTS)
-    with child('simulator', ['--ros-args', '-p', f'home:=[{home}]']):
+    with child('packbot_simulator', ['--ros-args', '-p', f'home:=[{home}]']):
         arm = Arm(live)
         terminal = Terminal(plan_file(tmp_path, *steps), tmp_path / 'out')
         try:

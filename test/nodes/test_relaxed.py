@@ -17,9 +17,9 @@ from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.cli.evaluate import judge_recording
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.freshness import Freshness
-from ugv_acceptance.evaluation.permitted import RANGES, Permitted
-from ugv_acceptance.nodes.parameters import knobs_of
+from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted
+from ugv_acceptance.nodes.monitor.parameters import knobs_of
 
 AT = '/acceptance_monitor'
 WHY = 'bench test, robot tied down'

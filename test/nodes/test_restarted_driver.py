@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from nodes.live_case import Driver, Live, session_of
 
-from ugv_acceptance.nodes.monitor import Monitor
-from ugv_acceptance.nodes.voices import OUTLIVED, Publisher, Voices
+from ugv_acceptance.monitoring.publisher_identity import OUTLIVED, Publisher, Voices
+from ugv_acceptance.nodes.monitor.node import Monitor
 
 PUBLISHER = """
 import sys, time

@@ -19,12 +19,12 @@ from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.bag.reader import open_bag
-from ugv_acceptance.cli import running_plan
+from ugv_acceptance.cli import run_session as running_plan
 from ugv_acceptance.config import load
-from ugv_acceptance.nodes.guard import Guard
+from ugv_acceptance.nodes.runner_world import Guard
 from ugv_acceptance.plan.plan import Plan, plan_text
-from ugv_acceptance.run.hands import OPERATOR, ROBOT
-from ugv_acceptance.run.verdicts import seen_in
+from ugv_acceptance.run.actuation import OPERATOR, ROBOT
+from ugv_acceptance.run.step_verdict import seen_in
 
 HOME = {'turret_joint': 0, 'shoulder_joint': 95, 'elbow_joint': 140, 'flipper_joint': 180}
 # A start on a busy machine, and a step.

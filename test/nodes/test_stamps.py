@@ -18,7 +18,7 @@ from visualization_msgs.msg import (
     MarkerArray,
 )
 
-from ugv_acceptance.nodes.stamps import NS, Stamps, restamped, stamp_of, stamped
+from ugv_acceptance.nodes.replay_stamps import NS, Stamps, restamped, stamp_of, stamped
 
 MS = 1_000_000
 LOG, NOW, SIM = 1_700_000_000 * NS, 1_800_000_000 * NS, 12_300 * MS

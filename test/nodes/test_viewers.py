@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from ugv_acceptance.config import load
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.nodes.player import message_type
+from ugv_acceptance.nodes.bag_player import message_type
 
 JOINTS = load().settings.robot.joint_names
 # Panels both viewers have, by the name in their code.

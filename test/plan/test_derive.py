@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ugv_acceptance.config import Config, load
-from ugv_acceptance.evaluation.wording import WORDS
+from ugv_acceptance.evaluation.alerts.messages import WORDS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
@@ -21,7 +21,7 @@ from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.plan.ways import Routes, safe_way
-from ugv_acceptance.report.numbers import time_text
+from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 CONFIG: Config = load()

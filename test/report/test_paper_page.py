@@ -12,11 +12,11 @@ from robots import paper_arm
 from typer.testing import CliRunner
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.kinds import PAPER
+from ugv_acceptance.cli.output_kinds import PAPER
 from ugv_acceptance.cli.paper import paper
-from ugv_acceptance.report.arm_figures import disagreement, paper_grid, safe_fractions
-from ugv_acceptance.report.paper import Subject, rollover
-from ugv_acceptance.report.paper_numbers import summary, table_1_rows, table_2_rows
+from ugv_acceptance.report.paper.arm_figures import disagreement, paper_grid, safe_fractions
+from ugv_acceptance.report.paper.numbers import summary, table_1_rows, table_2_rows
+from ugv_acceptance.report.paper.sections import Subject, rollover
 
 app = typer.Typer()
 app.command('paper')(paper)

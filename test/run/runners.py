@@ -7,12 +7,12 @@ from typing import Any
 
 from ugv_acceptance.config import load
 from ugv_acceptance.plan.plan import Plan
+from ugv_acceptance.run.actuation import SIM, Ask, Hands
 from ugv_acceptance.run.fault_text import fault_from
 from ugv_acceptance.run.folder import open_folder
-from ugv_acceptance.run.hands import SIM, Ask, Hands
-from ugv_acceptance.run.offline import Offline
 from ugv_acceptance.run.runner import Runner
-from ugv_acceptance.run.virtual import VirtualRobot
+from ugv_acceptance.run.simulated_robot import VirtualRobot
+from ugv_acceptance.run.simulated_world import Offline
 
 CONFIG = load()
 HOME = {

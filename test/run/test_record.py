@@ -10,9 +10,9 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from ugv_acceptance import BadBag, BadConfig
-from ugv_acceptance.bag.judge import judge
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
+from ugv_acceptance.offline.evaluate import judge
 from ugv_acceptance.run.catalogue import case_of, names
 from ugv_acceptance.run.fault_text import fault_from
 from ugv_acceptance.run.record import lasting, record

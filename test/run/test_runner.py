@@ -9,9 +9,9 @@ import numpy as np
 from run.runners import CONFIG, HOME, NEAR, plan_of, results, runner_of
 
 from ugv_acceptance.bag.reader import open_bag
-from ugv_acceptance.run.hands import OPERATOR
-from ugv_acceptance.run.offline import Offline
-from ugv_acceptance.run.verdicts import seen_in
+from ugv_acceptance.run.actuation import OPERATOR
+from ugv_acceptance.run.simulated_world import Offline
+from ugv_acceptance.run.step_verdict import seen_in
 
 TIPS: dict[str, Any] = {
     'where': 'simulation', 'action': 'tip', 'payload_kg': 2.0,

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
-from ugv_acceptance.simulation.run import run
 from ugv_acceptance.simulation.scenarios import SCENARIOS
+from ugv_acceptance.simulation.stretches import run
 
 RUNS = ('packbot_pass', 'packbot_fail', 'packbot_gap')
 SECOND = 1_000_000_000

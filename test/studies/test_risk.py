@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from robots import tracked
 from scipy import stats
 
+from bench.quadrature import saturation_probability
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Link, Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import inverse_dynamics
 from ugv_acceptance.studies import risk as risk_module
 from ugv_acceptance.studies.planar import PAPER, arm_robot
-from ugv_acceptance.studies.quadrature import saturation_probability
 from ugv_acceptance.studies.risk import Study, failures_of, run
 from ugv_acceptance.studies.risk_kernel import known_names, risk_kernel
 from ugv_acceptance.studies.spread import clopper_pearson, normal, together, uniform

@@ -18,11 +18,11 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
 from ugv_acceptance import BadBag, __version__
+from ugv_acceptance.bag.atomic_files import is_stream, unwritable, whole
 from ugv_acceptance.bag.mcap_writer import McapWriter
 from ugv_acceptance.bag.raw import Logged, messages_of
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
-from ugv_acceptance.bag.result import is_stream, unwritable, whole
 from ugv_acceptance.bag.writer import definition_of
 
 CHUNK = 1 << 20

@@ -17,14 +17,8 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, PAYLOAD, Decoder, Kind
 from ugv_acceptance.bag.gather import HEAD, LEAD, Bytes, Gather, Offsets, Span
 from ugv_acceptance.bag.layout import Layout, Wire
-from ugv_acceptance.evaluation.samples import (
-    Batch,
-    Floats,
-    ImuColumns,
-    JointStateColumns,
-    PayloadColumns,
-    Times,
-)
+from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
+from ugv_acceptance.type_aliases import Floats, Times
 
 Columns: TypeAlias = JointStateColumns | ImuColumns | PayloadColumns
 AnyColumns = TypeVar('AnyColumns', bound=Columns)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.bag.layout import Layout
-from ugv_acceptance.evaluation.samples import Floats, Times
+from ugv_acceptance.type_aliases import Floats, Times
 
 Bytes: TypeAlias = NDArray[np.uint8]
 Offsets: TypeAlias = NDArray[np.int64]

@@ -11,9 +11,9 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ugv_acceptance import BadBag, BadSample, __version__
+from ugv_acceptance.bag.atomic_files import write_text
 from ugv_acceptance.bag.mcap_writer import Compression, McapWriter
 from ugv_acceptance.bag.metadata import NAME
-from ugv_acceptance.bag.result import write_text
 
 _NS = 1_000_000_000
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}

@@ -18,8 +18,8 @@ from typing import Any
 
 from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.campaign.batches import AHEAD, DIED, Runs, Work, batches, each
+from ugv_acceptance.campaign.not_judged import words
 from ugv_acceptance.campaign.sources import Source
-from ugv_acceptance.campaign.trouble import words
 from ugv_acceptance.campaign.work import Done
 
 # How long (s) a scheduler or workers that are gone are waited for.

@@ -15,9 +15,8 @@ from ugv_acceptance.campaign.failure_log import (
     UNKNOWN,
     Entry,
 )
-from ugv_acceptance.evaluation.taxonomy import FIRST_SUSPECT, FailureSource
-
-Json = dict[str, Any]
+from ugv_acceptance.evaluation.alerts.messages import FIRST_SUSPECT, FailureSource
+from ugv_acceptance.type_aliases import Json
 
 # Levels at which an alert counts as a failure; a warning does not.
 CRITICAL = frozenset({'ERROR', 'STALE'})

@@ -4,14 +4,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from fnmatch import fnmatchcase
-from typing import Any
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.campaign.failures import Failure
-from ugv_acceptance.campaign.rows import Row
+from ugv_acceptance.campaign.run_table import Row
 from ugv_acceptance.studies.two_groups import Compared, compare_mtbf, compare_success
-
-Json = dict[str, Any]
+from ugv_acceptance.type_aliases import Json
 
 
 def comparison(

@@ -16,7 +16,7 @@ from typing import Any
 from ugv_acceptance import AcceptanceError, BadBag, pip_install
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.metadata import SUFFIXES, numbered
-from ugv_acceptance.campaign.trouble import words
+from ugv_acceptance.campaign.not_judged import words
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -9,12 +9,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import accumulate
-from typing import Any
 
 from ugv_acceptance import __version__
 from ugv_acceptance.campaign.failures import Failure, counts
 from ugv_acceptance.campaign.groups import comparison
-from ugv_acceptance.campaign.rows import NOT_JUDGED, VERDICTS, Row
+from ugv_acceptance.campaign.run_table import NOT_JUDGED, VERDICTS, Row
 from ugv_acceptance.studies.reliability import (
     Bounded,
     availability,
@@ -25,8 +24,7 @@ from ugv_acceptance.studies.reliability import (
     proportion,
     trend,
 )
-
-Json = dict[str, Any]
+from ugv_acceptance.type_aliases import Json
 
 # Version of the layout; changes where a reader of campaigns must change.
 CAMPAIGN_VERSION = 2

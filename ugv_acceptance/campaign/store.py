@@ -2,12 +2,10 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.result import unwritable, write_text
-
-Json = dict[str, Any]
+from ugv_acceptance.bag.atomic_files import unwritable, write_text
+from ugv_acceptance.type_aliases import Json
 
 RUNS = 'runs'
 # Hexadecimal digits of a key.

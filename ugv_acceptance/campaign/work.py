@@ -8,17 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag, __version__
-from ugv_acceptance.bag.judge import RESULT_VERSION, Terms, judge
+from ugv_acceptance.bag.atomic_files import json_text
 from ugv_acceptance.bag.reader import Bag, choose_topics, open_bag
-from ugv_acceptance.bag.result import json_text
-from ugv_acceptance.campaign.rows import Row, row_of
+from ugv_acceptance.campaign.not_judged import is_of_the_machine
+from ugv_acceptance.campaign.run_table import Row, row_of
 from ugv_acceptance.campaign.sources import Source, local_paths
-from ugv_acceptance.campaign.trouble import is_of_the_machine
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.uncertain import sources_from
-from ugv_acceptance.evaluation.criteria import CriteriaSet
-
-Json = dict[str, Any]
+from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
+from ugv_acceptance.offline.evaluate import RESULT_VERSION, Terms, judge
+from ugv_acceptance.type_aliases import Json
 
 
 @dataclass(frozen=True, slots=True)

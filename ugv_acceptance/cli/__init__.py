@@ -11,7 +11,7 @@ from importlib import import_module
 import typer
 
 from ugv_acceptance import AcceptanceError, __version__
-from ugv_acceptance.cli.ending import ended_by_signals
+from ugv_acceptance.cli.termination import ended_by_signals
 
 PASS, FAIL, BAD_INPUT, INCONCLUSIVE = range(4)
 # A disk that is full, a quota or a limit that is reached, a file system that is read-only.

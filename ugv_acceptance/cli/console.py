@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.ros_arguments import CONTEXT
+from ugv_acceptance.cli.options import CONTEXT
 from ugv_acceptance.cli.watch import Recording, RobotFile, Urdf, feed_of, need
 
 __all__ = ['CONTEXT', 'console']

@@ -1,9 +1,145 @@
 """`ugv-acceptance demo`: a recorded run through real DDS into the monitor, then its verdict."""
 
+import os
+import random
+import socket
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.markup import escape
+
+from ugv_acceptance import BadBag
+
+if TYPE_CHECKING:
+    from ugv_acceptance.cli.monitor import Raised
+
+
+BAG = 'packbot_fail'
+WORKED, BROKEN = 0, 1
+
+
+def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
+    """Run the demo, with the console's `page` or without; return its exit code.
+
+    That is 0 where live and recording were both judged.
+    """
+    from ugv_acceptance.cli.evaluate import judge_recording
+    from ugv_acceptance.cli.result_text import print_result
+    from ugv_acceptance.config import load
+
+    console = Console(highlight=False)
+    path = find(bag)
+    domain = free_domain()
+    os.environ['ROS_DOMAIN_ID'] = str(domain)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    console.rule('1. Live: a recorded run, published through DDS, watched by the monitor')
+    console.print(
+        f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}', soft_wrap=True
+    )
+    alerts, played = live(path, rate, console, page=page)
+    console.rule('2. The same run from the recording')
+    result = judge_recording([path], load(), compare_effort=False)
+    print_result(result)
+    return conclude(console, alerts, played, result)
+
+
+def free_domain() -> int:
+    """Return a ROS domain on whose discovery port no program of this machine listens."""
+    candidates = random.SystemRandom().sample(range(1, 102), 101)
+    for domain in candidates:
+        with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(('', 7400 + 250 * domain))
+            return domain
+    return candidates[0]
+
+
+def find(bag: Path | None) -> Path:
+    """Return the recording to play: the one given, or the one that ships."""
+    if bag is not None:
+        return bag
+    from ugv_acceptance.config import load
+
+    # It lies beside the configuration that ships.
+    place = load().path.parent.parent / 'bags' / BAG
+    if not place.is_dir():
+        raise BadBag(f'{place}: expected the recording that ships, found none')
+    return place
+
+
+def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Raised', bool]:
+    """Play the recording into the monitor; return its alerts and whether the player succeeded."""
+    from ugv_acceptance.cli.monitor import watch
+
+    play = ('replay', str(path), '--rate', str(rate))
+    with ExitStack() as stack:
+        if page:
+            announce(stack.enter_context(verb('console', '--port', '0')), console)
+        players: list[subprocess.Popen[str]] = []
+
+        def over() -> bool:
+            # Asked for the first time when the monitor listens: no message comes before it.
+            if not players:
+                players.append(stack.enter_context(verb(*play)))
+            return players[0].poll() is not None
+
+        alerts = watch(None, None, [], console, 2.0, over)
+        return alerts, bool(players) and players[0].poll() == 0
+
+
+@contextmanager
+def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
+    """Run a verb in a process that ends when this one does; its output is to be read.
+
+    It has a session of its own: a Ctrl-C is for this process, which ends it.
+    """
+    # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    code = 'from ugv_acceptance.nodes import child; child.end_with_parent()'
+    code += '; from ugv_acceptance.cli import main; main()'
+    command, pipe = [sys.executable, '-u', '-c', code, *words], subprocess.PIPE
+    with subprocess.Popen(  # noqa: S603 - our own command
+        command, env=environment, stdin=pipe, stdout=pipe, text=True, start_new_session=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
+def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
+    """Say where the console is; where it cannot be had, it said why, and the demo goes on."""
+    said = next(iter(process.stdout or ()), '').split()
+    if len(said) > 2:
+        text = f'Open {said[2]} in a browser on this machine to see it as an operator does.'
+        console.print(text, soft_wrap=True)
+
+
+def conclude(console: Console, seen: 'Raised', played: bool, result: dict[str, Any]) -> int:
+    """Say what came of it."""
+    console.rule('3. What came of it')
+    recorded = Counter((a['code'], a['subject'], a['level']) for a in result['alerts'])
+    both, only_live, only_bag = seen & recorded, seen - recorded, recorded - seen
+    console.print(f'{both.total()} alerts came both live and from the recording.')
+    for name, extra in (('live', only_live), ('from the recording', only_bag)):
+        for code, subject, level in extra:
+            why = ' (before it began and after it ended)' if code == 'INPUT_STALE' else ''
+            console.print(f'only {name}: {level} {code} {subject}{why}')
+    verdict = result['verdict']
+    console.print(f'The verdict on the recording is [bold]{verdict}[/].')
+    if verdict == 'FAIL' and Path(result['bag']['path'][0]).name.startswith(BAG):
+        console.print('FAIL is the right verdict: this run was made to break the limits.')
+    if not played or not seen:
+        console.print('[bold red]The live part did not work:[/] try `ugv-acceptance doctor`.')
+        return BROKEN
+    console.print('Everything worked.')
+    return WORKED
 
 
 def demo(
@@ -26,6 +162,6 @@ def demo(
       ugv-acceptance demo
       ugv-acceptance demo --bag bags/packbot_pass --rate 2 --no-console
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.demonstration import demonstrate
+    from ugv_acceptance.cli.demo import demonstrate
 
     raise typer.Exit(demonstrate(bag, rate, page=console))

@@ -80,10 +80,10 @@ def evaluate(
       ugv-acceptance evaluate run --criteria site.yaml --json r.json --report r.html --junit r.xml
       ugv-acceptance evaluate run --annotate run_judged.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.bag.result import write_json
-    from ugv_acceptance.cli import kinds
+    from ugv_acceptance.bag.atomic_files import write_json
+    from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.evidence import Papers, write_junit
-    from ugv_acceptance.cli.summary import print_result, while_read
+    from ugv_acceptance.cli.result_text import print_result, while_read
     from ugv_acceptance.config import load
     from ugv_acceptance.config.identity import file_of, identity_from
 

@@ -3,22 +3,21 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from ugv_acceptance import AcceptanceError, __version__
+from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
-    from ugv_acceptance.bag.judge import Judgement
     from ugv_acceptance.bag.reader import Bag, Topics
     from ugv_acceptance.cli.outputs import Output
     from ugv_acceptance.config import Config
-    from ugv_acceptance.evaluation.criteria import CriteriaSet
+    from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
+    from ugv_acceptance.evaluation.downsampling import StripRecorder
     from ugv_acceptance.evaluation.settings import Settings
-    from ugv_acceptance.evaluation.strips import StripRecorder
-
-Json = dict[str, Any]
+    from ugv_acceptance.offline.evaluate import Judgement
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +39,7 @@ class Papers:
 
     def outputs(self, recordings: int) -> list['Output']:
         """Return the files to write. AcceptanceError where one is of one run, but asked of more."""
-        from ugv_acceptance.cli import kinds
+        from ugv_acceptance.cli import output_kinds as kinds
         from ugv_acceptance.cli.outputs import Output
 
         found = [
@@ -61,15 +60,15 @@ def judge_files(
     paths: list[Path], config: 'Config', papers: Papers, *, compare_effort: bool = False
 ) -> tuple[Json, 'StripRecorder | None']:
     """Return the result of one recording, and its strips where a report is asked for."""
-    from ugv_acceptance.bag.acknowledgements import add_acknowledgements
-    from ugv_acceptance.bag.judge import Terms, judge
+    from ugv_acceptance.bag.atomic_files import CsvSink
     from ugv_acceptance.bag.reader import choose_topics, open_bag
-    from ugv_acceptance.bag.result import CsvSink
-    from ugv_acceptance.bag.table import ParquetSink
-    from ugv_acceptance.cli.summary import progress_of
+    from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.config.uncertain import sources_from
-    from ugv_acceptance.evaluation.effort import EffortComparison
-    from ugv_acceptance.evaluation.strips import StripRecorder
+    from ugv_acceptance.evaluation.downsampling import StripRecorder
+    from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
+    from ugv_acceptance.offline.acknowledgements import add_acknowledgements
+    from ugv_acceptance.offline.evaluate import Terms, judge
+    from ugv_acceptance.offline.parquet import ParquetSink
 
     settings, wanted = config.settings, config.topics
     terms = Terms(
@@ -105,8 +104,8 @@ def annotate(
 ) -> None:
     """Write the recording with its judgement beside it, for viewers."""
     from ugv_acceptance.bag.annotated import write_annotated
-    from ugv_acceptance.cli.summary import progress_of
-    from ugv_acceptance.nodes.annotation import Annotation
+    from ugv_acceptance.cli.result_text import progress_of
+    from ugv_acceptance.offline.annotation import Annotation
 
     robot = config.serial or config.name
     told = Annotation(bag, topics, config.settings, judgement, robot)
@@ -150,7 +149,7 @@ def write_papers(
 ) -> None:
     """Write the report, the PDF and the proposed criteria of one recording."""
     if recorder is not None:
-        from ugv_acceptance.bag.result import write_text
+        from ugv_acceptance.bag.atomic_files import write_text
         from ugv_acceptance.config.identity import PARTS
         from ugv_acceptance.report.acceptance import acceptance_page
 
@@ -165,9 +164,9 @@ def write_papers(
 
 def _propose(path: Path, result: Json) -> None:
     """Write criteria that a good run meets; of any other say so and go on: its verdict stands."""
-    from ugv_acceptance.bag.result import write_text
+    from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.config.seal import sealed
-    from ugv_acceptance.evaluation.proposal import proposed_criteria
+    from ugv_acceptance.evaluation.criteria.proposal import proposed_criteria
 
     if result['verdict'] == 'PASS':
         write_text(path, sealed(proposed_criteria(result, result['robot']['name'])))
@@ -178,8 +177,8 @@ def _propose(path: Path, result: Json) -> None:
 
 def _write_pdf(path: Path, html: str) -> None:
     """Write the PDF; without WeasyPrint say so and go on: the verdict does not depend on it."""
-    from ugv_acceptance.bag.result import write_bytes
-    from ugv_acceptance.report.pdf import pdf_of
+    from ugv_acceptance.bag.atomic_files import write_bytes
+    from ugv_acceptance.report.acceptance import pdf_of
 
     try:
         write_bytes(path, pdf_of(html))
@@ -189,7 +188,7 @@ def _write_pdf(path: Path, html: str) -> None:
 
 def write_junit(path: Path, results: list[Json]) -> None:
     """Write the JUnit XML of all recordings."""
-    from ugv_acceptance.bag.result import write_bytes
+    from ugv_acceptance.bag.atomic_files import write_bytes
     from ugv_acceptance.report.junit import junit_of
 
     write_bytes(path, junit_of(results))

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ros_arguments
 
 __all__ = ['CONTEXT', 'foxglove']
 
@@ -22,8 +22,8 @@ def foxglove(
       ugv-acceptance foxglove        # then open ws://localhost:8765 and layouts/foxglove.json
       ssh -L 8765:localhost:8765 robot ugv-acceptance foxglove
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.nodes.foxglove import Bridge
-    from ugv_acceptance.nodes.running import end, ros, spin
+    from ugv_acceptance.nodes.executor import end, ros, spin
+    from ugv_acceptance.nodes.foxglove_bridge import Bridge
 
     with ros(ros_arguments(context)) as stop:
         bridge = Bridge(port)

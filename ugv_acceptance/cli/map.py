@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+from ugv_acceptance.type_aliases import Floats
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
-    from ugv_acceptance.model.blocks import Floats
     from ugv_acceptance.report.map_data import Scene
 
 
@@ -54,8 +54,8 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
       ugv-acceptance map rollover --x flipper_joint=-30deg:180deg --y elbow_joint --out tip.csv
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.bag.result import whole
-    from ugv_acceptance.cli import kinds
+    from ugv_acceptance.bag.atomic_files import whole
+    from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
     from ugv_acceptance.config import load
@@ -87,8 +87,8 @@ def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':
     import numpy as np
 
     from ugv_acceptance import BadBag
-    from ugv_acceptance.bag.judge import judge
     from ugv_acceptance.bag.reader import choose_topics, open_bag
+    from ugv_acceptance.offline.evaluate import judge
 
     bag = open_bag(paths)
     names = loaded.topics

@@ -10,12 +10,12 @@ from ugv_acceptance.cli.robot_description import payload_from, posture_from
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import parse, quantity
 from ugv_acceptance.evaluation.settings import Limits
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.studies.bilinear import Grid
 from ugv_acceptance.studies.maps import Levels
 from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of
+from ugv_acceptance.type_aliases import Floats
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,162 @@
 """`ugv-acceptance model`: what the tool believes the robot is, and its margins in one posture."""
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ugv_acceptance.report.format import number_text
+
+Values = dict[str, Any]
+
+# A payload of so many times the robot's own mass is not a number anybody plans with.
+_MANY = 10.0
+
+
+def print_tables(description: Values) -> None:
+    """Print what `describe` returned."""
+    console = Console(highlight=False, soft_wrap=False)
+    _head(console, description)
+    console.print(_links(description))
+    console.print(_joints(description))
+    _print_payload(console, description)
+    console.print(_contacts(description))
+    _print_stability(console, description)
+    for text in description['warnings']:
+        console.print(f'[yellow]warning:[/] {escape(text)}', soft_wrap=True)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify='left', box=box.SIMPLE_HEAD, pad_edge=False)
+    for k, column in enumerate(columns):
+        table.add_column(column, justify='left' if k == 0 else 'right', overflow='fold')
+    return table
+
+
+def _head(console: Console, d: Values) -> None:
+    serial = d['robot']['serial']
+    console.print(
+        f'[bold]{escape(d["robot"]["name"])}[/]' + (f', serial {serial}' if serial else '')
+    )
+    console.print(f'config {escape(d["config"]["path"])}', soft_wrap=True)
+    console.print(f'urdf   {escape(d["config"]["urdf"])}', soft_wrap=True)
+    console.print(f'sha256 {d["config"]["sha256"][:16]}\n')
+
+
+def _links(d: Values) -> Table:
+    table = _table('Links (centre of gravity in link axes)', 'link', 'kg', 'x m', 'y m', 'z m')
+    for link in d['links']:
+        if link['mass_kg'] > 0.0:
+            table.add_row(escape(link['name']), *_numbers([link['mass_kg']]), *_xyz(link))
+    bare = sum(link['mass_kg'] == 0.0 for link in d['links'])
+    if bare:
+        table.caption, table.caption_justify = f'and {bare} without mass', 'left'
+    return table
+
+
+def _joints(d: Values) -> Table:
+    roll, pitch = d['tilt']['roll_deg'], d['tilt']['pitch_deg']
+    table = _table(
+        f'Joints in this posture (base: roll {roll:g} deg, pitch {pitch:g} deg)',
+        *('joint', 'range', 'at', 'torque', 'limit', 'used'),
+    )
+    for joint in d['joints']:
+        table.add_row(escape(joint['name']), _range(joint), _place(joint), *_torque(joint))
+    return table
+
+
+def _torque(joint: Values) -> tuple[str, str, str]:
+    if joint['topic_name'] is None:
+        return 'held', '', ''
+    unit, limit, used = joint['torque_unit'], joint['limit'], joint['utilisation']
+    torque = f'{number_text(joint["torque"])} {unit}'
+    if limit is None:
+        return torque, 'not judged', ''
+    colour = 'red' if used > 1.0 else 'green'
+    return torque, f'{limit:g} {unit}', f'[{colour}]{_share(used)}[/]'
+
+
+def _share(used: float) -> str:
+    return f'{used:.0%}' if used < 100.0 else f'{number_text(used, 0)} x'
+
+
+def _range(joint: Values) -> str:
+    if joint['lower'] is None:
+        return 'any'
+    scale, unit = _unit(joint)
+    return f'{joint["lower"] * scale:g} .. {joint["upper"] * scale:g} {unit}'
+
+
+def _place(joint: Values) -> str:
+    scale, unit = _unit(joint)
+    return f'{joint["position"] * scale:.4g} {unit}'
+
+
+def _unit(joint: Values) -> tuple[float, str]:
+    return (1.0, 'm') if joint['unit'] == 'm' else (180.0 / math.pi, 'deg')
+
+
+def _print_payload(console: Console, d: Values) -> None:
+    load = d['payload']
+    if load['link'] is None:
+        console.print('Payload: no payload link is configured\n')
+        return
+    console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}:\n  ', end='')
+    if not load['holds_itself']:
+        console.print('[red]the arm is too heavy for its limits without one[/]\n')
+    elif _boundless(d):
+        console.print('no joint limit bounds it in this posture; tipping may, see below\n')
+    else:
+        left = load['largest_kg'] - load['mass_kg']
+        text = f'{number_text(abs(left), 2)} kg'
+        state = f'{text} left' if left >= 0.0 else f'[red]{text} too much[/]'
+        console.print(f'the limits allow {number_text(load["largest_kg"], 2)} kg here: {state}\n')
+
+
+def _boundless(d: Values) -> bool:
+    """Return whether joints hold the payload here, and any other a person would try."""
+    largest, carried = d['payload']['largest_kg'], d['payload']['mass_kg']
+    own = sum(link['mass_kg'] for link in d['links'])
+    return largest is None or bool(largest > max(carried, _MANY * own))
+
+
+def _contacts(d: Values) -> Table:
+    table = _table('Contact points (base_link)', 'point', 'link', 'x m', 'y m', 'z m', 'polygon')
+    for contact in d['contacts']:
+        xyz = _numbers(contact['position_m'])
+        corner = 'corner' if contact['corner'] else ''
+        table.add_row(escape(contact['name']), escape(contact['link']), *xyz, corner)
+    return table
+
+
+def _print_stability(console: Console, d: Values) -> None:
+    x, y, z = _numbers(d['centre_of_gravity_m'])
+    console.print(
+        f'Total mass {number_text(d["total_mass_kg"], 2)} kg with payload, '
+        f'centre of gravity {x} {y} {z} m'
+    )
+    names = ' '.join(d['support_polygon']) or 'none'
+    console.print(f'Support polygon: {escape(names)} ({d["state"]})')
+    table = _table('Tilt left before tipping', 'side', 'deg', 'restoring N m', 'energy J')
+    for side, margin in d['sides'].items():
+        angle = margin['tilt_left_deg']
+        text = '-' if angle is None else f'[{"green" if angle > 0 else "red"}]{angle:.1f}[/]'
+        row = (margin['restoring_moment_nm'], margin['energy_j'])
+        table.add_row(side, text, *('-' if value is None else number_text(value) for value in row))
+    console.print(table)
+
+
+def _xyz(link: Values) -> list[str]:
+    return _numbers(link['centre_of_gravity_m'])
+
+
+def _numbers(values: list[float]) -> list[str]:
+    return [f'{round(value, 3) + 0.0:.3f}' for value in values]
 
 
 def model(
@@ -32,8 +185,8 @@ def model(
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.cli.model import print_tables
     from ugv_acceptance.cli.robot_description import describe, payload_doubts, warn
-    from ugv_acceptance.cli.robot_tables import print_tables
     from ugv_acceptance.config import load
 
     loaded = load(config, urdf=urdf)

@@ -17,7 +17,7 @@ import typer
 from ugv_acceptance import AcceptanceError
 
 if TYPE_CHECKING:
-    from ugv_acceptance.cli.kinds import FolderKind, Kind
+    from ugv_acceptance.cli.output_kinds import FolderKind, Kind
     from ugv_acceptance.config import Config
 
 Overwrite = Annotated[
@@ -72,7 +72,7 @@ def check_outputs(
     outputs: Sequence[Output], inputs: Sequence[Input], *, overwrite: bool = False
 ) -> None:
     """Raise AcceptanceError naming option, file and reason where an output must not be written."""
-    from ugv_acceptance.bag.result import check_writable, is_stream
+    from ugv_acceptance.bag.atomic_files import check_writable, is_stream
 
     earlier: list[tuple[str, Path]] = []
     for output in outputs:

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from ugv_acceptance.config import Config
-    from ugv_acceptance.report.page import Section
-    from ugv_acceptance.report.paper import Subject
+    from ugv_acceptance.report.paper.page import Section
+    from ugv_acceptance.report.paper.sections import Subject
 
 
 def paper(
@@ -41,11 +41,11 @@ def paper(
     from rich.console import Console
     from rich.progress import track
 
-    from ugv_acceptance.cli.kinds import PAPER
+    from ugv_acceptance.cli.output_kinds import PAPER
     from ugv_acceptance.config import load
-    from ugv_acceptance.report.page import draw, render
-    from ugv_acceptance.report.paper import SECTIONS
-    from ugv_acceptance.report.paper_numbers import as_json, summary
+    from ugv_acceptance.report.paper.numbers import as_json, summary
+    from ugv_acceptance.report.paper.page import draw, render
+    from ugv_acceptance.report.paper.sections import SECTIONS
 
     loaded = load(config)
     check_folder('--out', out, PAPER, inputs_of(loaded), overwrite=overwrite)
@@ -76,7 +76,7 @@ def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
     """Write the folder; paper.json, by which it is known, comes first."""
     import json
 
-    from ugv_acceptance.bag.result import unwritable, write_text
+    from ugv_acceptance.bag.atomic_files import unwritable, write_text
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -90,8 +90,8 @@ def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
 def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -> 'Subject':
     import numpy as np
 
-    from ugv_acceptance.report.paper import Subject
-    from ugv_acceptance.report.parts import check_parts
+    from ugv_acceptance.report.paper.joints import check_parts
+    from ugv_acceptance.report.paper.sections import Subject
 
     robot, limits = loaded.settings.robot, np.array(loaded.settings.limits.torque)
     if not simulate:

@@ -5,15 +5,15 @@ import math
 import numpy as np
 from rich.console import Console
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.report.paper_numbers import DOWN, Simulated
-from ugv_acceptance.report.parts import PARTS, posture
+from ugv_acceptance.report.paper.joints import PARTS, posture
+from ugv_acceptance.report.paper.numbers import DOWN, Simulated
 from ugv_acceptance.studies.offsets import OFFSET1, OFFSET2
 from ugv_acceptance.studies.orientations import grounding_angle
 from ugv_acceptance.studies.planar import paper_arm
 from ugv_acceptance.studies.validity import PAPER_SPEEDS_DEG_S, mean_square, paper_sweep
+from ugv_acceptance.type_aliases import Floats
 
 
 def simulated_arm() -> tuple[Simulated, Floats]:

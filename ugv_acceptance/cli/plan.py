@@ -51,8 +51,8 @@ def plan(
       ugv-acceptance plan --from plan.yaml --card card.html
       ugv-acceptance plan --config my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.bag.result import write_text
-    from ugv_acceptance.cli import kinds
+    from ugv_acceptance.bag.atomic_files import write_text
+    from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.config import load
     from ugv_acceptance.plan.derive import Wanted, derive
     from ugv_acceptance.plan.plan import plan_text, read_plan
@@ -92,7 +92,7 @@ def _print(made: 'Plan') -> None:
     from rich.table import Table
 
     from ugv_acceptance.plan.order import duration
-    from ugv_acceptance.report.numbers import time_text
+    from ugv_acceptance.report.format import time_text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2))
     for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):

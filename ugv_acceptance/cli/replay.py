@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ros_arguments
 
 if TYPE_CHECKING:
-    from ugv_acceptance.nodes.player import Player
-    from ugv_acceptance.nodes.running import Stop
+    from ugv_acceptance.nodes.bag_player import Player
+    from ugv_acceptance.nodes.executor import Stop
 
 __all__ = ['CONTEXT', 'replay']
 
@@ -49,8 +49,8 @@ def replay(
       ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
       ugv-acceptance replay run --no-restamp
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.nodes.player import Play, player_of
-    from ugv_acceptance.nodes.running import end, ros
+    from ugv_acceptance.nodes.bag_player import Play, player_of
+    from ugv_acceptance.nodes.executor import end, ros
 
     anew = not clock if restamp is None else restamp
     play = Play(bag, rate, loop, tuple(topics or ()), clock, anew)

@@ -47,8 +47,13 @@ def risk(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from ugv_acceptance.cli.risk_study import doubts, phases_from
-    from ugv_acceptance.cli.risk_tables import as_document, mission_lines, phase_lines
+    from ugv_acceptance.cli.risk_study import (
+        as_document,
+        doubts,
+        mission_lines,
+        phase_lines,
+        phases_from,
+    )
     from ugv_acceptance.cli.robot_description import warn
     from ugv_acceptance.config import load
     from ugv_acceptance.studies.risk import run

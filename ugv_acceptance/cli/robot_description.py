@@ -23,7 +23,7 @@ from ugv_acceptance.model.stability import (
     stance_of,
 )
 from ugv_acceptance.model.statics import payload_capacity, torque_of
-from ugv_acceptance.report.numbers import number_text
+from ugv_acceptance.report.format import number_text
 
 VERSION = 1
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ros_arguments
 
 __all__ = ['CONTEXT', 'run']
 
@@ -76,7 +76,7 @@ def run(
         raise typer.BadParameter('expected --fast with --sim: a real robot has its own time')
     if plan is None and not sim:
         raise typer.BadParameter('expected a plan for a robot; only --sim goes without one')
-    from ugv_acceptance.cli.running_plan import Asked, execute
+    from ugv_acceptance.cli.run_session import Asked, execute
 
     asked = Asked(
         plan=plan,

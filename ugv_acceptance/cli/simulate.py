@@ -63,7 +63,7 @@ def simulate(
         return
     if bag is None:
         raise typer.BadParameter('expected a folder to record into, got none', param_hint='--bag')
-    from ugv_acceptance.cli.kinds import RECORDING
+    from ugv_acceptance.cli.output_kinds import RECORDING
     from ugv_acceptance.config import load
     from ugv_acceptance.run.catalogue import case_of
     from ugv_acceptance.run.fault_text import fault_from

@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
-
-Json = dict[str, Any]
+from ugv_acceptance.type_aliases import Json
 
 # Relative difference of numbers that is rounding of another machine's arithmetic.
 ROUNDING = 1e-9
@@ -36,7 +35,7 @@ def verify(
       ugv-acceptance verify result.json
       ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.summary import while_read
+    from ugv_acceptance.cli.result_text import while_read
 
     told = read_result(result_file)
     found = again(told, result_file.parent, bag, config, urdf, criteria)
@@ -61,7 +60,7 @@ def read_result(path: Path) -> Json:
     """Return a result of one recording. Raises AcceptanceError where it is none of ours."""
     import json
 
-    from ugv_acceptance.bag.judge import RESULT_VERSION
+    from ugv_acceptance.offline.evaluate import RESULT_VERSION
 
     try:
         told = json.loads(path.read_text('utf-8'))

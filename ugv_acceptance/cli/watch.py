@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ugv_acceptance import BadConfig, pip_install
-from ugv_acceptance.cli.ending import asked_to_end
-from ugv_acceptance.cli.ros_arguments import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ros_arguments
+from ugv_acceptance.cli.termination import asked_to_end
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
-    from ugv_acceptance.console.feed import Feed
     from ugv_acceptance.console.recording import RecordingFeed
+    from ugv_acceptance.console.snapshot import Feed
 
 __all__ = ['CONTEXT', 'watch']
 
@@ -65,7 +65,7 @@ def watch(
         need('textual')
     with feed_of(context, bag, config, urdf) as (feed, asked):
         if lines:
-            from ugv_acceptance.cli.summary import while_read
+            from ugv_acceptance.cli.result_text import while_read
             from ugv_acceptance.console.lines import show_lines
 
             with while_read():
@@ -100,7 +100,7 @@ def feed_of(
         with asked_to_end() as asked:
             yield recording, asked
         return
-    from ugv_acceptance.nodes.console import live_feed
+    from ugv_acceptance.nodes.console_feed import live_feed
 
     with live_feed(loaded, ros) as (feed, stop):
         yield feed, lambda: stop.asked

@@ -13,7 +13,7 @@ from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
-from ugv_acceptance.evaluation.permitted import refused, relaxed
+from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 

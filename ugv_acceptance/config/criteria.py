@@ -14,7 +14,8 @@ from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import Document, read_document
 from ugv_acceptance.config.schema import Name, NotNegative, Positive, Section
 from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
-from ugv_acceptance.evaluation.criteria import (
+from ugv_acceptance.evaluation.alerts.messages import WORDS
+from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
     AlertDemand,
     CriteriaSet,
@@ -24,10 +25,8 @@ from ugv_acceptance.evaluation.criteria import (
     MapDemand,
     Value,
 )
-from ugv_acceptance.evaluation.data_quality import DATA, INPUTS
+from ugv_acceptance.evaluation.criteria.quantities import DATA, INPUTS, SIGNALS, subjects_of
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.signals import SIGNALS, subjects_of
-from ugv_acceptance.evaluation.wording import WORDS
 from ugv_acceptance.model.robot import Joint
 
 

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from ugv_acceptance.config.units import Given, Measure, parse, shown, split_key
-from ugv_acceptance.evaluation.permitted import checked_reason
+from ugv_acceptance.evaluation.permitted_limits import checked_reason
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 from ugv_acceptance.model.robot import Robot
 

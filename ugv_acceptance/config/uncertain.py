@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.loading import Config
 from ugv_acceptance.config.units import UNITS, split_key
-from ugv_acceptance.evaluation.uncertainty import CONTACTS, IMU, PAYLOAD, Source
+from ugv_acceptance.evaluation.criteria.uncertainty import CONTACTS, IMU, PAYLOAD, Source
 from ugv_acceptance.model.robot import Robot
 
 _AXES = ('x', 'y', 'z')

@@ -9,14 +9,14 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any
 
-from ugv_acceptance.console.skeleton import Figure, Skeleton, plumb_of, skeleton_of
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
-from ugv_acceptance.evaluation.alerts import ERROR, LEVELS, OK, STALE, WARN
-from ugv_acceptance.evaluation.low_pass import NOWHERE
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
+from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
 # One word a level, and what the page says where nothing is wrong or nothing is known.
 WORDS = {OK: 'OK', WARN: 'CAUTION', ERROR: 'DANGER', STALE: 'NO DATA'}

@@ -3,18 +3,28 @@
 import asyncio
 import json
 import math
+import sys
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadSample
-from ugv_acceptance.console.feed import Feed
 from ugv_acceptance.console.frame import describe_robot, frame_of
-from ugv_acceptance.console.numbers import number_in
 from ugv_acceptance.console.safe_map import MapKey, axes_of, key_of, probe, safe_map
-from ugv_acceptance.console.skeleton import Figure, figure_of
-from ugv_acceptance.console.snapshot import Snapshot
+from ugv_acceptance.console.snapshot import Feed, Snapshot
+from ugv_acceptance.monitoring.drawing import Figure, figure_of
+
+
+def number_in(values: Mapping[str, object], name: str) -> float:
+    """Return a finite number of a command. Raises BadSample where there is none."""
+    value = values.get(name)
+    # JSON's whole numbers have no end, floats have.
+    most = sys.float_info.max
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
+        raise BadSample(f'{name}: expected a finite number, got {value!r:.60}')
+    return float(value)
+
 
 # Seconds between frames and, at least, between two maps.
 FRAME = 0.05

@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable
 
-from ugv_acceptance.console.feed import Feed
 from ugv_acceptance.console.frame import Plain, frame_of
-from ugv_acceptance.console.skeleton import figure_of
+from ugv_acceptance.console.snapshot import Feed
+from ugv_acceptance.monitoring.drawing import figure_of
 
 # Seconds between looks, as in a terminal, and between lines at least.
 LISTEN, BETWEEN = 0.05, 1.0

@@ -10,20 +10,53 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.bag.judge import Judgement, judge
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.console.frame import number
-from ugv_acceptance.console.numbers import number_in
-from ugv_acceptance.console.playhead import SPEEDS, Playhead
+from ugv_acceptance.console.hub import number_in
+from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
-from ugv_acceptance.console.track import Track, TrackMaker, rate_at
-from ugv_acceptance.evaluation.alerts import LEVELS, OK, STALE, Alert
-from ugv_acceptance.evaluation.payload import payload_from
-from ugv_acceptance.evaluation.rows import Times
+from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
+from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
-from ugv_acceptance.evaluation.wording import describe
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.offline.evaluate import Judgement, judge
+from ugv_acceptance.type_aliases import Times
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
+
+
+@dataclass(slots=True)
+class Playhead:
+    """`position` in seconds from the beginning, at most `duration`; it stops at the end."""
+
+    duration: float
+    position: float = 0.0
+    speed: float = 1.0
+    playing: bool = True
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if self.playing:
+            self.position += self.speed * seconds
+        if self.position >= self.duration:
+            self.position, self.playing = self.duration, False
+
+    def play(self) -> None:
+        """Go on, from the beginning where it has come to the end."""
+        if self.position >= self.duration:
+            self.position = 0.0
+        self.playing = True
+
+    def pause(self) -> None:
+        """Stay where it is."""
+        self.playing = False
+
+    def seek(self, position: float) -> None:
+        """Go to a position (s); beyond an end is that end."""
+        self.position = min(max(position, 0.0), self.duration)
+
 
 # An alert stays on the page this long (ns) after it is over.
 LINGER = 10_000_000_000

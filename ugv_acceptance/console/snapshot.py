@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any, Protocol
 
-from ugv_acceptance.evaluation.alerts import STALE
-from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.evaluation.alerts.state_machine import STALE
+from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.stability import SIDES, UNKNOWN
 
 NOTHING = (math.nan,) * len(SIDES)
@@ -73,3 +75,21 @@ class Snapshot:
     inputs: tuple[InputRow, ...] = ()
     hints: tuple[str, ...] = ()
     stamp: int | None = None
+
+
+class Feed(Protocol):
+    """A live robot or a recording; its methods are called from one thread, 20 times a second."""
+
+    settings: Settings
+
+    def describe(self) -> dict[str, Any]:
+        """Return what a page must know once beside the robot: `source` and its `title`."""
+
+    def snapshot(self) -> Snapshot:
+        """Return the newest snapshot; never waits."""
+
+    def extra(self) -> dict[str, Any]:
+        """Return what this source adds to each frame, such as where a recording is played."""
+
+    def command(self, do: str, values: dict[str, Any]) -> str:
+        """Do what an operator asks; return what was done. Raises BadSample where it cannot be."""

@@ -11,10 +11,10 @@ from textual.containers import VerticalScroll
 from textual.widgets import Footer, Static
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.console.feed import Feed
 from ugv_acceptance.console.frame import Plain, frame_of
-from ugv_acceptance.console.skeleton import figure_of
-from ugv_acceptance.evaluation.alerts import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.console.snapshot import Feed
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.monitoring.drawing import figure_of
 
 # Seconds between drawings: a terminal over SSH shows no more. A feed is asked more often, as by a
 # page: it judges silence by when it was asked.

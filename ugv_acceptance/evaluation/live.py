@@ -5,17 +5,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ugv_acceptance.evaluation.alerts import OK, STALE
-from ugv_acceptance.evaluation.freshness import Freshness
-from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuTracker
-from ugv_acceptance.evaluation.joints import NEVER, JointMerger
-from ugv_acceptance.evaluation.low_pass import NOWHERE, Vector
-from ugv_acceptance.evaluation.payload import payload_from
+from ugv_acceptance.evaluation.alerts.rules import InputSignals, Watch
+from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE
+from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
+from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
+from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
+from ugv_acceptance.evaluation.inputs.payload import payload_from
+from ugv_acceptance.evaluation.inputs.timeouts import Freshness
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.sliding import slides_first
-from ugv_acceptance.evaluation.watch import InputSignals, Watch
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Vector
+from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import NO_CONTACT, Stability, Stance, stability_of, stance_of
 from ugv_acceptance.model.statics import torque_of
 

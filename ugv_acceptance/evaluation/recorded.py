@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts import feed
-from ugv_acceptance.evaluation.freshness import Freshness
-from ugv_acceptance.evaluation.imu import ORIENTATIONS, ImuRows, ImuTracker
-from ugv_acceptance.evaluation.joints import JointMerger, JointRows
-from ugv_acceptance.evaluation.payload import PayloadHistory, payload_from
-from ugv_acceptance.evaluation.rows import Floats, MarginRows, Pairs, Times
+from ugv_acceptance.evaluation.alerts.rules import InputSignals, Watch
+from ugv_acceptance.evaluation.alerts.state_machine import feed
+from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
+from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
+from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
+from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.sliding import slides_first
-from ugv_acceptance.evaluation.watch import InputSignals, Watch
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
-from ugv_acceptance.model.rows import ALL, Rows, pick
+from ugv_acceptance.model.row_selection import ALL, Rows, pick
+from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
     NO_CONTACT,
     UNKNOWN,
@@ -28,6 +28,7 @@ from ugv_acceptance.model.stability import (
     take_stance,
     tip_angles_of,
 )
+from ugv_acceptance.type_aliases import Floats, Times
 
 # A stretch of silence (ns): from when the input was stale to its next message.
 Gap = tuple[int, int]

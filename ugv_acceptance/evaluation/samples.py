@@ -9,11 +9,7 @@ message definitions (SI, radians) and in the message's own joint order and sign.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
-Times = NDArray[np.int64]
+from ugv_acceptance.type_aliases import Floats, Times
 
 
 @dataclass(frozen=True, slots=True)

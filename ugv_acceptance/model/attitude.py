@@ -22,7 +22,7 @@ from ugv_acceptance.model.expressions import (
 )
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.robot import Matrix
-from ugv_acceptance.model.rows import Values
+from ugv_acceptance.model.row_selection import Values
 
 # A unit quaternion's norm may be this far from 1 (single precision, rounding).
 NORM_SLACK = 0.01

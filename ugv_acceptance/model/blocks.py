@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.expressions import Number
+from ugv_acceptance.type_aliases import Floats
 
-Floats = NDArray[np.float64]
 # Samples a block: more of them fall out of the cache, fewer pay more for each Python call.
 BLOCK = 65536
 

@@ -29,7 +29,7 @@ from ugv_acceptance.model.hull import Cycle, pairs
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.robot import ZERO
-from ugv_acceptance.model.rows import Values
+from ugv_acceptance.model.row_selection import Values
 from ugv_acceptance.model.tree import in_body
 
 # Sides of the robot, by the direction in which an edge's outward normal points most.

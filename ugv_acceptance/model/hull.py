@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.model.expressions import Scalar
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
-from ugv_acceptance.model.rows import ALL, Rows, Values, inner, pick
+from ugv_acceptance.model.row_selection import ALL, Rows, Values, inner, pick
 
 Point = tuple[float, float, float]
 Cycle = tuple[int, ...]

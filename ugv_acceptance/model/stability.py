@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ugv_acceptance.model.blocks import Floats, in_blocks
+from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.edges import SIDES, Edges, corners_of, edges_of, side_of
 from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import (
@@ -24,8 +24,9 @@ from ugv_acceptance.model.mechanics import (
     posture_of,
 )
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.rows import Rows, Values, groups, inner, pick
+from ugv_acceptance.model.row_selection import Rows, Values, groups, inner, pick
 from ugv_acceptance.model.support import Support, support_of, supports_of
+from ugv_acceptance.type_aliases import Floats
 
 __all__ = ['SIDES', 'STATES', 'Margins', 'Stability', 'Stance']
 

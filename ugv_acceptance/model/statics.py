@@ -8,10 +8,11 @@ is the robot's own `payload`.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats, in_blocks
+from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.type_aliases import Floats
 
 
 def torque_of(posture: Posture, gravity: tuple[Number, Number, Number]) -> tuple[Number, ...]:

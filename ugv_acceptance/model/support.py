@@ -30,7 +30,7 @@ from ugv_acceptance.model.hull import (
     triples_under,
 )
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.rows import ALL, Rows, Values, groups, inner, pick
+from ugv_acceptance.model.row_selection import ALL, Rows, Values, groups, inner, pick
 
 __all__ = ['ALL', 'Cycle', 'Point', 'Rows', 'Support', 'pairs', 'support_of', 'supports_of']
 

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Step
 from ugv_acceptance.plan.search import Arm, Found, Mask, look, spread_out
 from ugv_acceptance.plan.ways import Routes
 from ugv_acceptance.plan.writing import Setup, hold_step
 from ugv_acceptance.studies.orientations import ORIENTATIONS
+from ugv_acceptance.type_aliases import Floats
 
 # What a posture is to the boundary, the band it lies in (share of the limit; deg of tilt left),
 # where it is tried, and what is done there.

@@ -9,13 +9,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.wording import advice
+from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
-from ugv_acceptance.report.numbers import time_text
+from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
 # Code -> what it means to the person at the robot.

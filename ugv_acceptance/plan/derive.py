@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ugv_acceptance.config import Config
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.boundaries import tip_boundary, torque_boundary
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
 from ugv_acceptance.plan.order import ordered, seconds_of
@@ -20,6 +19,7 @@ from ugv_acceptance.plan.search import Arm, look, roles_of, safe
 from ugv_acceptance.plan.ways import Routes
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
 from ugv_acceptance.studies.orientations import ORIENTATIONS
+from ugv_acceptance.type_aliases import Floats
 
 # Share of a limit (and 20 deg of tilt) by which tests on a robot stay inside, by default.
 SPARE = 0.05

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Alerts, Step
 from ugv_acceptance.plan.search import Arm, Found, look, safe, spread_out
 from ugv_acceptance.plan.writing import (
@@ -19,6 +18,7 @@ from ugv_acceptance.plan.writing import (
 )
 from ugv_acceptance.studies.capacity import CAUSES, lift_capacity, pull_capacity
 from ugv_acceptance.studies.orientations import grounding_angle
+from ugv_acceptance.type_aliases import Floats
 
 # Loads tried, as shares of the largest the model allows.
 LIGHTER, HEAVIER = 0.9, 1.12

@@ -16,8 +16,8 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.seal import sealed
-from ugv_acceptance.evaluation.alerts import LEVELS
-from ugv_acceptance.evaluation.wording import WORDS
+from ugv_acceptance.evaluation.alerts.messages import WORDS
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.model.robot import Robot, Vector
 from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Payload, Robot
 from ugv_acceptance.model.stability import STANDING, margins, stability
 from ugv_acceptance.studies.orientations import gravity_of
+from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.plan import Step
 from ugv_acceptance.plan.search import Arm
 from ugv_acceptance.studies.orientations import ORIENTATIONS
+from ugv_acceptance.type_aliases import Floats
 
 # Size of the picture (m of the robot's world: half width, above and below the ground's middle).
 WIDE, HIGH, DEEP = 1.3, 1.45, 0.45

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.plan.search import PATH, STEP_DEG, Arm, Mask, look, safe
+from ugv_acceptance.type_aliases import Floats
 
 # Neither the start nor any other place: no place before it.
 _NOWHERE = -9999

@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.plan import ROBOT, Alerts, Ground, Posture, Step
 from ugv_acceptance.plan.search import Arm, Found
 from ugv_acceptance.studies.orientations import ORIENTATIONS
+from ugv_acceptance.type_aliases import Floats
 
 SAFE_STOP = (
     'stop and freeze the arm at any ERROR or STALE alert that is not expected, when the posture is'

@@ -1,14 +1,16 @@
 """The acceptance report: a result as one self-contained HTML page a person can sign."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from ugv_acceptance import AcceptanceError, pip_install
+from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.strips import Strips
-from ugv_acceptance.report.numbers import (
+from ugv_acceptance.report.format import (
     bound_text,
     doubts_of,
     interval_text,
@@ -19,10 +21,28 @@ from ugv_acceptance.report.numbers import (
     worst_text,
 )
 from ugv_acceptance.report.regions import svg_of
-from ugv_acceptance.report.run_charts import run_chart
-from ugv_acceptance.report.track_map import track_map
+from ugv_acceptance.report.run_charts import run_chart, track_map
+from ugv_acceptance.type_aliases import Json
 
-Json = dict[str, Any]
+
+def pdf_of(html: str) -> bytes:
+    """Return the page as a PDF file's bytes. Raises AcceptanceError where WeasyPrint is absent."""
+    try:
+        import weasyprint  # noqa: PLC0415 - an extra
+    except (ImportError, OSError) as error:
+        reason = str(error).splitlines()[0]
+        raise AcceptanceError(
+            f'no PDF: expected WeasyPrint ({pip_install("pdf")}) and Pango '
+            f'(apt install libpango-1.0-0 libpangoft2-1.0-0), got: {reason}'
+        ) from None
+    logging.getLogger('weasyprint').setLevel(logging.ERROR)
+    document: bytes = weasyprint.HTML(string=html, url_fetcher=_nothing).write_pdf()
+    return document
+
+
+def _nothing(url: str, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - WeasyPrint's protocol
+    raise ValueError(f'a report refers to nothing outside itself, got {url}')
+
 
 # Seconds shown before and after an event, and charts of events at most.
 AROUND = 5.0

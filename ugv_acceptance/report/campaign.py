@@ -1,16 +1,13 @@
 """The report of a campaign: its statement as one self-contained HTML page with its trend."""
 
-from typing import Any
-
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ugv_acceptance.report.numbers import hours_text, number_text
+from ugv_acceptance.report.format import hours_text, number_text
 from ugv_acceptance.report.regions import figure, svg_of
-
-Json = dict[str, Any]
+from ugv_acceptance.type_aliases import Json
 
 # Runs listed one by one; campaign.json has all.
 MOST_RUNS = 400

@@ -8,12 +8,12 @@ import numpy as np
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.evaluation.settings import Limits
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.studies.bilinear import Grid
 from ugv_acceptance.studies.capacity import CAUSES, lift_capacity, pull_capacity
 from ugv_acceptance.studies.maps import Levels, rollover_map, torque_forms, utilisation_map
+from ugv_acceptance.type_aliases import Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.report.regions import draw_regions, figure, legend, png_of, svg_of
 from ugv_acceptance.studies.maps import CLASSES, classes
+from ugv_acceptance.type_aliases import Floats
 
 WORDS = {
     'torque': ('holds', 'caution: near the limit', 'saturates'),

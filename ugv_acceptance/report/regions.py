@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.studies.maps import Levels
+from ugv_acceptance.type_aliases import Floats
 
 # Colours that stay apart in grey and for colour-blind readers; the hatch says it without them.
 COLOURS = ('#ffffff', '#fff0c2', '#e7a9a0')

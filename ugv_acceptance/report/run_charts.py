@@ -1,19 +1,19 @@
 """Charts of a run over time: margins with their limits, and the alerts below them."""
 
 import math
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.strips import Strips
-from ugv_acceptance.report.regions import figure
-
-Floats = NDArray[np.float64]
-Json = dict[str, Any]
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.report.regions import draw_regions, figure, legend
+from ugv_acceptance.studies.bilinear import Grid
+from ugv_acceptance.studies.maps import Levels, rollover_map, torque_forms, utilisation_map
+from ugv_acceptance.type_aliases import Floats, Json
 
 # Colour-blind safe, and told apart by dashes as well.
 LINES = (('#0072b2', '-'), ('#d55e00', '--'), ('#009e73', '-.'), ('#cc79a7', ':'), ('#56b4e9', '-'))
@@ -132,3 +132,99 @@ def _draw_alerts(axes: Axes, alerts: list[Json], kinds: list[tuple[str, str]], e
 def plain(name: str) -> str:
     """Return a name that matplotlib does not take for mathematics, short enough for a label."""
     return name.replace('$', r'\$')[:40]
+
+
+CELLS = 121
+
+
+def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None:
+    """Return the map of the two judged joints that moved most, with the run's track on it.
+
+    All else - the other joints, attitude, payload - is as when the tilt left first broke its limit,
+    else as when it was least. None where
+    the robot has no two such joints or the run no known posture.
+    """
+    pair = _moving_pair(strips, settings)
+    moment = _telling_moment(result)
+    if pair is None or moment is None:
+        return None
+    grid = _grid(pair, moment, settings)
+    gravity = _gravity(moment, settings.robot.gravity)
+    payload = Payload(float(moment['payload_kg']), settings.robot.payload.cog)
+    limits = np.array(settings.limits.torque)
+    forms = torque_forms(settings.robot, grid, gravity, payload)
+    load = 100.0 * utilisation_map(settings.robot, grid, forms, limits)
+    tip = np.degrees(rollover_map(settings.robot, grid, gravity, payload).angle)
+    made = figure(7.4, 3.7)
+    left, right = made.subplots(1, 2, sharey=True)
+    bounds = settings.limits
+    torque_levels = Levels(-100.0 * bounds.torque_warn, -100.0 * bounds.torque_error)
+    tip_levels = Levels(math.degrees(bounds.tip_warn), math.degrees(bounds.tip_error))
+    for axes, margin, levels, words in (
+        (left, -load, torque_levels, 'torque'),
+        (right, tip, tip_levels, 'tip-over'),
+    ):
+        draw_regions(axes, np.degrees(grid.x), np.degrees(grid.y), margin, levels)
+        q = np.degrees(strips.q[:, pair])
+        axes.plot(q[:, 0], q[:, 1], color='#0072b2', lw=1.4)
+        axes.plot(q[:1, 0], q[:1, 1], 'o', color='#0072b2', ms=4.0)
+        axes.set_title(words)
+        axes.set_xlabel(_axis_name(settings, pair[0]))
+    left.set_ylabel(_axis_name(settings, pair[1]))
+    areas = ('within limits', 'caution', 'beyond limits')
+    legend(made, areas, loc='outside lower center', ncols=3)
+    return made
+
+
+def _axis_name(settings: Settings, joint: int) -> str:
+    return plain(settings.robot.joint_names[joint]) + ' (deg)'
+
+
+def _moving_pair(strips: Strips, settings: Settings) -> list[int] | None:
+    turning = [
+        j
+        for j in judged_joints(settings)
+        if settings.robot.joint(settings.robot.joint_names[j]).kind != 'prismatic'
+    ]
+    known = strips.q[np.isfinite(strips.q).all(axis=1)]
+    if len(turning) < 2 or len(known) < 2:
+        return None
+    order = sorted(turning, key=lambda j: -float(np.ptp(known[:, j])))
+    return sorted(order[:2])
+
+
+def _telling_moment(result: Json) -> Json | None:
+    """Return when the tilt left first broke its limit, else when it was least."""
+    for outcome in result['criteria']['results']:
+        measured = outcome['measured']
+        if measured.get('signal') == 'tip_angle' and measured['moment'] is not None:
+            found: Json = measured['first_violation'] or measured['moment']
+            return found
+    return None
+
+
+def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
+    roll, pitch = math.radians(moment['roll_deg']), math.radians(moment['pitch_deg'])
+    return (
+        g * math.sin(pitch),
+        -g * math.cos(pitch) * math.sin(roll),
+        -g * math.cos(pitch) * math.cos(roll),
+    )
+
+
+def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
+    q = np.array([x['position'] for x in moment['joints'].values()])
+    turning = [
+        settings.robot.joint(name).kind != 'prismatic' for name in settings.robot.joint_names
+    ]
+    q = np.where(turning, np.radians(q), q)
+    x, y = (np.linspace(*_range(settings, j), CELLS) for j in pair)
+    return Grid(pair[0], pair[1], x, y, q)
+
+
+def _range(settings: Settings, joint: int) -> tuple[float, float]:
+    limits = settings.robot.joint(settings.robot.joint_names[joint])
+    low, high = limits.lower, limits.upper
+    if not math.isfinite(low + high) or high - low > 2.0 * math.pi:
+        return -math.pi, math.pi
+    return low, high

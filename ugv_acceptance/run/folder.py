@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import BadConfig, __version__
-from ugv_acceptance.bag.result import write_json, write_text
+from ugv_acceptance.bag.atomic_files import write_json, write_text
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.plan import SIMULATION, Plan, Step, plan_text
-from ugv_acceptance.run.hands import SIM
+from ugv_acceptance.run.actuation import SIM
 from ugv_acceptance.run.report import html_of, report_of
-from ugv_acceptance.run.verdicts import VERDICTS, whole
+from ugv_acceptance.run.step_verdict import VERDICTS, whole
 
 RESULT_VERSION = 1
 

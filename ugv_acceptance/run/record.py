@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.run.catalogue import Case
 from ugv_acceptance.run.messages import EPOCH, Message, messages
 from ugv_acceptance.simulation.corruption import Corruption, overload, overloaded, weakened
@@ -19,6 +18,7 @@ from ugv_acceptance.simulation.scenario import TIPPED, Recording
 from ugv_acceptance.simulation.simulation import BUILD
 from ugv_acceptance.simulation.stretches import stretches
 from ugv_acceptance.simulation.vehicle import Build
+from ugv_acceptance.type_aliases import Floats
 
 # Simulated seconds held in memory at a time.
 STRETCH = 5.0

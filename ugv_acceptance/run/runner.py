@@ -15,10 +15,10 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.plan.plan import SIMULATION, Step, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.ways import safe_way
+from ugv_acceptance.run.actuation import SIM, Hands
 from ugv_acceptance.run.folder import RunFolder
-from ugv_acceptance.run.hands import SIM, Hands
-from ugv_acceptance.run.moving import REFUSED, Moves, holds
-from ugv_acceptance.run.verdicts import INCONCLUSIVE, SKIPPED, Done, judge_step
+from ugv_acceptance.run.motions import REFUSED, Moves, holds
+from ugv_acceptance.run.step_verdict import INCONCLUSIVE, SKIPPED, Done, judge_step
 from ugv_acceptance.run.world import Brake, World
 
 # Seconds for alerts to be over, and recorded after a stop.

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.faults import Fault
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Scenario
+from ugv_acceptance.type_aliases import Floats
 
 # Messages reach a subscriber this much (s) after their stamp.
 DELAY, JITTER = 0.0003, 0.0004

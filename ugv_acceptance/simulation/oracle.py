@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import IDENTITY, Payload, Robot
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
+from ugv_acceptance.type_aliases import Floats
 
 # Turn (rad) against the plane that counts as tipping; the slack of the contacts is far below.
 TIPPED = np.radians(2.0)

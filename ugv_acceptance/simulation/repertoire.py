@@ -10,7 +10,6 @@ from math import atan, pi, radians
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import margins
 from ugv_acceptance.model.statics import gripper_point
@@ -18,6 +17,7 @@ from ugv_acceptance.simulation.scenario import Command, Scenario
 from ugv_acceptance.simulation.scenarios import STOWED
 from ugv_acceptance.simulation.shape import Block, ramp, stairs, step, wheel_contacts
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
+from ugv_acceptance.type_aliases import Floats
 
 # Margins that a quiet shift keeps: tilt left (rad), share of the torque limit, grip height (m).
 CALM_TILT, CALM_TORQUE, LOWEST = radians(18.0), 0.62, 0.08

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.simulation.shape import Block
+from ugv_acceptance.type_aliases import Floats
 
 NO_LOAD = Payload()
 # Lean (rad) from which a robot is off its stance (2 deg), and from which it counts as tipped

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.scenario import Command
@@ -23,6 +22,7 @@ from ugv_acceptance.simulation.vehicle import (
     set_payload,
     vehicle_of,
 )
+from ugv_acceptance.type_aliases import Floats
 
 BUILD = Build(
     wheels=True,

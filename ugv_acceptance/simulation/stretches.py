@@ -1,17 +1,18 @@
 """A scenario simulated stretch by stretch, as fast as it goes: runs of any length."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ugv_acceptance import AcceptanceError, BadConfig
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recording, Scenario, Truth
 from ugv_acceptance.simulation.simulation import BUILD, Simulation
 from ugv_acceptance.simulation.vehicle import Build
+from ugv_acceptance.type_aliases import Floats
 
 # Share of a motor's limit from which it gives all it has.
 _ALL = 1.0 - 1e-9
@@ -172,3 +173,12 @@ class Sensors:
         step = self.noise.orientation_step
         result: Floats = np.round(turned / step) * step
         return result
+
+
+def run(robot: Robot, scenario: Scenario, seed: int, build: Build = BUILD) -> Recording:
+    """Simulate `scenario` in one stretch; the same seed gives the same bits.
+
+    Raises as `stretches` does.
+    """
+    (recording,) = stretches(robot, scenario, seed, math.inf, build)
+    return recording

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, tune, vehicle_of
+from ugv_acceptance.type_aliases import Floats
 
 FIXED = Build(base='fixed', motors=False)
 FREE = Build(wheels=True, timestep=0.0005, contact_time=0.005)

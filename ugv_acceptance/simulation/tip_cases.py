@@ -7,7 +7,6 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
@@ -16,6 +15,7 @@ from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
+from ugv_acceptance.type_aliases import Floats
 
 # Step (rad) of the grid of tilts on which the model's tilt is looked for, then interpolated.
 GRID = np.radians(0.1)

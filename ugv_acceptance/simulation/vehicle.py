@@ -12,11 +12,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.simulation import shape
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.shape import numbers
+from ugv_acceptance.type_aliases import Floats
 
 # Mass (kg) and inertia (kg m2) of what has none: MuJoCo wants a moving body to have some.
 LEAST = 1e-12

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.type_aliases import Floats
 
 TURN = 2.0 * math.pi
 

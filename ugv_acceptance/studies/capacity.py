@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ugv_acceptance.model.blocks import Floats, in_blocks
+from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
-from ugv_acceptance.model.rows import Rows
+from ugv_acceptance.model.row_selection import Rows
 from ugv_acceptance.model.statics import LEAST_LEVER, gripper_point, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
+from ugv_acceptance.type_aliases import Floats
 
 # What ends a pull first; NOTHING: no finite force does.
 SATURATION, TIP, SLIP, NOTHING = range(4)

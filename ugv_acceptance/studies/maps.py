@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.edges import side_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
@@ -22,6 +21,7 @@ from ugv_acceptance.model.statics import centre_of_gravity, static_torque
 from ugv_acceptance.model.support import pairs, supports_of
 from ugv_acceptance.studies.bilinear import Grid, along_rows, evaluate, form_of, is_sum_form
 from ugv_acceptance.studies.windows import Mask, window_between
+from ugv_acceptance.type_aliases import Floats
 
 SAFE, CAUTION, FAILURE = range(3)
 CLASSES = ('safe', 'caution', 'failure')

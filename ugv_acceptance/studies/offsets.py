@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.studies.planar import (
     PAPER,
     PlanarArm,
@@ -26,6 +25,7 @@ from ugv_acceptance.studies.validity import (
     paper_sweep,
     speed_error,
 )
+from ugv_acceptance.type_aliases import Floats
 
 # Table 2 as printed: F of the first joint; that of the second is 1.0 throughout.
 TABLE_2 = (1.0, 1.0, 1.0, 1.2, 5.1, 22.0, 67.6, 163.9)

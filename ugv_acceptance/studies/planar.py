@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Joint, Link, Matrix, Payload, Robot
 from ugv_acceptance.studies.intervals import Intervals, where_cosine_between
+from ugv_acceptance.type_aliases import Floats
 
 TURN = 2.0 * math.pi
 # Below this a cosine is zero: pi/2 as a float has a cosine of 6e-17.

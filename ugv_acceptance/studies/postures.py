@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.type_aliases import Floats
 
 
 def joint_range(robot: Robot, name: str) -> tuple[float, float]:

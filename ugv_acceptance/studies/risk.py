@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.mechanics import Posture, mechanics_of
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import stability_of, stances_of
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.studies.risk_kernel import risk_kernel
 from ugv_acceptance.studies.spread import Spread, clopper_pearson, generators
+from ugv_acceptance.type_aliases import Floats
 
 Columns = tuple[Floats, Floats, Floats]
 

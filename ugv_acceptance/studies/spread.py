@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, ndtr
 
-from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.type_aliases import Floats
 
 UNIFORM, NORMAL = 'uniform', 'normal'
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import fdtri
 
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import inverse_dynamics, static_torque
+from ugv_acceptance.type_aliases import Floats
 
 PAPER_CRITICAL = 1.227
 PAPER_SAMPLES = 201

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from ugv_acceptance.model.blocks import Floats
+from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 

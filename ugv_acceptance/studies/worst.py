@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model.blocks import Floats
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.studies.intervals import TURN, Intervals, intersect, where_cosine_between
+from ugv_acceptance.type_aliases import Floats
 
 # A wave of less (N m) is none: the joint moves nothing that this torque feels.
 _FLAT = 1e-9

@@ -1,0 +1,75 @@
+"""Alerts in words: every number that a sentence holds, in its unit, with its limit."""
+
+import math
+
+import pytest
+from evaluation.streams import T0, settings
+
+from ugv_acceptance.evaluation.alerts.messages import advice, describe, tilt_left
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
+from ugv_acceptance.evaluation.settings import Limits
+
+TOLD = settings(limits=Limits((45.0, 30.0)))
+RAD = math.radians(1.0)
+WARNED = 'warning limit 10.0 degrees of tilt left'
+
+
+@pytest.mark.parametrize(
+    ('code', 'subject', 'level', 'on', 'peak', 'said'),
+    [
+        ('TORQUE_LIMIT', 'lift', WARN, 36.0, 40.04, 'lift needs 40.0 N m; its limit is 45.0 N m'),
+        ('TORQUE_LIMIT', 'slide', ERROR, 30.0, 31.0, 'slide needs 31.0 N; its limit is 30.0 N'),
+        ('TIP_OVER', 'left', WARN, -10 * RAD, -8 * RAD,
+         f'8.0 degrees of tilt left before it tips to the left; {WARNED}'),
+        ('TIP_OVER', 'rear', ERROR, -5 * RAD, 3 * RAD,
+         '3.0 degrees past its tipping point to the rear; limit 5.0 degrees of tilt left'),
+        ('STATIC_MODEL', 'lift', WARN, 0.6, 0.75,
+         'lift moves at 0.75 rad/s; the static model holds to 0.60 rad/s'),
+        ('STATIC_MODEL', 'slide', WARN, 0.1, 0.25,
+         'slide moves at 0.25 m/s; the static model holds to 0.10 m/s'),
+        ('SLIDE', 'robot', WARN, -10 * RAD, -4 * RAD,
+         'the tracks slide before it tips: 4.0 degrees of slope left'),
+        ('SLIDE', 'robot', WARN, -10 * RAD, 2 * RAD,
+         'the tracks slide before it tips: 0.0 degrees of slope left'),
+        ('TIP_AHEAD', 'front', WARN, -1.5, -0.3,
+         'tips to the front within 1.5 s if it goes on like this'),
+        ('TORQUE_AHEAD', 'lift', WARN, -2.0, -0.3,
+         'lift is at its limit within 2.0 s if it goes on like this'),
+        ('EFFORT_LIMIT', 'lift', WARN, 0.9, 44.0,
+         'the motor of lift gives 44.0 N m; its limit is 45.0 N m'),
+        ('EFFORT_LIMIT', 'slide', WARN, 0.9, 29.0,
+         'the motor of slide gives 29.0 N; its limit is 30.0 N'),
+        ('POSITION_LEAP', 'lift', ERROR, 20.0, 57.3,
+         'the position of lift changes by 57.3 rad/s, ten times faster than it can move'),
+        ('POSITION_LEAP', 'slide', ERROR, 10.0, 12.0,
+         'the position of slide changes by 12.0 m/s, ten times faster than it can move'),
+        ('IMU_GRAVITY', 'imu', ERROR, 0.15, 0.9,
+         'at rest the acceleration differs from gravity by 90%'),
+        ('IMU_INCONSISTENT', 'imu', ERROR, 0.1, 28.6 * RAD,
+         'orientation and acceleration of the IMU disagree by 28.6 degrees at rest'),
+        ('INPUT_STALE', 'imu', ERROR, 0.5, 1.0, 'no message from imu'),
+    ],
+)  # fmt: skip
+def test_an_alert_is_one_sentence_with_its_numbers(
+    code: str, subject: str, level: int, on: float, peak: float, said: str
+) -> None:
+    """Newtons and metres of what slides, newton metres and radians of what turns."""
+    assert describe(Alert(Rule(code, subject, level, on, on, 0, 0), T0, peak), TOLD) == said
+
+
+@pytest.mark.parametrize(
+    ('degrees', 'said'),
+    [
+        (0.0, '0.0 degrees of tilt left before it tips'),
+        (0.06, '0.1 degrees of tilt left before it tips'),
+        (-0.06, '0.1 degrees past its tipping point'),
+    ],
+)
+def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
+    """Past the tipping point is what is below zero."""
+    assert tilt_left(degrees) == said
+
+
+def test_what_helps_is_told_beside_what_happened() -> None:
+    """By the code alone."""
+    assert advice('INPUT_STALE').startswith('check that its driver runs')

@@ -1,0 +1,165 @@
+"""Demands and violations in words, and loads: declared, remembered, weighed by the motors."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from evaluation.streams import settings
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.evaluation.criteria.criteria import (
+    ANY,
+    AlertDemand,
+    Criterion,
+    DataDemand,
+    Demand,
+    MapDemand,
+    Value,
+)
+from ugv_acceptance.evaluation.criteria.messages import demand_words
+from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
+from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.statics import static_torque
+
+TOLD = settings()
+DOWN = (0.0, 0.0, -9.81)
+LIFT = 9.81 * 1.1  # what a kg in the hand is to the level lift, N m
+
+
+def value(**chosen: Any) -> Value:
+    """Return a demand on the lift's torque."""
+    return Value('torque', 'lift', below=True, limit=30.0, **chosen)
+
+
+BELOW = 'static torque (magnitude) of lift below 30 N m'
+
+
+@pytest.mark.parametrize(
+    ('demand', 'words'),
+    [
+        (value(), f'{BELOW} at all times'),
+        (value(dwell=2.5), f'{BELOW} for 2.5 s at a stretch'),
+        (value(time_in_violation=0.5), f'{BELOW} except for at most 0.5 s in all'),
+        (value(longest_violation=0.2, share_in_violation=0.05),
+         f'{BELOW} except for at most 0.2 s at a stretch and 5.0% of the time'),
+        (Value('tip_angle', ANY, below=False, limit=math.radians(5.0)), 'above 5 deg at all times'),
+        (Value('torque_utilisation', 'lift', below=True, limit=0.8), 'below 80% at all times'),
+        (Value('torque', 'slide', below=True, limit=30.0), 'of slide below 30 N at all times'),
+        (AlertDemand(raised=True, code='TIP_OVER', of='left', level='WARN'),
+         'WARN TIP_OVER alert of left raised'),
+        (AlertDemand(raised=False), 'no alert'),
+        (AlertDemand(raised=False, level='ERROR'), 'no ERROR alert'),
+        (AlertDemand(raised=True), 'any alert raised'),
+        (DataDemand('coverage', least=0.9), 'at least 90%'),
+        (DataDemand('rate', of='imu', least=10.0, most=90.0),
+         'rate of imu at least 10 and at most 90 Hz'),
+        (DataDemand('longest_gap', most=0.2), 'at most 0.2 s'),
+        (MapDemand(('lift', 'slide'), ((0.0, 1.0), (0.0, 1.0)), (0.1, 0.1), 0.25),
+         'at least 25% of the map of lift and slide visited'),
+    ],
+)  # fmt: skip
+def test_a_demand_in_words(demand: Demand, words: str) -> None:
+    """As a person would say it, with its unit; a window is told too."""
+    assert demand_words(Criterion('c', demand), TOLD).endswith(words)
+    windowed = demand_words(Criterion('c', demand, window=(1.5, 4.0)), TOLD)
+    assert windowed.endswith(f'{words}, from 1.5 to 4 s')
+
+
+@pytest.mark.parametrize(
+    ('mass', 'com', 'frame', 'known'),
+    [
+        (2.0, (0.1, 0.0, 0.0), 'hand', True), (2.0, (0.1, 0.0, 0.0), '/hand', True),
+        (2.0, (0.1, 0.0, 0.0), '', True), (2.0, (0.1, 0.0, 0.0), 'arm', False),
+        (0.0, (0.0, 0.0, 0.0), 'hand', True), (-0.001, (0.0, 0.0, 0.0), 'hand', False),
+        (1e5, (0.0, 0.0, 0.0), 'hand', True), (1.001e5, (0.0, 0.0, 0.0), 'hand', False),
+        (1.0, (0.0, 1e3, 0.0), 'hand', True), (1.0, (0.0, 0.0, -1001.0), 'hand', False),
+        (1.0, (800.0, 800.0, 0.0), 'hand', False), (math.nan, (0.0, 0.0, 0.0), 'hand', False),
+        (1.0, (math.nan, 0.0, 0.0), 'hand', False), (math.inf, (0.0, 0.0, 0.0), 'hand', False),
+    ],
+)  # fmt: skip
+def test_only_a_load_that_can_be_is_taken(
+    mass: float,
+    com: tuple[float, float, float],
+    frame: str,
+    known: bool,  # noqa: FBT001
+) -> None:
+    """In the hand's axes, not below zero, below a hundred tons and a kilometre."""
+    found = payload_from(TOLD.robot, mass, com, frame)
+    assert found == (Payload(mass, com) if known else None)
+
+
+def test_a_robot_without_a_hand_carries_nothing() -> None:
+    """Whatever frame is named."""
+    robot = Robot('r', TOLD.robot.links[:1], (), ())
+    assert payload_from(robot, 1.0, (0.0, 0.0, 0.0), '') is None
+
+
+@given(st.lists(st.integers(0, 50), max_size=6), st.lists(st.integers(0, 50), min_size=1))
+def test_a_load_is_in_force_from_its_moment_on(declared: list[int], asked: list[int]) -> None:
+    """Of those declared at one time the last counts; asked in order, in any pieces."""
+    history, times = PayloadHistory(Payload(0.5)), sorted(asked)
+    for k, when in enumerate(sorted(declared)):
+        history.declare(when, Payload(float(k + 1), (0.1 * k, 0.0, 0.0)))
+    expected = [sum(when <= t for when in declared) or 0.5 for t in times]
+    half = len(times) // 2
+    found: list[float] = []
+    for part in (times[:half], times[half:]):
+        if part:
+            mass = history.at(np.array(part, np.int64))[0]
+            found += np.broadcast_to(np.asarray(mass), len(part)).tolist()
+    assert found == expected
+
+
+def weighed(effort: float, *, declared: float = 1.0, rate: float = 0.0, q: float = 0.0) -> Any:
+    """Return what the motors say where the lift gives an effort (N m)."""
+    load = Payload(declared, (0.1, 0.0, 0.0))
+    return payload_estimate(
+        TOLD, (q, 0.0), (rate, math.nan), (effort, math.nan), DOWN, load
+    )  # fmt: skip
+
+
+def need(mass: float, q: float = 0.0) -> float:
+    """Return the effort (N m) of the lift with a load."""
+    return float(static_torque(TOLD.robot, (q, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)))[0])
+
+
+@pytest.mark.parametrize(
+    ('mass', 'differs'), [(1.0, False), (1.49, False), (1.51, True), (3.0, True), (0.4, True)]
+)
+def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa: FBT001
+    """By the leverage of a kg; half a kg from what was declared is told."""
+    found = weighed(need(mass))
+    assert found.mass == pytest.approx(mass)
+    assert found.declared == 1.0
+    assert found.differs == differs
+    assert f'as if {mass:.1f} kg were in the hand, 1.0 kg are declared' in found.sentence
+
+
+def test_less_than_nothing_is_told_as_nothing() -> None:
+    """A motor that is helped a little carries no negative load; helped much, the arm leans."""
+    assert 'as if 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
+    assert weighed(need(0.0) - 0.6 * LIFT) is None
+
+
+def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
+    """Motion, no effort, or an arm that stands up: a kg there is felt by less than a N m."""
+    assert weighed(need(2.0), rate=0.02) is not None
+    assert weighed(need(2.0), rate=0.021) is None
+    assert weighed(math.nan) is None
+    assert weighed(5.0, q=math.pi / 2) is None
+    steep, steeper = math.acos(1.05 / LIFT), math.acos(0.95 / LIFT)
+    assert weighed(need(2.0, steep), q=steep) is not None
+    assert weighed(need(2.0, steeper), q=steeper) is None
+
+
+@pytest.mark.parametrize(('off', 'known'), [(5.0, True), (15.0, False)])
+def test_what_no_load_explains_is_no_load(off: float, known: bool) -> None:  # noqa: FBT001
+    """A level slide feels no load: its force must stay below what half a kg is to the lift."""
+    load = Payload(1.0, (0.1, 0.0, 0.0))
+    told = payload_estimate(
+        TOLD, (0.0, 0.0), (0.0, 0.0), (need(1.0), off), DOWN, load
+    )  # fmt: skip
+    assert (told is not None) == known

@@ -1,0 +1,250 @@
+"""What the verdict says beside the alerts, and what a person may do about them."""
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance import AcceptanceError, BadSample
+from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.alerts.alarms import State
+from ugv_acceptance.evaluation.alerts.messages import WORDS as EVALUATED
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.monitoring.diagnostics import verdict_of
+from ugv_acceptance.monitoring.faults import SUSPECTS, WORDS, suspect_of, what_to_do
+from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, operate, operation_from
+
+PACKBOT = load().settings
+FOLDED = (0.0, 2.0, -2.5, 2.0)
+STRETCHED = (0.0, 0.0, 0.0, 2.0)
+# 3.6 degrees past its tipping point.
+NEARER = (0.0, 0.3, 0.2, 2.0)
+DOWN = (0.0, 0.0, -9.81)
+
+
+def session_with(settings: Settings = PACKBOT) -> Session:
+    """Return a session that writes nothing down."""
+    return Session(settings, lambda _stamp, _margins: None, lambda: None, lambda _text: None)
+
+
+def give(
+    session: Session, q: tuple[float, ...], pitch: float = 0.0, effort: Any = (0.0,) * 4
+) -> None:
+    """Give a session both inputs of a robot at rest that faces downhill by `pitch` (rad)."""
+    now, names = session.clock.now(), PACKBOT.robot.joint_names
+    force = (-9.81 * math.sin(pitch), 0.0, 9.81 * math.cos(pitch))
+    turn = (0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2))
+    session.take_joint_state(joint_state_cdr(now, '', names, q, (0.0,) * 4, effort))
+    session.take_imu(imu_cdr(now, 'imu_link', turn, (0.0, 0.0, 0.0), force))
+
+
+def wait_until(condition: Any, meanwhile: Any) -> None:
+    """Give messages until it is so."""
+    end = time.monotonic() + 60.0
+    while not condition():
+        assert time.monotonic() < end
+        meanwhile()
+        time.sleep(0.01)
+
+
+def raised(session: Session, code: str, subject: str = '', level: int = 0) -> list[Alert]:
+    """Return the alerts of a code that are active: on a busy machine an input may be late too."""
+    rules = [(a, a.rule) for a in session.active if a.rule.code == code]
+    return [a for a, rule in rules if rule.subject.startswith(subject) and rule.level >= level]
+
+
+def test_advice_comes_without_holding_up_a_message() -> None:
+    """First the general advice, then the computed one, which a thread has worked out."""
+    session = session_with()
+    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
+    session.follower.take()
+    assert 'raise the elbow' not in verdict_of(session).message
+    wait_until(session.counsel.arrived, lambda: give(session, STRETCHED))
+    wait_until(
+        lambda: 'raise the elbow by' in verdict_of(session).message,
+        lambda: give(session, STRETCHED),
+    )
+    verdict = verdict_of(session)
+    assert verdict.values['do'] == verdict.values['advice_1']
+    assert verdict.values['class'] in {'physical / effector', 'human / interaction'}
+
+
+def test_the_verdict_tells_the_margin_of_now() -> None:
+    """A robot that was worse a moment ago is told the same as one that was not."""
+    said = []
+    for before in ((), (STRETCHED,)):
+        session = session_with()
+        for q in (*before, NEARER):
+            # An input that is late for a moment is said first.
+            wait_until(lambda q=q: _tells(session, q), lambda q=q: give(session, q))  # noqa: B023
+        said.append(verdict_of(session).message.split(' (and ')[0])
+    assert said[0] == said[1]
+    assert raised(session, 'TIP_OVER', level=ERROR)[0].peak > math.radians(9.0)
+
+
+def _tells(session: Session, q: tuple[float, ...]) -> bool:
+    margins = session.evaluator.margins
+    there = margins is not None and margins.q == q
+    return there and 'past its tipping point' in verdict_of(session).message
+
+
+def test_a_robot_that_slides_before_it_tips_is_told() -> None:
+    """With a friction of 0.3 the tracks slide at 16.7 degrees: 1.7 are left on a slope of 15."""
+    limits = replace(PACKBOT.limits, friction=0.3)
+    session = session_with(replace(PACKBOT, limits=limits))
+    slope = math.radians(15.0)
+    wait_until(lambda: session.evaluator.margins, lambda: give(session, FOLDED, slope))
+    verdict = verdict_of(session)
+    assert verdict.values['slide_left_deg'] == pytest.approx(1.7, abs=0.01)
+    wait_until(lambda: raised(session, 'SLIDE'), lambda: give(session, FOLDED, slope))
+    assert [a.rule.subject for a in raised(session, 'SLIDE')] == ['robot']
+    assert not raised(session, 'TIP_OVER')
+    said = verdict_of(session).message
+    assert 'the tracks slide before it tips: 1.7 degrees of slope left' in said
+    assert 'stop; go back to where the slope is less' in said
+
+
+def test_a_robot_that_tips_before_it_slides_is_not_told_of_sliding() -> None:
+    """With a friction of 0.8 a stretched arm with its load tips first."""
+    limits = replace(PACKBOT.limits, friction=0.8)
+    session = session_with(replace(PACKBOT, limits=limits))
+    wait_until(
+        lambda: raised(session, 'TIP_OVER'),
+        lambda: give(session, STRETCHED, math.radians(30.0)),
+    )
+    assert not raised(session, 'SLIDE')
+
+
+def test_a_load_that_the_motors_feel_is_offered() -> None:
+    """Efforts of 6 kg where 4 are declared: told after three looks in a row."""
+    session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
+    effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
+    wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
+    told = []
+    for _ in range(4):
+        session.feel()
+        told.append(session.counsel.estimate is not None)
+    assert told == [False, False, True, True]
+    alert = next(a for a in session.active if a.rule.code == 'PAYLOAD_DIFFERS')
+    assert alert.peak == pytest.approx(2.0, abs=0.01)
+    words = session.faults.sentence(alert, session.settings)
+    assert words == 'the motors work as if 6.0 kg were in the hand, 4.0 kg are declared'
+    assert 'declare the load' in session.counsel.do(alert)
+    assert verdict_of(session).values['payload_estimate_kg'] == pytest.approx(6.0, abs=0.01)
+
+
+def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared() -> None:
+    """A moving arm tells nothing: the alert stays; efforts that agree end it."""
+    session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
+    effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
+    wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
+    for _ in range(3):
+        session.feel()
+    moving = joint_state_cdr(
+        time.time_ns(), '', PACKBOT.robot.joint_names, q, (0.0, 0.3, 0.0, 0.0), effort
+    )
+    session.take_joint_state(moving)
+    session.feel()
+    assert session.counsel.estimate is not None
+    session.evaluator.payload = Payload(6.0)
+    give(session, q, 0.0, effort)
+    session.feel()
+    assert session.counsel.estimate is None
+
+
+def test_a_tilt_that_grows_fast_is_urgent() -> None:
+    """Tipping within two seconds is said at once, and with its time."""
+    session, begin = session_with(), time.monotonic()
+
+    def lean() -> None:
+        give(session, FOLDED, 0.3 * (time.monotonic() - begin))
+
+    wait_until(lambda: session.counsel.urgent(session.clock.now()), lean)
+    verdict = verdict_of(session)
+    assert verdict.values['tip_of'] == 'front'
+    assert 'it tips to the front in' in verdict.message
+
+
+def test_every_fault_of_the_node_says_what_to_do_and_where_to_look() -> None:
+    """No code without an action and a class."""
+    assert SUSPECTS.keys() == WORDS.keys()
+    for code in (*WORDS, *EVALUATED):
+        assert what_to_do(code)
+        assert ' / ' in suspect_of(code)
+
+
+def message(name: str, **values: str) -> DiagnosticStatus:
+    """Return an operator's message."""
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticStatus(name=name, hardware_id='Ada', message='seen', values=pairs)
+
+
+def test_the_operators_page_has_every_code_with_its_class(repository: Path) -> None:
+    """One row a code: meaning, what to do, and where to look first."""
+    page = (repository / 'docs' / 'operator.md').read_text(encoding='utf-8')
+    rows = [line.strip('| ').split(' | ') for line in page.splitlines() if line.count('|') == 5]
+    written = {row[0]: row[3] for row in rows if row[0].isupper()}
+    assert written == {code: suspect_of(code) for code in (*WORDS, *EVALUATED)}
+
+
+texts = st.text(st.characters(exclude_categories=['Cs'], exclude_characters='\0'), max_size=12)
+
+
+keys = texts | st.sampled_from(['seconds', 'code', 'subject', 'level'])
+
+
+@given(
+    texts | st.sampled_from(DOINGS),
+    st.dictionaries(keys, texts | st.sampled_from(['WARN', 'ERROR', '60'])),
+)
+def test_whatever_an_operator_sends_is_done_or_refused_in_one_line(
+    name: str, values: dict[str, str]
+) -> None:
+    """No message ends the node: it is an operation, or an error of one line that says why."""
+    error = None
+    try:
+        operate(session_with(), message(name, **values))
+    except AcceptanceError as refused:
+        error = refused
+    assert error is None or len(str(error).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ('sent', 'said'),
+    [
+        (message('explode'), 'name: expected one of acknowledge'),
+        (message('shelve', code='CLOCK', level='BAD'), 'level: expected one of OK'),
+        (message('shelve', seconds='soon'), 'seconds: expected a number'),
+        (message('shelve', seconds='nan'), 'seconds: expected a number'),
+    ],
+)
+def test_what_is_wrong_with_an_operation_is_said(sent: DiagnosticStatus, said: str) -> None:
+    """Which field, what was expected, what came."""
+    with pytest.raises(BadSample, match=said):
+        operation_from(sent)
+
+
+def test_one_alarm_can_be_acknowledged_by_its_code() -> None:
+    """The others stay as they are."""
+    session = session_with()
+    wait_until(
+        lambda: raised(session, 'TIP_OVER', 'front', ERROR) and len(session.active) > 3,
+        lambda: give(session, STRETCHED),
+    )
+    session.follower.take()
+    asked = message('acknowledge', code='TIP_OVER', subject='front', level='ERROR')
+    (change,) = operate(session, asked)
+    assert (change.who, change.note) == ('Ada', 'seen')
+    states = [alarm.state for alarm in session.follower.alarms.table.values()]
+    assert states.count(State.ACTIVE_ACKNOWLEDGED) == 1

@@ -1,0 +1,274 @@
+"""What the live node is made of, without ROS around it: bytes in, margins and alerts out."""
+
+import struct
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from bag.bag_cases import cdr, joint_state
+from hypothesis import given
+from hypothesis import strategies as st
+from nodes.live_case import FOLDED, NAMES, imu, joints
+
+from ugv_acceptance.bag.encode import JointStateBytes, joint_state_cdr
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
+from ugv_acceptance.monitoring.alarm_tracker import KEPT, Follower
+from ugv_acceptance.monitoring.diagnostics import guarded
+from ugv_acceptance.monitoring.faults import WORDS
+from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock
+from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.monitor.parameters import knobs_of, unknown
+
+CONFIG = load()
+NS = 1_000_000_000
+
+
+def session(problems: list[str] | None = None) -> Session:
+    """Return a session of the PackBot whose problems are written to a list."""
+    told = [] if problems is None else problems
+    return Session(CONFIG.settings, lambda _s, _m: None, lambda: None, told.append)
+
+
+GOOD = {'joint_states': joints(stamp=NS), 'imu': imu(stamp=NS)}
+
+
+@st.composite
+def mutated(draw: st.DrawFn) -> tuple[str, bytes]:
+    """Draw a good message with bytes changed, cut or added; or any bytes at all."""
+    name = draw(st.sampled_from(sorted(GOOD)))
+    if draw(st.booleans()):
+        return name, draw(st.binary(max_size=300))
+    data = bytearray(GOOD[name])
+    for _ in range(draw(st.integers(0, 4))):
+        data[draw(st.integers(0, len(data) - 1))] = draw(st.integers(0, 255))
+    return name, bytes(data[: draw(st.integers(0, len(data)))]) + draw(st.binary(max_size=9))
+
+
+@given(st.lists(mutated(), max_size=8))
+def test_no_bytes_end_the_session(messages: list[tuple[str, bytes]]) -> None:
+    """Whatever comes is evaluated or counted as malformed; our own code never faults on it."""
+    watched = session()
+    takes = {'joint_states': watched.take_joint_state, 'imu': watched.take_imu}
+    for name, data in messages:
+        takes[name](data)
+    watched.tick()
+    taken = sum(count.taken + count.malformed for count in watched.counts.values())
+    assert taken == len(messages)
+    assert 'MONITOR_FAULT' not in [alert.rule.code for alert in watched.evaluator.watch.log]
+
+
+def test_a_fault_of_ours_is_an_error_and_not_the_end() -> None:
+    """An exception in the evaluation is reported, and leaves no margins behind."""
+    problems: list[str] = []
+    watched = session(problems)
+
+    def broken(*_: Any) -> None:
+        raise ZeroDivisionError
+
+    watched.take_imu(imu())
+    watched.take_joint_state(joints())
+    before = watched.evaluator.margins
+    watched._guard('imu', broken)(b'')
+    assert before is not None
+    assert watched.evaluator.margins is None
+    assert watched.level == STALE
+    assert problems
+    assert [alert.rule.code for alert in watched.faults.active] == ['MONITOR_FAULT']
+
+
+def test_a_fault_in_a_timer_is_an_error_and_not_the_end() -> None:
+    """What fails in a timer's work is told, leaves the margins unknown, and does not come out."""
+    told: list[str] = []
+    watched = session(told)
+
+    class Watching:
+        """A monitor as far as a timer needs one."""
+
+        session: Session | None = watched
+
+        def get_logger(self) -> Any:
+            return SimpleNamespace(error=lambda text, **_: told.append(text))
+
+    def tick() -> None:
+        raise ZeroDivisionError
+
+    guarded(Watching(), tick)()
+    assert watched.evaluator.margins is None
+    assert any('ZeroDivisionError' in text for text in told)
+    assert any(alert.rule.code == 'MONITOR_FAULT' for alert in watched.active)
+
+
+def test_margins_come_with_the_second_input() -> None:
+    """Either input alone gives no margins; both do, and then every message."""
+    got: list[int] = []
+    watched = Session(CONFIG.settings, lambda s, _: got.append(s), lambda: None, lambda _: None)
+    stamp = time.time_ns()
+    watched.take_imu(imu(stamp=stamp))
+    assert got == []
+    watched.take_joint_state(joints(stamp=stamp + 1))
+    watched.take_imu(imu(stamp=stamp + 2))
+    assert got == [stamp + 1, stamp + 2]
+    assert watched.level == OK
+
+
+@given(
+    st.integers(0, 2**31 - 1),
+    st.lists(st.tuples(st.floats(width=64), st.floats(width=64)), min_size=1, max_size=8),
+)
+def test_filled_bytes_are_the_message(sec: int, pairs: list[tuple[float, float]]) -> None:
+    """A filled template is byte for byte what serialising the message gives."""
+    names = [f'joint_{k}' for k in range(len(pairs))]
+    position, effort = zip(*pairs, strict=True)
+    template = JointStateBytes(names, 'base')
+    template.fill(5, [1.0] * len(names), [2.0] * len(names))
+    data = template.fill(sec * NS + 7, position, effort)
+    assert data == joint_state_cdr(sec * NS + 7, 'base', names, position, (), effort)
+    whole = cdr(joint_state((sec, 7), 'base', names, (position, (), effort)))
+    assert data == whole[: len(data)]
+
+
+def test_the_receipt_clock_is_the_wall_clock_at_first() -> None:
+    """Receipt times are nanoseconds since the epoch."""
+    assert abs(ReceiptClock().now() - time.time_ns()) < NS
+
+
+@given(st.integers(0, 2**60), st.integers(0, 2**60))
+def test_simulated_stamps_are_shifted_into_receipt_time(now: int, simulated: int) -> None:
+    """After /clock was seen, a stamp of its time is the time of receipt, within the slack."""
+    clock = ReceiptClock(simulated=True)
+    clock.follow(now, simulated)
+    assert abs(clock.stamp(now, simulated) - now) <= RESHIFT
+
+
+def test_real_stamps_are_not_shifted() -> None:
+    """Without use_sim_time nothing moves a stamp."""
+    clock = ReceiptClock()
+    clock.follow(10 * NS, 3 * NS)
+    assert clock.stamp(10 * NS, 4 * NS) == 4 * NS
+
+
+def alert(k: int, code: str = 'TIP_OVER') -> Alert:
+    """Return an alert that begins at `k`."""
+    return Alert(Rule(code, 'front', ERROR, 0.0, 0.0, 0, 0), k, 1.0)
+
+
+def test_the_follower_tells_each_change_once() -> None:
+    """An alert is raised once and cleared once."""
+    log: list[Alert] = []
+    follower = Follower(log)
+    assert not follower.changed()
+    log.append(alert(1))
+    assert follower.changed()
+    assert [change.how for change in follower.take()] == ['raised']
+    assert not follower.changed()
+    log[0].end = 2
+    assert [change.how for change in follower.take()] == ['cleared']
+    assert follower.take() == []
+
+
+def test_an_alert_shorter_than_a_look_is_told() -> None:
+    """What was raised and cleared between two looks is both, in that order."""
+    short = alert(1)
+    short.end = 2
+    follower = Follower([short])
+    assert [change.how for change in follower.take()] == ['raised', 'cleared']
+
+
+@given(st.lists(st.integers(0, 400), max_size=30))
+def test_memory_stays_bounded(bursts: list[int]) -> None:
+    """Of cleared alerts no more than a fixed number is kept; active ones are never forgotten."""
+    log: list[Alert] = [alert(0, 'NO_SUPPORT')]
+    follower = Follower(log)
+    active = log[0]
+    told = 0
+    for burst in bursts:
+        for k in range(burst):
+            log.append(alert(k))
+            log[-1].end = k + 1
+        told += len(follower.take())
+        assert len(log) <= 2 * KEPT + 1
+        assert len(follower.alarms.table) <= 2
+    assert any(found is active for found in log) or not bursts
+    assert told == 2 * sum(bursts) + bool(bursts)
+
+
+def test_what_is_over_and_seen_waits_for_nobody_but_a_tip_over() -> None:
+    """Of failures that were acknowledged only a tip-over stays, until it is reset."""
+    log = [alert(1), alert(2, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
+    follower = Follower(log)
+    follower.take()
+    assert len(follower.alarms.acknowledge(2, 'Ada')) == 3
+    for one in log:
+        one.end = 3
+    follower.take()
+    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
+    follower.alarms.reset(4, 'Ada')
+    assert follower.waiting == []
+
+
+def test_failures_nobody_saw_wait_and_faults_of_inputs_do_not() -> None:
+    """Only failures of the robot wait for somebody to have seen them."""
+    log = [alert(1, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
+    follower = Follower(log)
+    follower.take()
+    for one in log:
+        one.end = 3
+    follower.take()
+    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
+    follower.alarms.acknowledge(4, 'Ada')
+    assert follower.waiting == []
+
+
+@pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)
+def test_a_parameter_reads_what_was_put(knob: Any) -> None:
+    """Putting what was got changes nothing; putting another value is read back."""
+    settings = CONFIG.settings
+    value = knob.get(settings)
+    assert knob.get(knob.put(settings, value)) == pytest.approx(value)
+    if knob.lower is not None:
+        other = knob.lower + 0.25 * (min(knob.upper, 100.0) - knob.lower)
+        assert knob.get(knob.put(settings, other)) == pytest.approx(other)
+        assert knob.lower <= value <= knob.upper
+
+
+def test_a_misspelt_parameter_is_said() -> None:
+    """A parameter that does not exist is a warning that names the nearest one."""
+    (text,) = unknown(['limits.tip_wran_deg'], knobs_of(CONFIG.settings))
+    assert 'limits.tip_wran_deg' in text
+    assert 'limits.tip_warn_deg' in text
+
+
+@pytest.mark.parametrize('code', WORDS)
+def test_every_fault_says_what_to_do(code: str) -> None:
+    """An alert needs an action, also those of the node."""
+    _, sentence, action = WORDS[code]
+    assert sentence
+    assert len(action.split()) >= 3
+
+
+def test_a_big_endian_message_is_read_too() -> None:
+    """The byte order is the sender's choice."""
+    watched = session()
+    watched.take_imu(imu())
+    stamp = time.time_ns()
+    message = joint_state((stamp // NS, stamp % NS), '', NAMES, (FOLDED, (), ()))
+    data = cdr(message, little=False)
+    assert struct.unpack_from('>i', data, 4)[0] == stamp // NS
+    watched.take_joint_state(data)
+    assert watched.evaluator.margins is not None
+
+
+@pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)
+def test_every_parameter_is_documented(repository: Path, knob: Any) -> None:
+    """docs/ros_interface.md names every parameter."""
+    name = knob.name if '.limit_' not in knob.name else 'joints.JOINT.limit_nm'
+    assert f'`{name}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('code', WORDS)
+def test_every_alert_of_the_node_is_documented(repository: Path, code: str) -> None:
+    """docs/ros_interface.md names every alert that only the node raises."""
+    assert f'`{code}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')

@@ -1,0 +1,222 @@
+"""What is left, what was least, how soon it is gone, and what the motors say of the load."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from evaluation.streams import settings
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Limits, Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.sliding import slide_left
+from ugv_acceptance.model.stability import Stability
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.monitoring.trends import Outlook
+from ugv_acceptance.simulation.vehicle import gravity_on_slope
+
+PACKBOT = load().settings
+LEVEL = (0.0, 0.0, -9.81)
+STILL = (0.0,) * 4
+SECOND = 1_000_000_000
+
+
+def sample(time: int, front: float, shoulder: float = 10.0) -> Margins:
+    """Return margins with this tilt left (rad) to the front and this torque (N m)."""
+    nothing = (1.0,) * 4
+    stability = Stability((front, 1.0, 1.0, 1.0), nothing, nothing, 0.1, 0)
+    return Margins(time, time, STILL, LEVEL, (0.0, shoulder, 5.0, 0.0), stability)
+
+
+@given(st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-60.0, 60.0)), min_size=1))
+def test_near_misses_are_the_least_of_all_samples(values: list[tuple[float, float]]) -> None:
+    """The smallest tilt and the smallest torque margin, whatever their order."""
+    outlook = Outlook(PACKBOT)
+    for k, (front, shoulder) in enumerate(values):
+        outlook.see(sample(k, front, shoulder))
+    tilt, torque = outlook.near_misses()
+    assert tilt.left == min(1.0, *(front for front, _ in values))
+    assert torque.left == min(45.0, *(50.0 - abs(tau) for _, tau in values))
+
+
+def test_a_margin_that_shrinks_evenly_is_told_with_its_time() -> None:
+    """Ten degrees left and five a second: two seconds; it does not matter that it is noisy."""
+    outlook, noise = Outlook(PACKBOT), np.random.default_rng(3).normal(0.0, 0.002, 200)
+    for k in range(200):
+        left = math.radians(20.0 - 5.0 * k / 100) + float(noise[k])
+        outlook.see(sample(k * SECOND // 100, left))
+    (front,) = outlook.ahead(2 * SECOND)
+    assert front.subject == 'front'
+    assert front.seconds == pytest.approx(2.0, abs=0.2)
+    assert front.rate == pytest.approx(math.radians(-5.0), rel=0.1)
+
+
+def test_a_load_that_grows_is_told_with_its_time() -> None:
+    """From 30 N m at 10 N m a second it takes two seconds to 50 N m."""
+    outlook = Outlook(PACKBOT)
+    for k in range(100):
+        outlook.see(sample(k * SECOND // 100, 0.8, -20.0 - k / 10))
+    (shoulder,) = outlook.ahead(SECOND)
+    assert shoulder.subject == 'shoulder_joint'
+    assert shoulder.seconds == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize('later', [0, 3 * SECOND])
+def test_a_robot_that_rests_or_is_not_heard_has_nothing_ahead(later: int) -> None:
+    """No rate, or no sample of the last second: nothing is said."""
+    outlook = Outlook(PACKBOT)
+    for k in range(100):
+        left = 0.1 - 0.05 * k / 100 if later else 0.1
+        outlook.see(sample(k * SECOND // 100, left))
+    assert outlook.ahead(SECOND + later) == ()
+
+
+MS = 1_000_000
+TWO = settings(limits=Limits((100.0, 10.0)))
+
+
+def seen(
+    values: Sequence[tuple[tuple[float, ...], tuple[float, float]]], spacing: int = 50 * MS,
+    told: Settings = TWO,
+) -> Outlook:  # fmt: skip
+    """Return an outlook that saw (tilts left, torques) from time 0 on."""
+    outlook, nothing = Outlook(told), (1.0,) * 4
+    for k, (angle, torque) in enumerate(values):
+        stability = Stability(angle, nothing, nothing, 0.1, 0)
+        outlook.see(Margins(k * spacing, 0, (0.0, 0.0), LEVEL, torque, stability))
+    return outlook
+
+
+FINE = (1.0, 1.0, 1.0, 1.0)
+
+
+def test_a_near_miss_is_dated_to_the_first_of_equals() -> None:
+    """Tilt in rad; of torques the one that was the largest share of its limit, in its unit."""
+    least = ((1.0, 0.2, 1.0, 0.5), (-90.0, 8.0))
+    outlook = seen([(FINE, (1.0, 1.0)), least, least, (FINE, (80.0, -7.0))])
+    tilt, torque = outlook.near_misses()
+    assert (tilt.time, tilt.subject, tilt.left) == (50 * MS, 'left', 0.2)
+    assert (torque.time, torque.subject, torque.left) == (50 * MS, 'lift', 10.0)
+
+
+def test_what_has_no_limit_or_was_never_seen_is_no_near_miss() -> None:
+    """A joint without a limit, a tilt that is not known, and no sample at all."""
+    free = settings(limits=Limits((math.inf, 10.0)))
+    nowhere = (math.nan,) * 4
+    (torque,) = seen([(nowhere, (50.0, 3.0))], told=free).near_misses()
+    assert (torque.subject, torque.left) == ('slide', 7.0)
+    assert seen([]).near_misses() == ()
+    assert seen([]).ahead(0) == ()
+
+
+def falling(count: int, spacing: int = 50 * MS, tilt: float = 0.2, load: float = 0.0) -> Outlook:
+    """Return an outlook on a front tilt of 0.5 rad and a lift's load of 85 N m, at these rates."""
+    at = [k * spacing / SECOND for k in range(count)]
+    return seen([((0.5 - tilt * t, 1.0, 1.0, 1.0), (85.0 + load * t, 0.0)) for t in at], spacing)
+
+
+def test_eight_samples_of_the_last_second_tell_a_rate() -> None:
+    """One every 50 ms is kept; a second old is too old."""
+    assert len(falling(8).ahead(350 * MS)) == 1
+    assert falling(7).ahead(300 * MS) == ()
+    assert len(falling(8).ahead(SECOND - 1)) == 1
+    assert falling(8).ahead(SECOND) == ()
+    assert falling(15, spacing=25 * MS).ahead(350 * MS) != ()
+    assert falling(14, spacing=25 * MS).ahead(350 * MS) == ()
+
+
+def test_a_second_of_samples_is_all_that_is_kept() -> None:
+    """However long the robot runs."""
+    assert len(falling(500)._recent) == 21
+
+
+def test_a_rate_is_that_of_a_line_through_the_last_second() -> None:
+    """Least squares over its twenty samples, carried on to the moment that is asked for."""
+    time = np.arange(40) * 0.05
+    tilt = 1.0 - 0.1 * time**2
+    found = seen([((float(x), 1.0, 1.0, 1.0), (0.0, 0.0)) for x in tilt])
+    now = 2.0
+    last = time > now - 1.0
+    rate, value = np.polyfit(time[last] - now, tilt[last], 1)
+    (front,) = found.ahead(2 * SECOND)
+    assert front.rate == pytest.approx(rate)
+    assert front.seconds == pytest.approx(-value / rate)
+
+
+@pytest.mark.parametrize(
+    ('tilt', 'load', 'names'),
+    [
+        (0.2, 0.0, ['front']), (0.0, 5.0, ['lift']), (0.2, 12.0, ['lift', 'front']),
+        (0.0, 3.1, ['lift']), (0.0, 2.9, []), (0.2, -5.0, ['front']), (-0.2, -5.0, []),
+        (0.1, 0.0, ['front']), (0.085, 0.0, []),
+    ],
+)  # fmt: skip
+def test_what_is_used_up_within_five_seconds_is_told_soonest_first(
+    tilt: float, load: float, names: list[str]
+) -> None:
+    """Loads that grow by 3 % of their limit a second or more; what recovers is not told."""
+    assert [a.subject for a in falling(10, tilt=tilt, load=load).ahead(450 * MS)] == names
+
+
+@pytest.mark.parametrize(('degrees', 'told'), [(1.1, True), (0.9, False)])
+def test_a_tilt_that_shrinks_by_a_degree_a_second_is_told(degrees: float, told: bool) -> None:  # noqa: FBT001
+    """Slower it is not, however little is left."""
+    at = [k * 0.05 for k in range(10)]
+    low = [((0.03 - math.radians(degrees) * t, 1.0, 1.0, 1.0), (0.0, 0.0)) for t in at]
+    assert bool(seen(low).ahead(450 * MS)) == told
+
+
+def test_a_margin_that_was_unknown_tells_nothing_and_one_that_is_gone_tells_now() -> None:
+    """The other margins go on; a limit that is infinite is none."""
+    at = [k * 0.05 for k in range(10)]
+    rows = [((0.5 - 0.2 * t, -0.1 - 0.2 * t, 1.0, 1.0), (85.0 + 9.0 * t, 9.0 + t)) for t in at]
+    rows[4] = ((math.nan, *rows[4][0][1:]), rows[4][1])
+    free = settings(limits=Limits((math.inf, 10.0)))
+    left, slide = seen(rows, told=free).ahead(450 * MS)
+    assert (left.subject, left.seconds) == ('left', 0.0)
+    assert slide.subject == 'slide'
+    assert slide.rate == pytest.approx(-1.0)
+
+
+@given(st.floats(0.0, 1.5), st.floats(-3.1, 3.1), st.floats(0.05, 2.0))
+def test_the_robot_slides_where_the_slope_is_the_angle_of_friction(
+    tilt: float, heading: float, friction: float
+) -> None:
+    """What is left is the friction angle less the slope, whatever way it faces."""
+    x, y, z = gravity_on_slope(9.81, tilt, heading).tolist()
+    assert slide_left((x, y, z), friction) == pytest.approx(math.atan(friction) - tilt, abs=1e-9)
+
+
+def test_without_a_friction_nothing_slides() -> None:
+    """Friction that is not known is not judged."""
+    assert slide_left(LEVEL, math.inf) == math.inf
+
+
+@given(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-0.8, 0.8))
+def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) -> None:
+    """Efforts of a load at rest give its mass, and whether it is another than the declared one."""
+    q, down = (0.3, 0.4, -0.2, 0.0), gravity_on_slope(9.81, tilt, 1.0)
+    effort = static_torque(PACKBOT.robot, q, down, Payload(carried))
+    found = payload_estimate(PACKBOT, q, STILL, effort.tolist(), down.tolist(), Payload(declared))
+    assert found is not None
+    assert found.mass == pytest.approx(carried, abs=1e-6)
+    if not 0.499 < abs(declared - carried) < 0.501:
+        assert found.differs == (abs(declared - carried) > 0.5)
+
+
+def test_the_motors_tell_nothing_of_a_load_while_they_move() -> None:
+    """In motion, unknown, zero or turned round they say nothing; friction is no load."""
+    q, ten, nan = (0.0, 0.4, -0.2, 0.0), (0.0, 90.0, 40.0, 0.0), (math.nan,) * 4
+    moving = (0.0, 0.2, 0.0, 0.0)
+    assert payload_estimate(PACKBOT, q, moving, ten, LEVEL, Payload(4.0)) is None
+    assert payload_estimate(PACKBOT, q, STILL, nan, LEVEL, Payload(4.0)) is None
+    assert payload_estimate(PACKBOT, q, STILL, (0.0,) * 4, LEVEL, Payload(4.0)) is None
+    model = static_torque(PACKBOT.robot, q, LEVEL, Payload(4.0))
+    assert payload_estimate(PACKBOT, q, STILL, (-model).tolist(), LEVEL, Payload(4.0)) is None
+    stuck = (model + np.array((0.0, 10.0, -10.0, 0.0))).tolist()
+    assert payload_estimate(PACKBOT, q, STILL, stuck, LEVEL, Payload(4.0)) is None

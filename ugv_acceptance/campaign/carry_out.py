@@ -1,0 +1,98 @@
+"""A campaign carried out: every run judged or found judged, then the failures and the statement."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.campaign import store
+from ugv_acceptance.campaign.cluster import WAIT_S
+from ugv_acceptance.campaign.failure_log import Entry
+from ugv_acceptance.campaign.failures import Failure, with_log
+from ugv_acceptance.campaign.pool import judge_all
+from ugv_acceptance.campaign.run_table import (
+    NOT_JUDGED,
+    Row,
+    broken_row,
+    in_order,
+    row_of,
+    unjudged_row,
+)
+from ugv_acceptance.campaign.sources import Source
+from ugv_acceptance.campaign.work import Brief, Done, judge_source
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a campaign is worked out: processes of this machine, or a dask scheduler's address.
+
+    `wait_s` is how long a scheduler or workers that went away are waited for.
+    """
+
+    folder: Path
+    workers: int
+    scheduler: str | None = None
+    wait_s: float = WAIT_S
+
+
+@dataclass(slots=True)
+class Effort:
+    """How many runs were judged anew, the bytes of their recordings, and CPU time (s) for all."""
+
+    judged: int = 0
+    size: int = 0
+    cpu: float = 0.0
+
+
+def carry_out(
+    sources: Sequence[Source],
+    brief: Brief,
+    place: Place,
+    progress: Callable[[Done], None] = lambda _: None,
+) -> tuple[list[Row], Effort]:
+    """Judge every source, keep its result in the folder, and return the runs in order.
+
+    What the folder already holds is not judged again; what was not judged is tried again.
+    `progress` takes every run as it is ready.
+    """
+    store.prepare(place.folder)
+    brief = replace(brief, known=store.known_keys(place.folder))
+    rows, effort = [], Effort()
+    for done in judge_all(sources, brief, place.workers, place.scheduler, place.wait_s):
+        rows.append(_row(done, brief, place.folder))
+        effort.cpu += done.cpu
+        if done.row is not None:
+            effort.judged += 1
+            effort.size += done.size
+        progress(done)
+    return in_order(rows), effort
+
+
+def _row(done: Done, brief: Brief, folder: Path) -> Row:
+    name = done.source.name
+    if done.lost:
+        return unjudged_row(name, done.lost)
+    if done.error:
+        return broken_row(name, done.error)
+    if done.row is not None:
+        store.keep(folder, done.key, done.text)
+        return done.row
+    try:
+        return row_of(name, done.key, store.read(folder, done.key))
+    except (AcceptanceError, LookupError, TypeError, ValueError, AttributeError):
+        # What was kept is not what was written: as if it were not there.
+        again = judge_source(done.source, replace(brief, known=frozenset()))
+        return _row(again, brief, folder)
+
+
+def all_failures(rows: Sequence[Row], entries: Sequence[Entry]) -> list[Failure]:
+    """Return the failures of all runs with those of a log, in the order of the runs.
+
+    What the log says of an alert waits until its run is judged: nobody knows that alert yet.
+    """
+    names = {name: row.name for row in rows for name in (row.name, *row.also)}
+    open_runs = {row.name for row in rows if row.verdict == NOT_JUDGED}
+    said = [e for e in entries if e.alert is None or e.run_of(names) not in open_runs]
+    found = with_log([f for row in rows for f in row.failures], said, names)
+    place = {row.name: k for k, row in enumerate(rows)}
+    return sorted(found, key=lambda f: (place[f.run], f.at_s))

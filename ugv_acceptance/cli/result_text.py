@@ -1,0 +1,223 @@
+"""A result as a person reads it in ten seconds: the verdict, why, and the worst of each margin."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, TextColumn
+from rich.table import Table
+
+from ugv_acceptance.report.format import doubts_of, missing_text
+
+COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
+MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
+_MOST_ALERTS = 12
+_MOST_EFFORTS = 11
+# Of so many messages a rate is told, if they can be used.
+_FEW = 100
+# Less payload (kg) than minus this is none: the arm is held up by something.
+_LIGHT = 0.1
+# What robot failures and lost data come to, the least first.
+_SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
+
+
+@contextmanager
+def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int], None]]:
+    """Show how far a recording is read (log times, ns), where a person is watching."""
+    console = Console(file=stream)
+    if not console.is_terminal:  # a disabled bar of older rich still prints an empty line
+        yield lambda _: None
+        return
+    with Progress(
+        *Progress.get_default_columns(),
+        TextColumn('{task.fields[seconds]:.0f} s of the recording'),
+        console=console,
+        transient=True,
+    ) as progress:
+        task = progress.add_task('reading', total=max(end - start, 1), seconds=0.0)
+
+        def reached(now: int) -> None:
+            progress.update(task, completed=now - start, seconds=(now - start) / 1e9)
+
+        yield reached
+
+
+@contextmanager
+def while_read() -> Iterator[None]:
+    """Print while somebody reads: a closed pipe (`| head`) changes no exit code."""
+    try:
+        yield
+        sys.stdout.flush()
+    except (BrokenPipeError, SystemExit):  # the second is how newer rich tells of the first
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def print_result(result: dict[str, Any], console: Console | None = None) -> None:
+    """Print a result of `evaluate`."""
+    console = console or Console(highlight=False)
+    word = result['verdict']
+    paths = result['bag']['path']
+    heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
+    console.print(heading, soft_wrap=True)
+    for reason in result['reasons'][:5]:
+        console.print(f'    {escape(reason)}', soft_wrap=True)
+    if len(result['reasons']) > 5:
+        console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    for doubt in doubts_of(result):
+        console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
+    if result['criteria']['path'] is not None:
+        _print_criteria(result['criteria']['results'], console)
+    console.print(_margins(result))
+    _print_data(result, console)
+    _print_alerts(result, console)
+    if 'effort' in result:
+        _print_effort(result, console)
+
+
+def _print_criteria(outcomes: list[dict[str, Any]], console: Console) -> None:
+    for outcome in outcomes:
+        word = outcome['verdict']
+        mark = f'[{COLOURS[word]}]{escape(MARKS[word]):5}[/]'
+        text = f'{outcome["name"]}: {outcome["demand"]}'
+        console.print(f'  {mark} {escape(text)}', soft_wrap=True)
+
+
+def _margins(result: dict[str, Any]) -> Table:
+    table = Table(box=None, pad_edge=False, padding=(0, 2))
+    for heading in ('margin', 'worst', 'limit', 'left', 'at', 'in violation'):
+        table.add_column(heading, justify='left' if heading == 'margin' else 'right')
+    for name, joint in result['torque'].items():
+        unit = joint['unit']
+        table.add_row(
+            escape(name),
+            _number(joint['max_abs'], unit),
+            _number(joint['limit'], unit),
+            _number(joint['min_margin'], unit),
+            _number(joint['time_of_min_s'], 's'),
+            _number(joint['time_in_violation_s'], 's', 2),
+        )
+    stability = result['stability']
+    table.add_row(
+        f'tip-over ({stability["edge"] or "no polygon"})',
+        '',
+        '',
+        _number(stability['min_angle_deg'], 'deg'),
+        _number(stability['time_of_min_s'], 's'),
+        _number(stability['time_in_violation_s'], 's', 2),
+    )
+    return table
+
+
+def _number(value: float | None, unit: str, digits: int = 1) -> str:
+    return '-' if value is None else f'{value:.{digits}f} {unit}'
+
+
+def _print_data(result: dict[str, Any], console: Console) -> None:
+    coverage, bag = result['coverage'], result['bag']
+    console.print(
+        f'evaluated {coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s '
+        f'({coverage["fraction"]:.1%}); '
+        + {'all': 'every chunk has a checksum', 'part': 'some chunks have no checksum'}.get(
+            bag['protected'], 'unprotected: no checksum would show a changed byte'
+        ),
+        soft_wrap=True,
+    )
+    for key in ('joint_states', 'imu'):
+        source = result['inputs'][key]
+        rate = source['rate_hz']
+        faults = ', '.join([*source['faults'], *_malformed(source)])
+        missing = missing_text(source, coverage['duration_s'])
+        count = source['messages']
+        console.print(
+            f'  {escape(str(source["topic"]))}: {count} message{"s" * (count != 1)}'
+            + (f' at {rate:.0f} Hz' if rate else '')
+            + (f', {missing}' if missing else '')
+            + _gaps(source)
+            + ('; none tells of a joint of this robot' if _foreign(key, source) else '')
+            + (f'; {escape(faults)}' if faults else ''),
+            soft_wrap=True,
+        )
+    if bag['salvaged']:
+        console.print(f'  salvaged: {escape(bag["salvaged"])}', soft_wrap=True)
+    for finding in bag['findings'][:5]:
+        console.print(f'  {escape(finding)}', soft_wrap=True)
+
+
+def _foreign(key: str, source: dict[str, Any]) -> bool:
+    """Return whether joint states came, but none that could be used: none of them had a rate."""
+    return bool(key == 'joint_states' and source['messages'] > _FEW and not source['rate_hz'])
+
+
+def _gaps(source: dict[str, Any]) -> str:
+    count = source['gaps']
+    if not count:
+        return ''
+    return f', {count} gap{"s" * (count > 1)} of up to {source["longest_gap_s"]:.2f} s'
+
+
+def _malformed(source: dict[str, Any]) -> list[str]:
+    count = source['malformed']
+    return [f'{count} malformed ({source["malformed_reason"]})'] if count else []
+
+
+def _print_alerts(result: dict[str, Any], console: Console) -> None:
+    alerts = result['alerts']
+    if not alerts:
+        console.print('no alerts')
+        return
+    console.print(f'{len(alerts)} alert{"s" * (len(alerts) > 1)}:')
+    for alert in alerts[:_MOST_ALERTS]:
+        end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f} s'
+        console.print(
+            f'  {alert["start_s"]:8.2f} to {end:>9}  {alert["level"]:5}  {alert["code"]:16}  '
+            f'{escape(alert["message"])}',
+            soft_wrap=True,
+        )
+    if len(alerts) > _MOST_ALERTS:
+        console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE has all)')
+    most = max(_SEVERITY.index(alert['level']) for alert in alerts)
+    worst = {a['code']: a['advice'] for a in alerts if _SEVERITY.index(a['level']) == most}
+    for code, advice in list(worst.items())[:3]:
+        console.print(f'  {code}: {escape(advice)}', soft_wrap=True)
+
+
+def _print_effort(result: dict[str, Any], console: Console) -> None:
+    """Print plateaus of effort, those of joints that feel a payload most first."""
+    joints = [(name, plateaus) for name, plateaus in result['effort'].items() if plateaus]
+    if not joints:
+        console.print('no measured effort at rest to compare')
+        return
+    console.print(
+        'measured effort beside static torque, at rest; a payload that is not declared appears as '
+        'their difference:',
+        soft_wrap=True,
+    )
+    joints.sort(key=lambda joint: -max(abs(p['effort_per_kg']) for p in joint[1]))
+    lines = [
+        _plateau_line(name, p)
+        for name, plateaus in joints
+        for p in plateaus
+        if p['payload_kg_that_explains_it'] is not None or abs(p['difference']) > 1.0
+    ]
+    for line in lines[:_MOST_EFFORTS]:
+        console.print(line, soft_wrap=True)
+    console.print(f'  {sum(len(p) for _, p in joints)} stretches in all: --json FILE has them')
+
+
+def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
+    p, payload = plateau, plateau['payload_kg_that_explains_it']
+    text = (
+        f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  measured {p["measured"]:.1f}, '
+        f'model {p["model"]:.1f}, difference {p["difference"]:+.1f} {p["unit"]}'
+    )
+    if p['saturated']:
+        return f'{text}: saturated, the effort stands at a limit'
+    if payload is None:
+        return f'{text}: no payload would do that'
+    if payload < -_LIGHT:
+        return f'{text}: it pushes against something'
+    return f'{text} = {max(payload, 0.0):.2f} kg of payload'

@@ -1,0 +1,85 @@
+"""The monitor's alerts as a console hears them: changes in, what is active or unseen out.
+
+Who joins late misses what was said before: `also` adds what a console itself sees to be active.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.console.snapshot import AlertRow
+from ugv_acceptance.evaluation.alerts.alarms import State
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, Alert
+
+_STATES = {state.value: state for state in State}
+
+
+@dataclass(slots=True)
+class AlertBook:
+    """The newest row of each alert, by code, subject and level."""
+
+    rows: dict[str, AlertRow] = field(default_factory=dict)
+
+    def take(self, values: Mapping[str, str], message: str) -> None:
+        """Take a change as published on `~/alerts`, with the alarm's state and what it offers."""
+        how = values.get('state', '')
+        code, subject = values.get('code', ''), values.get('subject', '')
+        level = LEVELS.index(values['level']) if values.get('level') in LEVELS else ERROR
+        key = f'{code}-{subject}-{LEVELS[level]}'
+        state = _STATES.get(values.get('alarm', ''), State.ACTIVE_UNACKNOWLEDGED)
+        if state is State.NORMAL:
+            self.rows.pop(key, None)
+            return
+        before = self.rows.get(key)
+        said = ': '.join(x for x in (values.get('who', ''), values.get('note', '')) if x)
+        kept = before.note if before and how != 'raised' else ''
+        shelved = how == 'shelved'
+        self.rows[key] = AlertRow(
+            key,
+            code,
+            subject,
+            level,
+            state.value + (', shelved' if shelved else ''),
+            message.removeprefix(f'{how}: '),
+            values.get('do', ''),
+            _whole(values.get('start_ns')) or 0,
+            None if state.active else _whole(values.get('end_ns')) or 0,
+            state.unseen and not shelved,
+            tuple(x for x in values.get('offers', '').split(',') if x),
+            said or kept,
+        )
+
+    def row(self, key: object) -> AlertRow:
+        """Return the row of a key that a client sent. Raises BadSample where there is none."""
+        row = self.rows.get(str(key))
+        if row is None:
+            raise BadSample(f'key: expected that of an alert that is listed, got {key!r:.80}')
+        return row
+
+    def clear(self) -> None:
+        """Forget all: the monitor has none, or started anew."""
+        self.rows.clear()
+
+    def also(self, active: Iterable[AlertRow]) -> tuple[AlertRow, ...]:
+        """Return all rows, with those of `active` that the book does not have as active."""
+        told = {key for key, row in self.rows.items() if row.end is None}
+        return (*self.rows.values(), *(row for row in active if row.key not in told))
+
+
+def row_of(alert: Alert, text: str, advice: str) -> AlertRow:
+    """Return an active alert that only the console itself sees."""
+    rule = alert.rule
+    return AlertRow(
+        f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}',
+        rule.code,
+        rule.subject,
+        rule.level,
+        'active, seen by this console only',
+        text,
+        advice,
+        alert.start,
+    )
+
+
+def _whole(text: str | None) -> int | None:
+    return int(text) if text and text.lstrip('-').isdigit() else None

@@ -1,0 +1,1 @@
+"""What to do about a margin: the moves that help, live and for a recording."""

@@ -1,0 +1,157 @@
+"""Paths that an operator could follow: one joint moved one way, or the robot turned on the spot."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.expressions import Scalar
+from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
+from ugv_acceptance.model.robot import Joint, Payload, Robot
+from ugv_acceptance.model.stability import STANDING, stability
+from ugv_acceptance.model.tree import point_of, pose_of
+from ugv_acceptance.type_aliases import Floats
+
+# A path is followed this long (s), in so many steps; a joint that moves contact points in finer
+# ones (rad), since a point counts only while it is within the ground's tolerance.
+HORIZON, STEPS, FINE = 4.0, 16, 0.01
+# Speed of a joint (rad/s; m/s) whose speed is not known, and the share of a known one to be used.
+CAREFUL, SHARE = 0.3, 0.9
+# What an arm stays above the ground (m): joints, hand and load are no points.
+CLEARANCE = 0.06
+# Turning on the spot: rate and step (rad/s, rad), and the slope (as sin) from which it matters.
+TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(5.0)), 0.05
+# Share of the weight on the lighter track below which it slips: the robot then drives off instead
+# of turning (bench/bench_advice.py).
+GRIP = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Postures `q` (n, j) and gravity (n, 3) step by step after now; `amount` (n,) in rad or m.
+
+    `seconds` (n,) is the time each step is reached; `forbidden` (n,) is where it must not lead.
+    """
+
+    subject: str
+    q: Floats
+    gravity: Floats
+    amount: Floats
+    seconds: Floats
+    forbidden: NDArray[np.bool_]
+
+
+def joint_speed(settings: Settings, j: int) -> float:
+    """Return a speed (rad/s; m/s) at which joint j can move and the static model holds."""
+    robot, speeds = settings.robot, settings.limits.speed
+    known = [robot.joint(robot.joint_names[j]).velocity, speeds[j] if speeds else np.inf]
+    least = min(known)
+    return SHARE * least if np.isfinite(least) else CAREFUL
+
+
+def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) -> list[Path]:
+    """Return a path a joint and direction; none against a load that the motor does not hold."""
+    robot = settings.robot
+    found: list[Path] = []
+    for j, name in enumerate(robot.joint_names):
+        joint, speed = robot.joint(name), joint_speed(settings, j)
+        for way in (1.0, -1.0):
+            if abs(torque[j]) >= settings.limits.torque[j] and np.sign(torque[j]) == way:
+                continue
+            amount = _amounts(robot, joint, float(q[j]), way * speed * HORIZON)
+            path = np.tile(q, (len(amount), 1))
+            path[:, j] += amount
+            down = np.broadcast_to(gravity, (len(amount), 3))
+            free = np.zeros(len(amount), dtype=bool)
+            found.append(Path(name, path, down, amount, np.abs(amount) / speed, free))
+    return _above_ground(robot, q, [path for path in found if len(path.amount)])
+
+
+def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
+    """Return the steps of a joint's path, which ends where the joint does."""
+    end = float(np.clip(start + reach, joint.lower, joint.upper)) - start
+    if np.sign(end) != np.sign(reach):
+        return np.empty(0)
+    fine = _moves_contacts(robot, joint.child)
+    count = max(STEPS, int(abs(end) / FINE)) if fine else STEPS
+    steps: Floats = np.linspace(0.0, end, count + 1)[1:]
+    return steps
+
+
+def _moves_contacts(robot: Robot, link: str) -> bool:
+    """Return whether a contact point is on `link` or on what it carries."""
+    carried = [j.child for j in robot.joints if j.parent == link]
+    here = any(contact.link == link for contact in robot.contacts)
+    return here or any(_moves_contacts(robot, child) for child in carried)
+
+
+def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
+    """Return the paths, forbidden where the arm comes lower than CLEARANCE and than it is now."""
+    if not paths:
+        return paths
+    height = _lowest(robot, np.vstack((q, *(path.q for path in paths))))
+    below = height[1:] < min(robot.ground + CLEARANCE, float(height[0])) - 1e-6
+    ends = np.cumsum([len(path.q) for path in paths])[:-1]
+    parts = zip(paths, np.split(below, ends), strict=True)
+    return [replace(path, forbidden=part) for path, part in parts]
+
+
+def _lowest(robot: Robot, q: Floats) -> Floats:
+    """Return the height (n,) in m, `base_link`, of the lowest joint of the arm, or of its load."""
+    heights = _arm_heights(mechanics_of(robot)).run(*q.T)
+    lowest: Floats = np.min([np.broadcast_to(z, len(q)) for z in (np.inf, *heights)], axis=0)
+    return lowest
+
+
+@lru_cache(maxsize=16)
+def _arm_heights(mechanics: Mechanics) -> Kernel:
+    """Compile the heights (m) of the arm's joints and its load; what carries contacts is no arm."""
+    robot, tree = mechanics.robot, mechanics.tree
+    names = [body.joint for body in tree.bodies]
+    arm = [
+        k for k in range(1, len(names)) if not _moves_contacts(robot, robot.joint(names[k]).child)
+    ]
+
+    def formula(*q: Scalar) -> tuple[Any, ...]:
+        pose = pose_of(tree, [q[robot.joint_names.index(name)] for name in names[1:]])
+        found = [pose.origin[k] for k in arm]
+        if robot.payload_link is not None:
+            found.append(point_of(tree, pose, robot.payload_link, robot.payload.cog)[1])
+        return tuple(z for _, _, z in found)
+
+    return compile_kernel(formula, robot.joint_names)
+
+
+def turn_paths(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> Iterator[Path]:
+    """Yield a path to the left and one to the right, half a turn each; none on level ground.
+
+    Forbidden where the tracks do not share the weight: skid steering turns only what both push.
+    """
+    across = float(np.hypot(gravity[0], gravity[1]))
+    if across < LEVEL * float(np.linalg.norm(gravity)):
+        return
+    for way in (1.0, -1.0):
+        amount = way * np.arange(TURN_STEP, np.pi + 1e-9, TURN_STEP)
+        c, s = np.cos(amount), np.sin(amount)
+        # Seen from a robot that turns left, gravity turns right.
+        x, y = c * gravity[0] + s * gravity[1], c * gravity[1] - s * gravity[0]
+        down = np.column_stack((x, y, np.full(len(amount), gravity[2])))
+        path = np.tile(q, (len(amount), 1))
+        slips = _slips(robot, np.vstack((q, path)), np.vstack((gravity, down)), payload)
+        seconds = np.abs(amount) / TURN_RATE
+        yield Path('robot', path, down, amount, seconds, slips[1:] | slips[0])
+
+
+def _slips(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> NDArray[np.bool_]:
+    """Return where (n,) one track carries too little, or the robot stands on other points."""
+    found = stability(robot, q, gravity, payload)
+    left, right = (np.asarray(found.moment[k], dtype=np.float64) for k in (1, 3))
+    # What holds a robot down on one side is carried by the other.
+    shared = np.minimum(left, right) >= GRIP * (left + right)
+    slips: NDArray[np.bool_] = ~(shared & (np.asarray(found.state) == STANDING))
+    return slips

@@ -1,0 +1,82 @@
+"""What to do about each alert of a recording, computed for the moment it was raised.
+
+A case is kept an alert, not a message; what costs milliseconds is done at the end, for so many.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.advice.search import COMPUTED, advise_each
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.type_aliases import Floats
+
+# Advice is computed for so many alerts of a run, the most severe first.
+MOST = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moment:
+    """Positions (j,), gravity (3,) m/s2 in `base_link`, and when (ns) the joints were heard."""
+
+    q: Floats
+    gravity: Floats
+    heard: int
+
+
+@dataclass(slots=True)
+class AlertAdvice:
+    """Gathers the cases while a recording is read; `log` grows, `payload_at` takes a time (ns)."""
+
+    settings: Settings
+    log: list[Alert]
+    payload_at: Callable[[int], Payload]
+    _cases: list[tuple[Alert, _Moment]] = field(default_factory=list)
+    _seen: int = 0
+    _last: _Moment | None = None
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins, after the log has its alerts."""
+        for alert in self._fresh():
+            k = int(rows.time.searchsorted(alert.start, side='right')) - 1
+            moment = _moment(rows, k) if k >= 0 else self._last
+            if moment is not None:
+                self._cases.append((alert, moment))
+        if len(rows.time):
+            self._last = _moment(rows, len(rows.time) - 1)
+
+    def _fresh(self) -> list[Alert]:
+        fresh = [alert for alert in self.log[self._seen :] if alert.rule.code in COMPUTED]
+        self._seen = len(self.log)
+        return fresh
+
+    def sentences(self) -> dict[int, str]:
+        """Return what to do, by the alert's `id`; none where the model knows nothing better.
+
+        What fell due after the last message is judged by that.
+        """
+        if self._last is not None:
+            self._cases.extend((alert, self._last) for alert in self._fresh())
+        order = sorted(self._cases, key=lambda case: (-case[0].rule.level, case[0].start))
+        alike: dict[Payload, list[tuple[Alert, _Moment]]] = {}
+        for alert, moment in order[:MOST]:
+            alike.setdefault(self.payload_at(moment.heard), []).append((alert, moment))
+        found: dict[int, str] = {}
+        for payload, cases in alike.items():
+            q, gravity = ([getattr(m, name) for _, m in cases] for name in ('q', 'gravity'))
+            of = [alert.rule.subject for alert, _ in cases]
+            told = advise_each(self.settings, q, gravity, payload, of)
+            found |= {
+                id(alert): best[0].sentence
+                for (alert, _), best in zip(cases, told, strict=True)
+                if best
+            }
+        return found
+
+
+def _moment(rows: MarginRows, k: int) -> _Moment:
+    j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])
+    joints = rows.pairs.joints
+    return _Moment(joints.q[j].copy(), rows.pairs.imu.gravity[i].copy(), int(joints.time[j]))

@@ -1,0 +1,326 @@
+"""What to do about the worst margin: which joint to move which way, turn, or set the load down.
+
+Each candidate is a path, followed step by step with the compiled model: it is left where another
+margin falls below its warning limit, where a motor would have to lift more than it can, or where
+the robot would come to stand on other points. Of the paths that bring the margin back the fastest
+comes first, then the others by what they gain; turning, which shakes the robot, comes last.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ugv_acceptance.evaluation.advice.paths import Path, joint_paths, turn_paths
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
+from ugv_acceptance.model.statics import centre_of_gravity, payload_capacity
+from ugv_acceptance.type_aliases import Floats
+
+# A motion is up or down where the height is at least this share of the way.
+STEEP = 0.35
+
+
+def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
+    """Return how to move a joint along a path up to a step, such as "raise the elbow by 20 deg"."""
+    joint, amount = robot.joint(path.subject), float(path.amount[step])
+    name = path.subject.removesuffix('_joint').replace('_', ' ')
+    if joint.kind == 'prismatic':
+        return f'{"extend" if amount > 0.0 else "retract"} the {name} by {abs(amount) * 100:.0f} cm'
+    by = f'by {abs(math.degrees(amount)):.0f} deg'
+    if abs(joint.axis[2]) > 0.9:
+        left = amount * joint.axis[2] > 0.0
+        return f'turn the {name} {by} to the {"left" if left else "right"}'
+    start = path.q[step] - (np.array(robot.joint_names) == path.subject) * amount
+    before, after = centre_of_gravity(robot, np.stack((start, path.q[step])), payload)
+    moved = after - before
+    up = -path.gravity[step] / np.linalg.norm(path.gravity[step])
+    rise = float(moved @ up)
+    if abs(rise) >= STEEP * float(np.linalg.norm(moved)):
+        return f'{"raise" if rise > 0.0 else "lower"} the {name} {by}'
+    return f'swing the {name} {by} {"forward" if moved[0] > 0.0 else "back"}'
+
+
+def turn_words(amount: float, gravity: Floats) -> str:
+    """Return how to turn the robot, and what it then faces; `gravity` is that after the turn."""
+    side = 'left' if amount > 0.0 else 'right'
+    downhill = math.degrees(math.atan2(gravity[1], gravity[0]))
+    faces = ''
+    if abs(downhill) <= 30.0:
+        faces = ', to face downhill'
+    elif abs(downhill) >= 150.0:
+        faces = ', to face uphill'
+    return f'turn the robot slowly by {abs(math.degrees(amount)):.0f} deg to the {side}{faces}'
+
+
+def load_words(mass: float, holds: float | None) -> str:
+    """Return that the load is to be set down; `holds` (kg) is what this posture can hold."""
+    if holds is None or holds >= mass:
+        return f'set the load of {mass:.1f} kg down'
+    return f'set the load down: {mass:.1f} kg is {mass - holds:.1f} kg too heavy in this posture'
+
+
+# Codes of alerts whose advice is computed; their subject is the margin.
+COMPUTED = frozenset({'TIP_OVER', 'TORQUE_LIMIT'})
+# Slack of comparisons; a path that gains less than this share of the way from ERROR to WARN is
+# none.
+SLACK, LEAST_GAIN = 1e-6, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """One thing to do. `kind` is joint, turn or payload; `amount` in rad (m where prismatic) or kg.
+
+    It takes `seconds`; the `margin`, a side or a joint, then gains `gain` (rad of tilt; N m or N of
+    torque), which is enough to end the warning where `enough`. `sentence` says it in plain words.
+    """
+
+    kind: str
+    subject: str
+    amount: float
+    seconds: float
+    margin: str
+    gain: float
+    enough: bool
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Case:
+    """The situation: scores (m,) of all margins, the smallest one, its score that is enough."""
+
+    settings: Settings
+    q: Floats
+    gravity: Floats
+    payload: Payload
+    scores: Floats
+    torque: Floats
+    state: int
+    worst: int
+    enough: float
+
+    @property
+    def subject(self) -> str:
+        """Name of the smallest margin."""
+        return margin_names(self.settings)[self.worst]
+
+    @property
+    def tips(self) -> bool:
+        """Whether the smallest margin is one of tip-over."""
+        return self.worst < len(SIDES)
+
+
+def margin_names(settings: Settings) -> tuple[str, ...]:
+    """Return what the scores are of: the sides, then the joints."""
+    return (*SIDES, *settings.robot.joint_names)
+
+
+def scores_of(settings: Settings, torque: Floats, angle: Floats) -> Floats:
+    """Return each margin (..., 4 + j) so that WARN begins at 1 and ERROR at 0; unjudged: infinite.
+
+    `torque` (..., j) in N m (N), `angle` (..., 4) in rad.
+    """
+    limits = settings.limits
+    tip, torque_span = _spans(settings)
+    tilt = (angle - limits.tip_error) / tip
+    use = np.abs(torque) / np.array(limits.torque)
+    found: Floats = np.concatenate((tilt, (limits.torque_error - use) / torque_span), axis=-1)
+    found[..., len(SIDES) :][..., ~np.isfinite(limits.torque)] = np.inf
+    return found
+
+
+def _spans(settings: Settings) -> tuple[float, float]:
+    """Return how far WARN is from ERROR: in rad of tilt, and as a share of the torque's limit."""
+    limits = settings.limits
+    tip = max(limits.tip_warn - limits.tip_error, math.radians(0.5))
+    return tip, max(limits.torque_error - limits.torque_warn, 0.02)
+
+
+def advise(
+    settings: Settings,
+    q: Sequence[float],
+    gravity: Sequence[float],
+    payload: Payload,
+    of: str | None = None,
+) -> tuple[Advice, ...]:
+    """Return what to do, the best first; nothing where the margin is above its warning limit.
+
+    `q` (j,), `gravity` (3,) m/s2 in `base_link`. The margin is `of` a side or joint, else the one
+    to speak of first. Nothing too where no margin is known.
+    """
+    return advise_each(settings, [q], [gravity], payload, [of])[0]
+
+
+def advise_each(
+    settings: Settings,
+    q: ArrayLike,
+    gravity: ArrayLike,
+    payload: Payload,
+    of: Sequence[str | None],
+) -> list[tuple[Advice, ...]]:
+    """Return `advise` of many situations: `q` (n, j), `gravity` (n, 3), `of` (n,).
+
+    All go through the model together: fifty then take little longer than one.
+    """
+    cases = _cases(settings, q, gravity, payload, of)
+    warned = [case for case in cases if case is not None and case.scores[case.worst] < 1.0]
+    found: dict[int, list[Advice]] = {id(case): [] for case in warned}
+    for case, advice in chain(_moves(warned), _loads(warned)):
+        found[id(case)].append(advice)
+    return [tuple(sorted(found.get(id(case), ()), key=_order)) for case in cases]
+
+
+def _order(advice: Advice) -> tuple[bool, bool, float]:
+    """Enough comes first, then what is no turn, then the fastest; else what gains most."""
+    by = advice.seconds if advice.enough else -advice.gain
+    return not advice.enough, advice.kind == 'turn', by
+
+
+def _cases(
+    settings: Settings,
+    q: ArrayLike,
+    gravity: ArrayLike,
+    payload: Payload,
+    of: Sequence[str | None],
+) -> list[_Case | None]:
+    """Return the situations, None where no margin is known."""
+    at, down = np.array(q, dtype=np.float64), np.array(gravity, dtype=np.float64)
+    now = margins(settings.robot, at, down, payload)
+    with np.errstate(invalid='ignore'):
+        scores = scores_of(settings, now.torque, now.angle)
+    known = np.isfinite(at).all(axis=1) & np.isfinite(down).all(axis=1) & (now.state < NO_CONTACT)
+    worst = [
+        _most_severe(mine) if name is None else margin_names(settings).index(name)
+        for mine, name in zip(scores, of, strict=True)
+    ]
+    rows = zip(at, down, scores, now.torque, now.state.tolist(), worst, strict=True)
+    return [
+        _Case(settings, x, g, payload, score, torque, state, k, _enough(settings, k))
+        if told
+        else None
+        for told, (x, g, score, torque, state, k) in zip(known, rows, strict=True)
+    ]
+
+
+def _enough(settings: Settings, worst: int) -> float:
+    """Return the score from which a margin's warning ends: beyond its deadband."""
+    limits, (tip, span) = settings.limits, _spans(settings)
+    if worst < len(SIDES):
+        reserve = limits.tip_deadband / tip
+    else:
+        reserve = limits.torque_deadband / limits.torque[worst - len(SIDES)] / span
+    return 1.0 + reserve + SLACK
+
+
+def _most_severe(scores: Floats) -> int:
+    """Return the margin to speak of: past ERROR first, of those a tip-over, then the least."""
+    order = [
+        (int(score > 0.0) + int(score >= 1.0), k >= len(SIDES), score)
+        for k, score in enumerate(scores.tolist())
+    ]
+    return min(range(len(order)), key=lambda k: order[k])
+
+
+def _paths(case: _Case) -> Iterator[tuple[_Case, Path]]:
+    for path in joint_paths(case.settings, case.q, case.gravity, case.torque):
+        yield case, path
+    # Turning helps against tipping on a slope, but shakes a robot that is past its ERROR limit.
+    if case.tips and case.scores[case.worst] > 0.0:
+        for path in turn_paths(case.settings.robot, case.q, case.gravity, case.payload):
+            yield case, path
+
+
+def _ends(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Path, int, float, bool]]:
+    """Yield every path that gains something, and where to stop as `_end` says."""
+    paths = [found for case in cases for found in _paths(case)]
+    if not paths:
+        return
+    settings, payload = cases[0].settings, cases[0].payload
+    q, down = (np.vstack([getattr(p, name) for _, p in paths]) for name in ('q', 'gravity'))
+    found = margins(settings.robot, q, down, payload)
+    scores = scores_of(settings, found.torque, found.angle)
+    cuts = np.cumsum([len(path.q) for _, path in paths])[:-1]
+    parts = np.split(scores, cuts), np.split(found.state, cuts)
+    for (case, path), mine, states in zip(paths, *parts, strict=True):
+        end = _end(case, mine, path.forbidden | (states != case.state))
+        if end is not None:
+            yield case, path, *end
+
+
+def _end(
+    case: _Case, scores: Floats, forbidden: NDArray[np.bool_]
+) -> tuple[int, float, bool] | None:
+    """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
+    floor = np.minimum(case.scores, 1.0)
+    floor[case.worst] = case.scores[case.worst]
+    bad = ~(scores >= floor - SLACK).all(axis=1) | forbidden
+    last = int(np.argmax(bad)) if bad.any() else len(bad)
+    mine = scores[:last, case.worst]
+    reached = np.flatnonzero(mine >= case.enough)
+    if len(reached):
+        return int(reached[0]), float(mine[reached[0]]), True
+    if not last or not mine.max() > case.scores[case.worst] + LEAST_GAIN:
+        return None
+    # Stop where nearly all that can be gained is gained.
+    gained = mine - case.scores[case.worst]
+    k = int(np.argmax(gained >= 0.95 * gained.max()))
+    return k, float(mine[k]), False
+
+
+def _gain(case: _Case, score: float) -> float:
+    """Return a score's gain in rad of tilt, N m or N."""
+    tip, span = _spans(case.settings)
+    more = score - float(case.scores[case.worst])
+    if case.tips:
+        return more * tip
+    return more * span * case.settings.limits.torque[case.worst - len(SIDES)]
+
+
+def _moves(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
+    for case, path, k, score, enough in _ends(cases):
+        gain, seconds, amount = _gain(case, score), float(path.seconds[k]), float(path.amount[k])
+        if path.subject == 'robot':
+            kind, words = 'turn', turn_words(amount, path.gravity[k])
+        else:
+            kind, words = 'joint', joint_words(case.settings.robot, path, k, case.payload)
+        sentence = f'{words}: {_gain_words(case, gain)}, in {seconds:.1f} s'
+        yield (
+            case,
+            Advice(kind, path.subject, amount, seconds, case.subject, gain, enough, sentence),
+        )
+
+
+def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
+    """Setting the load down: how much of it is too much, and what is gained without it."""
+    if not cases or cases[0].payload.mass <= 0.0:
+        return
+    settings, payload = cases[0].settings, cases[0].payload
+    q, down = (np.array([getattr(case, name) for case in cases]) for name in ('q', 'gravity'))
+    found = margins(settings.robot, q, down, Payload(0.0, payload.cog))
+    scores = scores_of(settings, found.torque, found.angle)
+    # The mass that no joint's warning limit forbids in this posture.
+    torque = settings.limits.torque_warn * np.array(settings.limits.torque)
+    holds = np.maximum(payload_capacity(settings.robot, q, down, torque), 0.0).tolist()
+    for case, mine, held in zip(cases, scores, holds, strict=True):
+        score = float(mine[case.worst])
+        if not score > case.scores[case.worst] + LEAST_GAIN:
+            continue
+        gain, enough = _gain(case, score), score >= 1.0
+        words = load_words(payload.mass, None if case.tips else held)
+        sentence = f'{words}: {_gain_words(case, gain)}'
+        # Nobody sets a load down as fast as a joint moves: it comes after what moves in time.
+        told = Advice(
+            'payload', 'payload', -payload.mass, 10.0, case.subject, gain, enough, sentence
+        )
+        yield case, told
+
+
+def _gain_words(case: _Case, gain: float) -> str:
+    if case.tips:
+        return f'{math.degrees(gain):.0f} deg further from tipping to the {case.subject}'
+    unit = 'N' if case.settings.robot.joint(case.subject).kind == 'prismatic' else 'N m'
+    return f'{gain:.0f} {unit} less on the {case.subject.removesuffix("_joint")}'

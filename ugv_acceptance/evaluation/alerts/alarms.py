@@ -1,0 +1,197 @@
+"""Alarm management as ISA-18.2, IEC 62682 and OPC UA know it: what a person has seen of an alert.
+
+An alert is active or over; an alarm also remembers whether somebody acknowledged it. Pure: events
+and their times (ns) come in, changes go out.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
+
+# What stays after it is over and was seen, until a person resets it: the robot may lie on its side.
+LATCHING = frozenset({'TIP_OVER', 'NO_SUPPORT'})
+# Longest shelving (ns).
+LONGEST_SHELVING = 600 * 1_000_000_000
+
+# Code, subject and level of a rule: one alarm.
+Key = tuple[str, str, int]
+
+
+class State(Enum):
+    """State of an alarm; the value is the text people see."""
+
+    NORMAL = 'normal'
+    ACTIVE_UNACKNOWLEDGED = 'active, not acknowledged'
+    ACTIVE_ACKNOWLEDGED = 'active, acknowledged'
+    RETURNED_UNACKNOWLEDGED = 'over, not acknowledged'
+    LATCHED = 'over, latched until reset'
+
+    @property
+    def active(self) -> bool:
+        """Whether the limit is passed now."""
+        return self in {State.ACTIVE_UNACKNOWLEDGED, State.ACTIVE_ACKNOWLEDGED}
+
+    @property
+    def unseen(self) -> bool:
+        """Whether nobody has acknowledged it."""
+        return self in {State.ACTIVE_UNACKNOWLEDGED, State.RETURNED_UNACKNOWLEDGED}
+
+
+# (state, event) -> state; what is not here changes nothing. AFTERWARDS stands for what follows when
+# an alarm is over and seen: NORMAL, or LATCHED for one that latches.
+_AFTERWARDS = State.LATCHED
+TRANSITIONS: dict[tuple[State, str], State] = {
+    (State.NORMAL, 'raised'): State.ACTIVE_UNACKNOWLEDGED,
+    (State.LATCHED, 'raised'): State.ACTIVE_UNACKNOWLEDGED,
+    (State.RETURNED_UNACKNOWLEDGED, 'raised'): State.ACTIVE_UNACKNOWLEDGED,
+    (State.ACTIVE_UNACKNOWLEDGED, 'cleared'): State.RETURNED_UNACKNOWLEDGED,
+    (State.ACTIVE_ACKNOWLEDGED, 'cleared'): _AFTERWARDS,
+    (State.ACTIVE_UNACKNOWLEDGED, 'acknowledged'): State.ACTIVE_ACKNOWLEDGED,
+    (State.RETURNED_UNACKNOWLEDGED, 'acknowledged'): _AFTERWARDS,
+    (State.LATCHED, 'reset'): State.NORMAL,
+}
+
+
+def next_state(state: State, event: str, *, latches: bool) -> State:
+    """Return the state after an event: raised, cleared, acknowledged or reset."""
+    found = TRANSITIONS.get((state, event), state)
+    return State.NORMAL if found is State.LATCHED and not latches else found
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What happened to an alarm at `time` (ns), and the state it is in since.
+
+    `how` is raised, cleared, acknowledged, reset, shelved or unshelved; `who` and `note` are of the
+    person who did it.
+    """
+
+    time: int
+    alert: Alert
+    how: str
+    state: State
+    who: str = ''
+    note: str = ''
+
+
+@dataclass(slots=True)
+class Alarm:
+    """One alarm: its newest `alert`, its state, who acknowledged it, until when it is shelved."""
+
+    alert: Alert
+    state: State = State.NORMAL
+    acknowledged: Change | None = None
+    shelved_until: int | None = None
+
+    @property
+    def rule(self) -> Rule:
+        """The rule of the newest alert."""
+        return self.alert.rule
+
+
+def key_of(rule: Rule) -> Key:
+    """Return what tells an alarm from others."""
+    return rule.code, rule.subject, rule.level
+
+
+def latches(rule: Rule) -> bool:
+    """Return whether an alarm stays until it is reset."""
+    return rule.code in LATCHING and rule.level == ERROR
+
+
+@dataclass(slots=True)
+class Alarms:
+    """All alarms that are not NORMAL, and those that are shelved."""
+
+    table: dict[Key, Alarm] = field(default_factory=dict)
+
+    def raised(self, now: int, alert: Alert) -> list[Change]:
+        """Take an alert that was raised; a new one of an active alarm asks to be seen anew."""
+        alarm = self.table.setdefault(key_of(alert.rule), Alarm(alert))
+        alarm.alert, alarm.acknowledged = alert, None
+        alarm.state = State.ACTIVE_UNACKNOWLEDGED
+        return [Change(now, alert, 'raised', alarm.state)]
+
+    def cleared(self, now: int, alert: Alert) -> list[Change]:
+        """Take an alert that is over; one that a newer alert replaced changes nothing."""
+        alarm = self.table.get(key_of(alert.rule))
+        if alarm is None or alarm.alert is not alert:
+            return []
+        return self._event(now, alarm, 'cleared')
+
+    def acknowledge(
+        self, now: int, who: str, note: str = '', key: Key | None = None
+    ) -> list[Change]:
+        """Take one alarm (None: all) as seen by `who`. What is active stays active."""
+        chosen = [a for k, a in self.table.items() if key in {None, k} and a.state.unseen]
+        changes = []
+        for alarm in chosen:
+            found = self._event(now, alarm, 'acknowledged', who, note)
+            alarm.acknowledged = found[0]
+            changes += found
+        return changes
+
+    def reset(self, now: int, who: str, note: str = '', key: Key | None = None) -> list[Change]:
+        """Let go of one alarm (None: all) if it is latched: over and seen. All else stays."""
+        latched = {k: a for k, a in self.table.items() if a.state is State.LATCHED}
+        chosen = [a for k, a in latched.items() if key in {None, k}]
+        return [c for alarm in chosen for c in self._event(now, alarm, 'reset', who, note)]
+
+    def shelve(self, now: int, key: Key, length: int, who: str, note: str = '') -> list[Change]:
+        """Put a warning aside for `length` (ns): it is still judged, but nobody is called.
+
+        AcceptanceError where there is no such alarm, it is critical, or the time is too long.
+        """
+        alarm = self.table.get(key)
+        if alarm is None:
+            raise AcceptanceError(f'shelve: expected a known alarm, got {key[0]!r} of {key[1]!r}')
+        if key[2] != WARN:
+            raise AcceptanceError(f'shelve: only warnings can be shelved, {key[0]} is critical')
+        if not 0 < length <= LONGEST_SHELVING:
+            longest = LONGEST_SHELVING // 1_000_000_000
+            raise AcceptanceError(
+                f'shelve: expected above 0 and at most {longest} s, got {length / 1e9:g} s'
+            )
+        alarm.shelved_until = now + length
+        return [Change(now, alarm.alert, 'shelved', alarm.state, who, note)]
+
+    def unshelve(self, now: int, key: Key, who: str = '') -> list[Change]:
+        """Take an alarm back from the shelf."""
+        alarm = self.table.get(key)
+        if alarm is None or alarm.shelved_until is None:
+            return []
+        alarm.shelved_until = None
+        change = Change(now, alarm.alert, 'unshelved', alarm.state, who)
+        self._forget(key, alarm)
+        return [change]
+
+    def advance(self, now: int) -> list[Change]:
+        """Let time pass: shelving that is over ends, dated to the moment it was over."""
+        over = [(a.shelved_until, k) for k, a in self.table.items() if a.shelved_until is not None]
+        return [c for at, key in sorted(over) if at <= now for c in self.unshelve(at, key)]
+
+    def shelved(self, key: Key) -> bool:
+        """Return whether an alarm is shelved."""
+        alarm = self.table.get(key)
+        return alarm is not None and alarm.shelved_until is not None
+
+    def state(self, key: Key) -> State:
+        """Return the state of an alarm; NORMAL where nothing is known of it."""
+        alarm = self.table.get(key)
+        return State.NORMAL if alarm is None else alarm.state
+
+    def _event(
+        self, now: int, alarm: Alarm, how: str, who: str = '', note: str = ''
+    ) -> list[Change]:
+        before = alarm.state
+        alarm.state = next_state(before, how, latches=latches(alarm.rule))
+        if alarm.state is before:
+            return []
+        self._forget(key_of(alarm.rule), alarm)
+        return [Change(now, alarm.alert, how, alarm.state, who, note)]
+
+    def _forget(self, key: Key, alarm: Alarm) -> None:
+        if alarm.state is State.NORMAL and alarm.shelved_until is None:
+            del self.table[key]

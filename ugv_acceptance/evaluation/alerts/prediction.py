@@ -1,0 +1,237 @@
+"""What comes next, from the last half second: margins that shrink fast, motors that give all.
+
+Looked at every 50 ms of receipt time, so that a message costs a comparison. A recording and a live
+stream are judged by the same columns: the live one whenever time passes (`judge`).
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.type_aliases import Floats, Times
+
+
+def time_to(limit: ArrayLike, now: ArrayLike, then: ArrayLike, seconds: float) -> Floats:
+    """Return after how long (s) a value that is `now` and `then`, `seconds` later, reaches `limit`.
+
+    The value is taken to rise evenly; 0 where it is there already, infinite where it does not rise,
+    NaN where it is not known.
+    """
+    bound, start, end = (np.asarray(x, dtype=np.float64) for x in (limit, now, then))
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        left = (bound - start) * seconds / (end - start)
+    left = np.where(start >= bound, 0.0, np.where(end <= start, np.inf, left))
+    result: Floats = np.where(np.isnan(start) | np.isnan(end) | np.isnan(bound), np.nan, left)
+    return result
+
+
+SignalOf = Callable[[str, str, tuple[float, float], float], Signal]
+
+# Time (ns) between two looks, and looks that are remembered.
+SPACING, KEPT = 50_000_000, 10
+# Rates are those over so many looks, if these took at most so long (ns).
+OVER, LONGEST = 4, 400_000_000
+# Time left (s) from which a margin's end is told, and from which it no longer is.
+SOON, LATER = 1.0, 1.5
+# Slowest rates that count: rad/s of tilt, share of the limit a second of torque.
+TILT_RATE, LOAD_RATE = 0.0175, 0.03
+# A weak motor: effort even to this share of the limit while the posture comes to need this share
+# more. A frozen encoder: not a bit changes for so many looks, but effort by this share.
+EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
+# A motor is weak (1) or not (0).
+WEAK = 0.5
+# Shares of the limit between which an even effort may mean a weak motor.
+LOW, HIGH = 0.3, 0.97
+# What changes by more than this share of the whole between two looks has jumped.
+JUMP = 0.6
+# So few looks, as live, are taken one at a time.
+FEW = 3
+# Looks that wait at most for `judge`: who never lets time pass needs no memory for them.
+MOST = 1024
+
+
+@dataclass(slots=True)
+class Foresight:
+    """One signal a rule; `tip` follows SIDES, the others `robot.joint_names`.
+
+    `due` (ns) is when the next look is.
+    """
+
+    tip: list[Signal]
+    torque: list[Signal]
+    effort: list[Signal]
+    weak: list[Signal]
+    frozen: list[Signal]
+    due: int = 0
+    _waiting: deque[tuple[int, tuple[float, ...]]] = field(
+        default_factory=lambda: deque(maxlen=MOST)
+    )
+    _time: Times = field(default_factory=lambda: np.empty(0, np.int64))
+    _looks: Floats = field(init=False)
+    _since: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        n = len(self.torque)
+        self._looks = np.empty((0, len(SIDES) + 3 * n))
+        self._since = np.full((3, n), np.nan)
+
+    def signals(self) -> list[Signal]:
+        """Return all signals."""
+        return [*self.tip, *self.torque, *self.effort, *self.weak, *self.frozen]
+
+    def keep(
+        self,
+        now: int,
+        angle: Sequence[Any],
+        torque: Sequence[float],
+        effort: Sequence[float],
+        q: Sequence[float],
+    ) -> None:
+        """Remember a sample at `now` (ns) until `judge`; to be called from `due` on."""
+        self.due = now - now % SPACING + SPACING
+        self._waiting.append((now, (*angle, *torque, *effort, *q)))
+
+    def judge(self, limit: Sequence[float]) -> None:
+        """Judge what waits by the torque limits (j,)."""
+        if self._waiting:
+            time, rows = zip(*self._waiting, strict=True)
+            self._waiting.clear()
+            self._judge(np.array(time, np.int64), np.array(rows, np.float64), np.array(limit))
+
+    def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
+        """Take the next stretch of a recording."""
+        at = np.flatnonzero(rows.known)
+        cell = rows.time[at] // SPACING
+        at = at[np.diff(cell, prepend=self.due // SPACING - 1) > 0]
+        if not len(at):
+            return
+        time, joints, row = rows.time[at], rows.pairs.joints, rows.pairs.of_joints[at]
+        self.due = int(time[-1] - time[-1] % SPACING + SPACING)
+        looks = np.hstack((rows.angle[at], rows.torque[at], joints.effort[row], joints.q[row]))
+        self._judge(time, looks, np.array(limit))
+
+    def _judge(self, time: Times, looks: Floats, limit: Floats) -> None:
+        """Feed the signals with new looks (n, 4 + 3 j): angle, torque, effort, position."""
+        old, sides, n = len(self._time), len(SIDES), len(limit)
+        time, looks = np.concatenate((self._time, time)), np.concatenate((self._looks, looks))
+        angle, tau, effort, q = np.split(looks, [sides, sides + n, sides + 2 * n], axis=1)
+        with np.errstate(invalid='ignore', over='ignore', divide='ignore'):
+            found = (
+                (self.tip, _ahead(time, angle, TILT_RATE)),
+                (self.torque, _ahead(time, limit - np.abs(tau), LOAD_RATE * limit)),
+                (self.effort, np.where(np.isfinite(limit), np.abs(effort), 0.0)),
+                (self.weak, _weak(time, tau, effort, limit) * _standing(angle)),
+                (self.frozen, self._frozen(old, tau, effort, q) / limit),
+            )
+        for signals, values in found:
+            _feed(signals, time[old:], values[old:])
+        self._time, self._looks = time[-KEPT:], looks[-KEPT:]
+
+    def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
+        """Return by how much (N m; N) effort changed since each position did, beyond gravity's.
+
+        `_since` holds looks, effort and torque at the last change of each position.
+        """
+        rows = np.arange(len(q))[:, None]
+        moved = np.ones(q.shape, np.bool_)
+        moved[1:] = q[1:] != q[:-1]
+        if old:
+            moved[:old] = False
+        before = ~np.logical_or.accumulate(moved)
+        at = np.maximum.accumulate(np.where(moved, rows, 0))
+        looks, effort_then, tau_then = self._since
+        looks = np.where(before, looks + rows - old + 1, rows - at)
+        effort_then = np.where(before, effort_then, np.take_along_axis(effort, at, 0))
+        tau_then = np.where(before, tau_then, np.take_along_axis(tau, at, 0))
+        self._since = np.array([looks[-1], effort_then[-1], tau_then[-1]])
+        change = np.abs((effort - effort_then) - (tau - tau_then))
+        return np.where(looks >= STUCK, change, 0.0)
+
+
+def _feed(signals: list[Signal], time: Times, values: Floats) -> None:
+    """Feed each signal with its column of the values (n, m)."""
+    if len(time) > FEW:
+        for signal, column in zip(signals, values.T, strict=True):
+            feed(signal, time, column)
+        return
+    for now, row in zip(time.tolist(), values.tolist(), strict=True):
+        for signal, value in zip(signals, row, strict=True):
+            # A quiet signal has nothing to do with a small value.
+            if value >= signal.on or not signal.quiet:
+                signal.step(now, value)
+
+
+def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 - float or (m,)
+    """Return minus the time (n, m) in s until what is `left` is gone; NaN: no rate is known."""
+    found = np.full(left.shape, np.nan)
+    if len(time) > OVER:
+        step = (time[OVER:] - time[:-OVER])[:, None]
+        now, rate = left[OVER:], (left[OVER:] - left[:-OVER]) / step * 1e9
+        shrinks = rate <= -slowest
+        if shrinks.any():
+            shrinks &= _steady(-left, OVER)
+        seconds = time_to(0.0, -now, -now - np.where(shrinks, rate, np.inf), 1.0)
+        found[OVER:] = np.where(step <= LONGEST, -seconds, np.nan)
+    return found
+
+
+def _weak(time: Times, tau: Floats, effort: Floats, limit: Floats) -> Floats:
+    """Return 1 where effort is even, below its limit, while the posture comes to need more."""
+    found, over = np.zeros(tau.shape), KEPT - 1
+    grown = np.abs(tau[over:]) - np.abs(tau[:-over]) >= GROWN * limit
+    if grown.any():
+        even = _largest(effort, KEPT) + _largest(-effort, KEPT) <= EVEN * limit
+        share = np.abs(effort[over:]) / limit
+        even &= (share >= LOW) & (share <= HIGH)
+        soon = time[over:] - time[:-over] <= 2 * KEPT * SPACING
+        found[over:] = even & grown & soon[:, None] & _steady(np.abs(tau), over)
+    return found
+
+
+def _standing(angle: Floats) -> NDArray[np.bool_]:
+    """Return (n, 1) where no look of the last KEPT was past tipping: the ground bears the arm."""
+    tipped = np.convolve((angle < 0.0).any(axis=1), np.ones(KEPT))[: len(angle)]
+    standing: NDArray[np.bool_] = (tipped == 0.0)[:, None]
+    return standing
+
+
+def _steady(values: Floats, over: int) -> NDArray[np.bool_]:
+    """Return where values (n, m) rose over so many looks, and not for the most part in one.
+
+    A load that is declared makes a step of all margins; that is no rate.
+    """
+    largest = _largest(values[1:] - values[:-1], over)
+    steady: NDArray[np.bool_] = largest <= JUMP * (values[over:] - values[:-over])
+    return steady
+
+
+def _largest(values: Floats, over: int) -> Floats:
+    """Return the largest of each column of values (n, m) in every `over` neighbours; NaN counts."""
+    last = len(values) - over + 1
+    return reduce(np.maximum, [values[k : last + k] for k in range(over)])
+
+
+def foresight_of(settings: Settings, signal: SignalOf) -> Foresight:
+    """Return the rules of a robot; `signal` makes one of code, subject, (on, off) and delay (s)."""
+    names, limits, delays = settings.robot.joint_names, settings.limits, settings.delays
+    ahead, levels = (-SOON, -LATER), [limits.torque_warn * limit for limit in limits.torque]
+    at = [(level, level - min(limits.torque_deadband, level / 2.0)) for level in levels]
+    return Foresight(
+        [signal('TIP_AHEAD', side, ahead, delays.tip_on) for side in SIDES],
+        [signal('TORQUE_AHEAD', name, ahead, delays.torque_on) for name in names],
+        [
+            signal('EFFORT_LIMIT', name, effort, delays.torque_on)
+            for name, effort in zip(names, at, strict=True)
+        ],
+        [signal('MOTOR_WEAK', name, (WEAK, WEAK), 0.0) for name in names],
+        [signal('ENCODER_FROZEN', name, (CHANGED, CHANGED), delays.torque_on) for name in names],
+    )

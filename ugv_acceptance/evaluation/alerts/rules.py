@@ -1,0 +1,181 @@
+"""The rules of an evaluation and their signals: what is watched, live and in a recording alike."""
+
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.alerts.prediction import Foresight, foresight_of
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+
+# Alerts of level ERROR with these codes are failures of the robot; all others are of the input.
+FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
+# Share of g by which the acceleration at rest may differ from g.
+STRANGE = 0.15
+# Times its greatest speed at which a joint cannot move: the numbers are of another unit or joint.
+LEAP = 10.0
+
+
+@dataclass(slots=True)
+class Watch:
+    """One signal a rule, (WARN, ERROR) where a rule has two levels. `log` receives all alerts.
+
+    `torque` and `speed` follow `robot.joint_names`, `tip` follows SIDES.
+    """
+
+    settings: Settings
+    log: list[Alert] = field(default_factory=list)
+    torque: list[tuple[Signal, Signal]] = field(init=False)
+    speed: list[Signal] = field(init=False)
+    tip: list[tuple[Signal, Signal]] = field(init=False)
+    support: Signal = field(init=False)
+    joints: 'InputSignals' = field(init=False)
+    imu: 'InputSignals' = field(init=False)
+    payload: Signal = field(init=False)
+    missing: Signal = field(init=False)
+    leaps: list[Signal] = field(init=False)
+    attitude: AttitudeSignals = field(init=False)
+    foresight: Foresight = field(init=False)
+    slide: Signal = field(init=False)
+    relaxed: dict[str, Signal] = field(init=False)
+    _told: Settings | None = None
+
+    def __post_init__(self) -> None:
+        limits, names = self.settings.limits, self.settings.robot.joint_names
+        speeds = limits.speed or (float('inf'),) * len(names)
+        delay = self.settings.delays.tip_on
+        self.torque = [
+            (
+                self._torque(name, WARN, limits.torque_warn * limit),
+                self._torque(name, ERROR, limits.torque_error * limit),
+            )
+            for name, limit in zip(names, limits.torque, strict=True)
+        ]
+        self.speed = [
+            self._signal('STATIC_MODEL', name, WARN, (speed, 0.9 * speed), delay)
+            for name, speed in zip(names, speeds, strict=True)
+        ]
+        self.tip = [
+            (self._tip(side, WARN, limits.tip_warn), self._tip(side, ERROR, limits.tip_error))
+            for side in SIDES
+        ]
+        self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
+        self.joints, self.imu = self._input('joint_states'), self._input('imu')
+        self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
+        self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
+        self.leaps = [self._leap(name) for name in names]
+        self.attitude = self._attitude()
+        self.foresight = foresight_of(self.settings, self._warning)
+        self.slide = self._slide()
+        self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
+
+    def relax(self, now: int) -> None:
+        """Say which limits are relaxed at `now` (ns): a standing warning of each."""
+        if self._told is not self.settings:
+            self._told = self.settings
+            found = {breach.name for breach in relaxed(self.settings)}
+            for name, signal in self.relaxed.items():
+                signal.step(now, 1.0 if name in found else 0.0)
+
+    def foresee(self) -> None:
+        """Judge what live samples gave the foresight; before time passes."""
+        self.foresight.judge(self.settings.limits.torque)
+
+    def foresee_rows(self, rows: MarginRows) -> None:
+        """Judge what a stretch of a recording gives the foresight."""
+        self.foresight.rows(rows, self.settings.limits.torque)
+
+    def _warning(self, code: str, subject: str, at: tuple[float, float], delay: float) -> Signal:
+        return self._signal(code, subject, WARN, at, delay)
+
+    def _signal(
+        self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
+    ) -> Signal:
+        delays = self.settings.delays
+        off = int((delays.tip_off if code == 'TIP_OVER' else delays.off) * 1e9)
+        return Signal(Rule(code, subject, level, *at, int(on_delay * 1e9), off), self.log)
+
+    def _torque(self, joint: str, level: int, limit: float) -> Signal:
+        at = (limit, limit - min(self.settings.limits.torque_deadband, limit / 2.0))
+        return self._signal('TORQUE_LIMIT', joint, level, at, self.settings.delays.torque_on)
+
+    def _tip(self, side: str, level: int, angle: float) -> Signal:
+        """The watched value is minus the tilt left (rad), so that larger is worse."""
+        at = (-angle, -angle - self.settings.limits.tip_deadband)
+        return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
+
+    def _slide(self) -> Signal:
+        """The watched value is minus the slope left (rad) where it slides before it tips."""
+        limits, delay = self.settings.limits, self.settings.delays.tip_on
+        known = limits.friction < float('inf')
+        on = -limits.tip_warn if known else float('inf')
+        return self._warning('SLIDE', 'robot', (on, on - limits.tip_deadband), delay)
+
+    def _fault(self, code: str, subject: str, level: int, on_delay: float | None = None) -> Signal:
+        """A fault is watched as 1 (there) or 0 (not there)."""
+        delay = self.settings.delays.fault_on if on_delay is None else on_delay
+        return self._signal(code, subject, level, (0.5, 0.5), delay)
+
+    def _relaxed(self, name: str) -> Signal:
+        """It stands as long as the limit is in force: no delay, whatever the delays are."""
+        return Signal(Rule('LIMITS_RELAXED', name, WARN, 0.5, 0.5, 0, 0), self.log)
+
+    def _leap(self, joint: str) -> Signal:
+        limit = LEAP * self.settings.robot.joint(joint).velocity
+        delay = self.settings.delays.fault_on
+        return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+
+    def _attitude(self) -> AttitudeSignals:
+        imu = self.settings.imu
+        delay = imu.agreement_delay
+        apart = (imu.agreement, imu.agreement / 2)
+        # Who asks for the orientation alone is told, and gets its margins.
+        level = WARN if imu.attitude == 'orientation' and not imu.specific_force else ERROR
+        return AttitudeSignals(
+            self._fault('IMU_FRAME', 'imu', ERROR),
+            self._fault('IMU_ORIENTATION', 'imu', WARN, delay),
+            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), delay),
+            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay),
+        )
+
+    def _input(self, subject: str) -> 'InputSignals':
+        return InputSignals(
+            self._fault('INPUT_STALE', subject, STALE, 0.0),
+            self._fault('INPUT_INVALID', subject, ERROR),
+            self._fault('CLOCK', subject, WARN),
+        )
+
+    @property
+    def active(self) -> list[Alert]:
+        """Return the alerts that are active now, the most severe first."""
+        found = [signal.alert for signal in self.signals() if signal.alert is not None]
+        return sorted(found, key=lambda alert: -alert.rule.level)
+
+    def signals(self) -> list[Signal]:
+        """Return all signals."""
+        pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
+        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
+        of = self.attitude
+        attitude = [of.frame, of.orientation, of.strange, of.disagreement]
+        faults = [self.support, self.payload, self.missing, *attitude]
+        return [
+            *pairs,
+            *self.speed,
+            *self.leaps,
+            *inputs,
+            *faults,
+            self.slide,
+            *self.foresight.signals(),
+            *self.relaxed.values(),
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class InputSignals:
+    """What is watched of an input: silence, content that cannot be used, and its clock."""
+
+    stale: Signal
+    invalid: Signal
+    clock: Signal

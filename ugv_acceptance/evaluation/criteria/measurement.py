@@ -1,0 +1,320 @@
+"""Criteria measured while a recording is read: worst values, violations, dwell, visited cells."""
+
+from dataclasses import dataclass, field
+from heapq import nsmallest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.criteria.criteria import (
+    ANY,
+    AlertDemand,
+    CriteriaSet,
+    Criterion,
+    MapDemand,
+    Value,
+    Window,
+)
+from ugv_acceptance.evaluation.criteria.quantities import SIGNALS, columns_of, subjects_of
+from ugv_acceptance.evaluation.inputs.payload import PayloadLog
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.type_aliases import Floats, Times
+
+Span = tuple[int, int]
+
+# Spans kept as evidence.
+MOST = 20
+
+
+@dataclass(slots=True)
+class Spans:
+    """Takes spans (ns) in order and joins those that touch; memory does not grow."""
+
+    total: int = 0
+    count: int = 0
+    longest: Span = (0, 0)
+    first: list[Span] = field(default_factory=list)
+    _open: Span | None = None
+
+    def add(self, start: Times, end: Times) -> None:
+        """Take spans (n,) in order of time; none overlaps."""
+        if not len(start):
+            return
+        self.total += int((end - start).sum())
+        breaks = np.flatnonzero(start[1:] > end[:-1]) + 1
+        begins = start[np.concatenate(([0], breaks))].tolist()
+        ends = end[np.concatenate((breaks - 1, [len(end) - 1]))].tolist()
+        if self._open is not None and begins[0] <= self._open[1]:
+            begins[0] = self._open[0]
+        else:
+            self.close()
+        for span in zip(begins[:-1], ends[:-1], strict=True):
+            self._note(span)
+        self._open = (begins[-1], ends[-1])
+
+    def close(self) -> None:
+        """Say that no span follows."""
+        if self._open is not None:
+            self._note(self._open)
+        self._open = None
+
+    def _note(self, span: Span) -> None:
+        self.count += 1
+        if len(self.first) < MOST:
+            self.first.append(span)
+        if span[1] - span[0] > self.longest[1] - self.longest[0]:
+            self.longest = span
+
+
+# Rows whose bound is computed: the worst of so many stretches.
+CANDIDATES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One row in full: time (ns), value and subject of a signal, posture, gravity, payload."""
+
+    time: int
+    value: float
+    subject: str
+    q: tuple[float, ...]
+    gravity: tuple[float, float, float]
+    payload: Payload
+
+
+@dataclass(slots=True)
+class ValueMeasure:
+    """What a criterion on a value comes to; `span` is its window in log time (ns).
+
+    `worst` holds the worst row of the worst stretches, `first` the first row in violation.
+    """
+
+    criterion: Criterion
+    settings: Settings
+    payloads: PayloadLog
+    span: tuple[int, int]
+    evaluated: int = 0
+    samples: int = 0
+    worst: list[Moment] = field(default_factory=list)
+    first: Moment | None = None
+    violation: Spans = field(default_factory=Spans)
+    kept: Spans = field(default_factory=Spans)
+    _last: tuple[int, int, float] | None = None
+
+    @property
+    def demand(self) -> Value:
+        """Return the demand."""
+        demand = self.criterion.demand
+        assert isinstance(demand, Value)  # noqa: S101 - made only for such
+        return demand
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        if not len(rows.time):
+            return
+        demand = self.demand
+        self._settle(int(rows.time[0]))
+        values = columns_of(demand.signal, demand.of, rows, self.settings, largest=demand.below)
+        self._last = (int(rows.time[-1]), int(rows.until[-1]), float(values[-1]))
+        self._see(rows, values)
+        self._spend(rows.time[:-1], rows.until[:-1], values[:-1])
+
+    def finish(self, now: int) -> None:
+        """Say when the recording ended (ns)."""
+        self._settle(now)
+        self.violation.close()
+        self.kept.close()
+
+    def _settle(self, now: int) -> None:
+        """The last row holds until the next message, the input's deadline or the end."""
+        if self._last is None:
+            return
+        time, until, value = self._last
+        one = np.array([time]), np.array([min(until, now)]), np.array([value])
+        self._spend(*one)
+        self._last = None
+
+    def _spend(self, start: Times, end: Times, values: Floats) -> None:
+        """Add up the time for which values held."""
+        start, end = np.maximum(start, self.span[0]), np.minimum(end, self.span[1])
+        seen = (end > start) & ~np.isnan(values)
+        self.evaluated += int((end - start)[seen].sum())
+        bad = self._bad(values)
+        some = seen & bad
+        if some.any():
+            self.violation.add(start[some], end[some])
+        if self.demand.dwell is not None:
+            good = seen & ~bad
+            self.kept.add(start[good], end[good])
+
+    def _bad(self, values: Floats) -> NDArray[np.bool_]:
+        with np.errstate(invalid='ignore'):
+            found: NDArray[np.bool_] = (
+                values >= self.demand.limit if self.demand.below else values <= self.demand.limit
+            )
+        return found
+
+    def _see(self, rows: MarginRows, values: Floats) -> None:
+        """Keep the first row in violation, and the worst if it is among the worst of all."""
+        inside = (rows.time >= self.span[0]) & (rows.time <= self.span[1])
+        if not inside.all():
+            values = np.where(inside, values, np.nan)
+        sign = -1.0 if self.demand.below else 1.0
+        order = sign * values
+        order = np.where(np.isnan(order), np.inf, order)
+        k = int(order.argmin())
+        self.samples += int(np.count_nonzero(~np.isnan(values)))
+        if np.isnan(values[k]):
+            return
+        if self.first is None and self._bad(values[[k]])[0]:
+            at = int(self._bad(values).argmax())
+            self.first = self._moment(rows, at, float(values[at]))
+        if len(self.worst) == CANDIDATES and order[k] >= sign * self.worst[-1].value:
+            return
+        moments = [*self.worst, self._moment(rows, k, float(values[k]))]
+        self.worst = nsmallest(CANDIDATES, moments, key=lambda m: sign * m.value)
+
+    def _moment(self, rows: MarginRows, k: int, value: float) -> Moment:
+        j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])
+        joints = rows.pairs.joints
+        return Moment(
+            int(rows.time[k]),
+            value,
+            self._subject(rows, k, value),
+            tuple(joints.q[j].tolist()),
+            tuple(rows.pairs.imu.gravity[i].tolist()),
+            self.payloads.at(int(joints.time[j])),
+        )
+
+    def _subject(self, rows: MarginRows, k: int, value: float) -> str:
+        demand = self.demand
+        if demand.of != ANY:
+            return demand.of
+        kind = SIGNALS[demand.signal]
+        line = kind.of(rows, self.settings)[k]
+        return subjects_of(kind, self.settings)[int(np.flatnonzero(line == value)[0])]
+
+
+@dataclass(slots=True)
+class MapMeasure:
+    """The cells of two joints' ranges that a run visited."""
+
+    criterion: Criterion
+    settings: Settings
+    span: tuple[int, int]
+    visited: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.visited = np.zeros(self._counts(), np.bool_)
+
+    @property
+    def demand(self) -> MapDemand:
+        """Return the demand."""
+        demand = self.criterion.demand
+        assert isinstance(demand, MapDemand)  # noqa: S101 - made only for such
+        return demand
+
+    def _counts(self) -> tuple[int, int]:
+        pairs = zip(self.demand.ranges, self.demand.cell, strict=True)
+        x, y = (max(1, int(np.ceil((high - low) / cell - 1e-9))) for (low, high), cell in pairs)
+        return x, y
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        names = self.settings.robot.joint_names
+        inside = rows.known & (rows.time >= self.span[0]) & (rows.time <= self.span[1])
+        q = rows.q[inside]
+        places, keep = [], np.ones(len(q), np.bool_)
+        for axis, name in enumerate(self.demand.joints):
+            low, high = self.demand.ranges[axis]
+            x = q[:, names.index(name)]
+            keep &= (x >= low) & (x <= high)
+            place = np.floor((x - low) / self.demand.cell[axis])
+            places.append(np.clip(place, 0, self.visited.shape[axis] - 1).astype(np.intp))
+        self.visited[places[0][keep], places[1][keep]] = True
+
+    def finish(self, now: int) -> None:
+        """Say when the recording ended; nothing is outstanding."""
+
+
+@dataclass(slots=True)
+class KnownTime:
+    """For how long (ns) the margins were known within a window in log time."""
+
+    span: tuple[int, int]
+    evaluated: int = 0
+    _last: tuple[int, int] | None = None
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        if not len(rows.time):
+            return
+        self._settle(int(rows.time[0]))
+        some = rows.known[:-1]
+        start = np.maximum(rows.time[:-1][some], self.span[0])
+        end = np.minimum(rows.until[:-1][some], self.span[1])
+        self.evaluated += int(np.maximum(end - start, 0).sum())
+        if rows.known[-1]:
+            self._last = int(rows.time[-1]), int(rows.until[-1])
+
+    def finish(self, now: int) -> None:
+        """Say when the recording ended (ns)."""
+        self._settle(now)
+
+    def _settle(self, now: int) -> None:
+        if self._last is not None:
+            start, end = max(self._last[0], self.span[0]), min(self._last[1], now, self.span[1])
+            self.evaluated += max(end - start, 0)
+        self._last = None
+
+
+Measure = ValueMeasure | MapMeasure | KnownTime
+
+
+@dataclass(slots=True)
+class Examination:
+    """Everything that is measured for a set of criteria, and the payloads it needs for that."""
+
+    criteria: CriteriaSet
+    settings: Settings
+    start: int
+    end: int
+    payloads: PayloadLog = field(init=False)
+    measures: dict[str, Measure] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.payloads, self.measures = PayloadLog(self.settings), {}
+        for criterion in self.criteria.criteria:
+            span = self.span_of(criterion.window)
+            if isinstance(criterion.demand, Value):
+                self.measures[criterion.name] = ValueMeasure(
+                    criterion, self.settings, self.payloads, span
+                )
+            elif isinstance(criterion.demand, MapDemand):
+                self.measures[criterion.name] = MapMeasure(criterion, self.settings, span)
+            elif isinstance(criterion.demand, AlertDemand):
+                self.measures[criterion.name] = KnownTime(span)
+
+    @property
+    def detail(self) -> bool:
+        """Whether moments, energies or ZMP are needed."""
+        demands = [c.demand for c in self.criteria.criteria]
+        return any(SIGNALS[d.signal].detail for d in demands if isinstance(d, Value))
+
+    def span_of(self, window: Window | None) -> tuple[int, int]:
+        """Return a window in log time (ns)."""
+        if window is None:
+            return self.start, self.end
+        return self.start + round(window[0] * 1e9), self.start + round(window[1] * 1e9)
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins."""
+        for measure in self.measures.values():
+            measure.add(rows)
+
+    def finish(self, now: int) -> None:
+        """Say when the recording ended (ns)."""
+        for measure in self.measures.values():
+            measure.finish(now)

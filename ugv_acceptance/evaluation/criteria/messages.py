@@ -1,0 +1,119 @@
+"""Criteria and what became of them in plain words."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
+from ugv_acceptance.evaluation.criteria.criteria import (
+    ANY,
+    AlertDemand,
+    Criterion,
+    DataDemand,
+    MapDemand,
+    Value,
+)
+from ugv_acceptance.evaluation.criteria.measurement import ValueMeasure
+from ugv_acceptance.evaluation.criteria.quantities import DATA, SIGNALS, shown
+from ugv_acceptance.evaluation.settings import Settings
+
+
+def demand_words(criterion: Criterion, settings: Settings) -> str:
+    """Return what a criterion demands."""
+    demand = criterion.demand
+    if isinstance(demand, Value):
+        text = _value_words(demand, settings)
+    elif isinstance(demand, AlertDemand):
+        text = _alert_words(demand)
+    elif isinstance(demand, DataDemand):
+        text = _data_words(demand)
+    else:
+        text = _map_words(demand)
+    if criterion.window is not None:
+        text += f', from {criterion.window[0]:g} to {criterion.window[1]:g} s'
+    return text
+
+
+def _value_words(demand: Value, settings: Settings) -> str:
+    side = 'below' if demand.below else 'above'
+    of = '' if demand.of in (ANY, 'robot') else f' of {demand.of}'
+    text = f'{SIGNALS[demand.signal].words}{of} {side} {number(demand.limit, demand, settings)}'
+    if demand.dwell is not None:
+        return f'{text} for {demand.dwell:g} s at a stretch'
+    allowed = []
+    if demand.time_in_violation is not None:
+        allowed.append(f'{demand.time_in_violation:g} s in all')
+    if demand.longest_violation is not None:
+        allowed.append(f'{demand.longest_violation:g} s at a stretch')
+    if demand.share_in_violation is not None:
+        allowed.append(f'{demand.share_in_violation:.1%} of the time')
+    return (
+        f'{text} except for at most {" and ".join(allowed)}' if allowed else f'{text} at all times'
+    )
+
+
+def number(value: float, demand: Value, settings: Settings) -> str:
+    """Return a signal's value (SI) as a person reads it."""
+    if demand.signal == 'torque_utilisation':
+        return f'{value:.0%}'
+    scale, unit = shown(demand.signal, demand.of, settings)
+    return f'{value * scale:.3g} {unit}'.strip()
+
+
+def _alert_words(demand: AlertDemand) -> str:
+    what = ' '.join(x for x in (demand.level, demand.code) if x) or 'any'
+    of = f' of {demand.of}' if demand.of else ''
+    return (
+        f'{what} alert{of} raised' if demand.raised else f'no {what} alert{of}'.replace(' any', '')
+    )
+
+
+def _data_words(demand: DataDemand) -> str:
+    quantity = DATA[demand.quantity]
+    bounds = [
+        f'{word} {100.0 * bound:g}%' if quantity.share else f'{word} {bound:g}'
+        for word, bound in (('at least', demand.least), ('at most', demand.most))
+        if math.isfinite(bound)
+    ]
+    of = f' of {demand.of}' if demand.of else ''
+    return f'{quantity.words}{of} {" and ".join(bounds)} {quantity.unit}'.strip()
+
+
+def _map_words(demand: MapDemand) -> str:
+    return f'at least {demand.least:.0%} of the map of {" and ".join(demand.joints)} visited'
+
+
+def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[str, Any]) -> str:
+    """Return how a value broke its demand."""
+    demand, worst = measure.demand, measure.worst[0]
+    if demand.dwell is not None:
+        kept = measured['longest_kept_s']
+        needed = _value_words(demand, settings)
+        return f'{measure.criterion.name}: kept for {kept:.2f} s; needed: {needed}'
+    must = f'must stay {measured["must_be"]} {number(demand.limit, demand, settings)}'
+    spent = f'{measured["time_in_violation_s"]:.2f} s in violation'
+    at = f'at {measured["at_s"]:.2f} s'
+    if demand.signal == 'torque_utilisation':
+        limit = settings.limits.torque[settings.robot.joint_names.index(worst.subject)]
+        _, unit = shown('torque', worst.subject, settings)
+        return (
+            f'{worst.subject} needs {worst.value * limit:.1f} {unit} {at}; its limit is '
+            f'{limit:.1f} {unit}, {must} ({spent})'
+        )
+    if demand.signal == 'tip_angle':
+        degrees = math.degrees(worst.value)
+        where = f'of tilt left before it tips to the {worst.subject}'
+        if degrees < 0.0:
+            where = f'past its tipping point to the {worst.subject}'
+        return f'{abs(degrees):.1f} degrees {where} {at}; {must} ({spent})'
+    subject = '' if worst.subject == 'robot' else f' of {worst.subject}'
+    words = SIGNALS[demand.signal].words
+    return f'{words}{subject} was {number(worst.value, demand, settings)} {at}; {must} ({spent})'
+
+
+def missing_reasons(alerts: Sequence[Alert], settings: Settings) -> list[str]:
+    """Return why margins were missing: one sentence for each kind of input fault."""
+    kinds = {(a.rule.code, a.rule.subject): a for a in alerts if a.rule.code not in FAILURES}
+    return [describe(a, settings) for a in kinds.values() if LEVELS[a.rule.level] != 'WARN']

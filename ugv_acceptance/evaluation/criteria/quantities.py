@@ -1,0 +1,190 @@
+"""The values a criterion can be about: how each is taken from margin rows, its unit, its words."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ugv_acceptance.evaluation.criteria.criteria import ANY
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.type_aliases import Floats, Json
+
+_DEGREES = 180.0 / np.pi
+
+
+@dataclass(frozen=True, slots=True)
+class SignalKind:
+    """A signal: `of` gives its columns (n, k); `subjects` says what they are: joints, sides, robot.
+
+    `kinds` are the quantities (config/units.py) of a limit for a turning and a sliding joint, ''
+    without unit. `scale` and `unit` show it to a person. `detail`: moments, energies and ZMP are
+    needed.
+    """
+
+    of: Callable[[MarginRows, Settings], Floats]
+    subjects: str
+    kinds: tuple[str, ...]
+    unit: str
+    words: str
+    scale: float = 1.0
+    detail: bool = False
+
+
+def _utilisation(rows: MarginRows, settings: Settings) -> Floats:
+    share: Floats = np.abs(rows.torque) / np.array(settings.limits.torque)
+    return share
+
+
+def _margin(rows: MarginRows, settings: Settings) -> Floats:
+    return np.array(settings.limits.torque) - np.abs(rows.torque)
+
+
+def _tilt(rows: MarginRows, _: Settings) -> Floats:
+    g = rows.gravity
+    with np.errstate(invalid='ignore'):
+        return np.arctan2(np.hypot(g[:, 0], g[:, 1]), -g[:, 2])[:, None]
+
+
+SIGNALS = {
+    'torque_utilisation': SignalKind(_utilisation, 'joints', ('',), '', 'torque / limit'),
+    'torque': SignalKind(
+        lambda rows, _: np.abs(rows.torque),
+        'joints',
+        ('torque', 'force'),
+        'N m',
+        'static torque (magnitude)',
+    ),
+    'torque_margin': SignalKind(_margin, 'joints', ('torque', 'force'), 'N m', 'torque margin'),
+    'effort': SignalKind(
+        lambda rows, _: np.abs(rows.effort),
+        'joints',
+        ('torque', 'force'),
+        'N m',
+        'measured effort (magnitude)',
+    ),
+    'position': SignalKind(
+        lambda rows, _: rows.q, 'joints', ('angle', 'length'), 'deg', 'position', _DEGREES
+    ),
+    'speed': SignalKind(
+        lambda rows, _: np.abs(rows.qd),
+        'joints',
+        ('angular rate', 'rate'),
+        'deg/s',
+        'speed',
+        _DEGREES,
+    ),
+    'tip_angle': SignalKind(
+        lambda rows, _: rows.angle, 'sides', ('angle',), 'deg', 'tilt left', _DEGREES
+    ),
+    'tip_moment': SignalKind(
+        lambda rows, _: rows.moment, 'sides', ('torque',), 'N m', 'moment that holds', detail=True
+    ),
+    'tip_energy': SignalKind(
+        lambda rows, _: rows.energy, 'sides', ('',), 'J', 'energy to tip', detail=True
+    ),
+    'zmp': SignalKind(
+        lambda rows, _: rows.zmp[:, None], 'robot', ('length',), 'm', 'ZMP inside', detail=True
+    ),
+    'tilt': SignalKind(_tilt, 'robot', ('angle',), 'deg', 'tilt of the base', _DEGREES),
+}
+
+
+def subjects_of(kind: SignalKind, settings: Settings) -> tuple[str, ...]:
+    """Return the names of a signal's columns."""
+    names = {'joints': settings.robot.joint_names, 'sides': SIDES, 'robot': ('robot',)}
+    return names[kind.subjects]
+
+
+def shown(signal: str, subject: str, settings: Settings) -> tuple[float, str]:
+    """Return factor and unit with which a person sees a signal of a joint, side or the robot."""
+    kind = SIGNALS[signal]
+    sliding = (
+        kind.subjects == 'joints'
+        and subject != ANY
+        and settings.robot.joint(subject).kind == 'prismatic'
+    )
+    if not sliding:
+        return kind.scale, kind.unit
+    units = {'N m': 'N', 'deg': 'm', 'deg/s': 'm/s'}
+    return 1.0, units.get(kind.unit, kind.unit)
+
+
+def columns_of(
+    signal: str, subject: str, rows: MarginRows, settings: Settings, *, largest: bool
+) -> Floats:
+    """Return a signal's values (n,), SI; of `any` the largest or smallest of all subjects.
+
+    NaN where the value is not known at a row.
+    """
+    kind = SIGNALS[signal]
+    table = kind.of(rows, settings)
+    if subject != ANY:
+        column: Floats = table[:, subjects_of(kind, settings).index(subject)]
+    else:
+        column = _extreme(table, largest=largest)
+    return column if rows.known.all() else np.where(rows.known, column, np.nan)
+
+
+def _extreme(table: Floats, *, largest: bool) -> Floats:
+    """Return the extreme of the columns; columns of NaN alone (not judged) do not count."""
+    pick = np.fmax if largest else np.fmin
+    found: Floats = pick.reduce(table, axis=1)
+    return found
+
+
+INPUTS = ('joint_states', 'imu')
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number of the whole run (`of` None), or one of each input; a `share` is from 0 to 1."""
+
+    of: Callable[[Json], float | None]
+    words: str
+    unit: str = ''
+    each_input: bool = False
+    share: bool = False
+
+
+def _shares(protected: str) -> float:
+    return {'all': 1.0, 'part': 0.5}.get(protected, 0.0)
+
+
+DATA = {
+    'coverage': Quantity(
+        lambda r: r['coverage']['fraction'], 'share of the recording evaluated', share=True
+    ),
+    'duration': Quantity(lambda r: r['coverage']['duration_s'], 'length of the recording', 's'),
+    'protected': Quantity(
+        lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum', share=True
+    ),
+    'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'files that break off'),
+    'lost_messages': Quantity(
+        lambda r: float(r['bag']['lost_messages']), 'messages that metadata.yaml tells of missing'
+    ),
+    'findings': Quantity(lambda r: float(len(r['bag']['findings'])), 'oddities of the file'),
+    'late_messages': Quantity(
+        lambda r: float(r['inputs']['late_messages']), 'messages out of order'
+    ),
+    'messages': Quantity(lambda i: float(i['messages']), 'messages', each_input=True),
+    'rate': Quantity(lambda i: i['rate_hz'], 'rate', 'Hz', each_input=True),
+    'gaps': Quantity(lambda i: float(i['gaps']), 'gaps', each_input=True),
+    'longest_gap': Quantity(lambda i: i['longest_gap_s'], 'longest gap', 's', each_input=True),
+    'malformed': Quantity(lambda i: float(i['malformed']), 'malformed messages', each_input=True),
+    'faults': Quantity(lambda i: float(len(i['faults'])), 'kinds of fault', each_input=True),
+}
+
+
+def measured_of(quantity: str, of: str | None, result: Json) -> dict[str, float | None]:
+    """Return the numbers of a quantity: of the run, of one input, or (None) of both inputs."""
+    found = DATA[quantity]
+    if not found.each_input:
+        return {'run': found.of(result)}
+    return {name: found.of(result['inputs'][name]) for name in INPUTS if of in (None, name)}
+
+
+def unit_of(quantity: str) -> str:
+    """Return the unit of a quantity."""
+    return DATA[quantity].unit

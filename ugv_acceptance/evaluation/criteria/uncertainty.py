@@ -1,0 +1,333 @@
+"""The bound on a margin that follows from the stated +/- of the numbers it is computed from.
+
+First order: every number is moved by its +/- to both sides while the posture, the payload and the
+support polygon stay what they are; half the difference is that number's effect. Effects are
+combined as a root sum of squares (independent numbers) or as a sum (worst case).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ugv_acceptance.evaluation.criteria.criteria import IGNORED, RSS, WORST_CASE, Value
+from ugv_acceptance.evaluation.criteria.measurement import Examination, Moment, ValueMeasure
+from ugv_acceptance.evaluation.criteria.quantities import shown
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
+from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vector
+from ugv_acceptance.model.stability import SIDES, stance_of, tip_angles_of
+from ugv_acceptance.model.statics import torque_of
+from ugv_acceptance.type_aliases import Floats
+
+Gravity = tuple[float, float, float]
+# Contacts that are all moved, the payload in force, and the IMU: subjects beside links and joints.
+CONTACTS, PAYLOAD, IMU = 'contacts', 'payload', 'imu'
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """One uncertain number: +/- `value` (SI) of `what` of `subject`, `name` as in the file.
+
+    `what` is mass, cog, place (of a joint or contacts), offset, limit, roll or pitch (of the IMU);
+    `axis` 0, 1, 2 where it is a vector.
+    """
+
+    name: str
+    subject: str
+    what: str
+    value: float
+    axis: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """What every source does to one row: `torque` (s, j) N m (N), `angle` (s, 4) rad to SIDES.
+
+    `position` (s, j) rad or m, `tilt` (s,) rad, `limit` (s, j) N m (N). NaN angle: no edge there.
+    """
+
+    sources: tuple[Source, ...]
+    torque: Floats
+    angle: Floats
+    position: Floats
+    limit: Floats
+    tilt: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Point:
+    """What a row's margins are computed from."""
+
+    robot: Robot
+    q: tuple[float, ...]
+    gravity: Gravity
+    payload: Payload
+
+
+def effects_of(
+    settings: Settings,
+    sources: Sequence[Source],
+    q: tuple[float, ...],
+    gravity: Gravity,
+    payload: Payload,
+) -> Effects:
+    """Return the effect of each source on the margins of one row."""
+    robot = settings.robot
+    point = _Point(robot, q, gravity, payload)
+    margins = _margins_near(point)
+    n, count = len(q), len(sources)
+    table = np.zeros((count, n + len(SIDES)))
+    position, limit, tilt = np.zeros((count, n)), np.zeros((count, n)), np.zeros(count)
+    for k, source in enumerate(sources):
+        if source.what == 'limit':
+            limit[k, robot.joint_names.index(source.subject)] = source.value
+            continue
+        high, low = (_moved(point, source, sign * source.value) for sign in (1.0, -1.0))
+        with np.errstate(invalid='ignore'):
+            table[k] = 0.5 * (margins(high) - margins(low))
+        position[k] = 0.5 * (np.array(high.q) - np.array(low.q))
+        tilt[k] = source.value if source.subject == IMU else 0.0
+    return Effects(tuple(sources), table[:, :n], table[:, n:], position, limit, tilt)
+
+
+def combined(effects: Floats, method: str) -> Floats:
+    """Return the bound (...) of effects (s, ...): their root sum of squares or their sum."""
+    size = np.abs(effects)
+    bound: Floats = size.sum(axis=0) if method == WORST_CASE else np.sqrt((size**2).sum(axis=0))
+    return bound
+
+
+def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
+    """Return torques and tip angles (j + 4,) of points near this one, on its support polygon."""
+    mechanics = mechanics_of(point.robot)
+    nominal: Any = _posture(point)
+    stance = stance_of(mechanics, nominal)
+    contacts, frames = point.robot.contacts, mechanics.tree.frames
+    polygon = stance.support.polygon if stance.edges else ()
+    moving = [k for k in polygon if frames[contacts[k].link][0] != 0]
+    on_base = next((k for k in polygon if k not in moving), None)
+
+    def margins(at: _Point) -> Floats:
+        posture: Any = _posture(at)
+        torque = torque_of(posture, at.gravity)
+        if stance.edges is None:
+            return np.array([*torque, *(math.nan for _ in SIDES)])
+        # The kernel holds the base's corners fixed: what moves them moves all else the other way.
+        shift = np.zeros(3)
+        if on_base is not None:
+            shift = np.array(posture.contacts[on_base]) - np.array(nominal.contacts[on_base])
+        points = [posture.cog, *(posture.contacts[k] for k in moving)]
+        terms = tuple(float(x) for p in points for x in np.array(p) - shift)
+        near = replace(stance, terms=terms, mass=posture.mass)
+        angle, _ = tip_angles_of(near, at.gravity)
+        return np.array([*torque, *angle], dtype=np.float64)
+
+    return margins
+
+
+def _posture(point: _Point) -> Posture:
+    return posture_once(point.robot, point.q, point.payload.mass, point.payload.cog)
+
+
+def _moved(point: _Point, source: Source, by: float) -> _Point:
+    if source.subject == IMU:
+        return replace(point, gravity=_turned(point.gravity, source.what, by))
+    if source.subject == PAYLOAD:
+        return replace(point, payload=_other_payload(point.payload, source, by))
+    if source.what == 'offset':
+        j = point.robot.joint_names.index(source.subject)
+        q = (*point.q[:j], point.q[j] + by, *point.q[j + 1 :])
+        return replace(point, q=q)
+    return replace(point, robot=_other_robot(point.robot, source, by))
+
+
+def _other_payload(payload: Payload, source: Source, by: float) -> Payload:
+    if source.what == 'mass':
+        return replace(payload, mass=payload.mass + by)
+    return replace(payload, cog=_added(payload.cog, source.axis, by))
+
+
+def _other_robot(robot: Robot, source: Source, by: float) -> Robot:
+    if source.subject == CONTACTS:
+        contacts = [_contact(c, source, by) for c in robot.contacts]
+        return replace(robot, contacts=tuple(contacts))
+    if source.what == 'place':
+        moved = [_joint(j, source, by) for j in robot.joints]
+        return replace(robot, joints=tuple(moved))
+    return replace(robot, links=tuple([_link(x, source, by) for x in robot.links]))
+
+
+def _link(link: Link, source: Source, by: float) -> Link:
+    if link.name != source.subject:
+        return link
+    if source.what == 'mass':
+        return replace(link, mass=link.mass + by)
+    return replace(link, cog=_added(link.cog, source.axis, by))
+
+
+def _joint(joint: Joint, source: Source, by: float) -> Joint:
+    if joint.name != source.subject:
+        return joint
+    return replace(joint, xyz=_added(joint.xyz, source.axis, by))
+
+
+def _contact(contact: Contact, source: Source, by: float) -> Contact:
+    return replace(contact, position=_added(contact.position, source.axis, by))
+
+
+def _added(v: Vector, axis: int, by: float) -> Vector:
+    parts = [x + (by if k == axis else 0.0) for k, x in enumerate(v)]
+    return (parts[0], parts[1], parts[2])
+
+
+def _turned(g: Gravity, what: str, by: float) -> Gravity:
+    """Return gravity as an IMU that is off by a roll or pitch angle (rad) shows it."""
+    x, y, z = g
+    s, c = math.sin(by), math.cos(by)
+    if what == 'roll':
+        return (x, c * y - s * z, s * y + c * z)
+    return (c * x + s * z, y, -s * x + c * z)
+
+
+# Sources named beside a bound.
+NAMED = 5
+
+
+@dataclass(slots=True)
+class Bounds:
+    """Bounds of moments; the effects of the sources on one moment are computed once."""
+
+    settings: Settings
+    sources: tuple[Source, ...]
+    _known: dict[tuple[Any, ...], Effects] = field(default_factory=dict)
+
+    def worst(self, measure: ValueMeasure, method: str) -> dict[str, Any] | None:
+        """Return the bound at the moment that has least left beyond it; None: no bound is known.
+
+        `excess` is what is left to the limit less the bound; unit as people see it.
+        """
+        demand = measure.demand
+        ones = [self._one(demand, moment, method) for moment in measure.worst]
+        found = [one for one in ones if one is not None]
+        return min(found, key=lambda one: float(one['excess'])) if found else None
+
+    def _one(self, demand: Value, moment: Moment, method: str) -> dict[str, Any] | None:
+        effects = self.of(demand.signal, moment)
+        if effects is None or not np.isfinite(effects).all():
+            return None
+        used = RSS if method == IGNORED else method
+        scale, unit = shown(demand.signal, moment.subject, self.settings)
+        bound = float(combined(effects, used)) * scale
+        return {
+            'bound': bound,
+            'unit': unit,
+            'method': used,
+            'excess': demand.distance(moment.value) * scale - bound,
+            'largest': self.largest(effects, scale),
+        }
+
+    def of(self, signal: str, moment: Moment) -> Floats | None:
+        """Return the effects (s,) of the sources on a signal at a moment; None: not known."""
+        if not self.sources or signal not in _OF:
+            return None
+        key = (moment.q, moment.gravity, moment.payload)
+        if key not in self._known:
+            self._known[key] = effects_of(self.settings, self.sources, *key)
+        return _OF[signal](self._known[key], moment, self.settings)
+
+    def largest(self, effects: Floats, scale: float) -> list[dict[str, Any]]:
+        """Return the sources that count most, with what each does."""
+        order = np.argsort(-np.abs(effects), kind='stable')[:NAMED]
+        return [
+            {'name': self.sources[k].name, 'effect': float(effects[k]) * scale}
+            for k in order.tolist()
+            if effects[k] != 0.0
+        ]
+
+
+def _joint_index(moment: Moment, settings: Settings) -> int:
+    return settings.robot.joint_names.index(moment.subject)
+
+
+def _margin(effects: Effects, moment: Moment, settings: Settings) -> Floats:
+    j = _joint_index(moment, settings)
+    found: Floats = effects.torque[:, j] + effects.limit[:, j]
+    return found
+
+
+def _utilisation(effects: Effects, moment: Moment, settings: Settings) -> Floats:
+    j = _joint_index(moment, settings)
+    found: Floats = effects.torque[:, j] + moment.value * effects.limit[:, j]
+    return found / settings.limits.torque[j]
+
+
+def _position(effects: Effects, moment: Moment, settings: Settings) -> Floats:
+    column: Floats = effects.position[:, _joint_index(moment, settings)]
+    return column
+
+
+def _torque(effects: Effects, moment: Moment, settings: Settings) -> Floats:
+    column: Floats = effects.torque[:, _joint_index(moment, settings)]
+    return column
+
+
+def _angle(effects: Effects, moment: Moment, _: Settings) -> Floats:
+    column: Floats = effects.angle[:, SIDES.index(moment.subject)]
+    return column
+
+
+def _tilt(effects: Effects, _: Moment, __: Settings) -> Floats:
+    return effects.tilt
+
+
+# Sources are distinct, so a source of torque never is one of the limit: signs do not matter.
+_OF: dict[str, Callable[[Effects, Moment, Settings], Floats]] = {
+    'torque': _torque,
+    'torque_margin': _margin,
+    'torque_utilisation': _utilisation,
+    'position': _position,
+    'tip_angle': _angle,
+    'tilt': _tilt,
+}
+
+
+def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
+    """Return posture, attitude and payload of a moment for JSON; degrees, metres, kg."""
+    gx, gy, gz = moment.gravity
+    joints = {}
+    for name, q in zip(settings.robot.joint_names, moment.q, strict=True):
+        scale, unit = shown('position', name, settings)
+        joints[name] = {'position': q * scale, 'unit': unit}
+    return {
+        'joints': joints,
+        'roll_deg': math.degrees(math.atan2(-gy, -gz)),
+        'pitch_deg': math.degrees(math.atan2(gx, math.hypot(gy, gz))),
+        'payload_kg': moment.payload.mass,
+    }
+
+
+def margin_bounds(result: dict[str, Any], limits: Examination, bounds: Bounds) -> None:
+    """Add to every joint's and to the tip-over margin of a result the bound at its worst moment."""
+    for measure in limits.measures.values():
+        if not isinstance(measure, ValueMeasure):
+            continue
+        bound = bounds.worst(measure, RSS)
+        if measure.demand.signal == 'tip_angle':
+            result['stability']['uncertainty'] = bound
+        else:
+            joint = result['torque'][measure.demand.of]
+            joint['uncertainty'] = bound and _scaled(bound, joint['limit'], joint['unit'])
+
+
+def _scaled(bound: dict[str, Any], by: float, unit: str) -> dict[str, Any]:
+    """Return the bound of a utilisation as one of a torque."""
+    return {
+        **bound,
+        'bound': bound['bound'] * by,
+        'excess': bound['excess'] * by,
+        'unit': unit,
+        'largest': [{**one, 'effect': one['effect'] * by} for one in bound['largest']],
+    }

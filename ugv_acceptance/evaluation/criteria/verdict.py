@@ -1,0 +1,352 @@
+"""From measures to verdicts: each criterion PASS, FAIL or INCONCLUSIVE, with its evidence.
+
+A violation is a FAIL however little was evaluated; a PASS needs the data, and a margin beyond the
+bound of its uncertainty.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
+from ugv_acceptance.evaluation.criteria.criteria import (
+    ANY,
+    FAIL,
+    IGNORED,
+    INCONCLUSIVE,
+    PASS,
+    AlertDemand,
+    Criterion,
+    DataDemand,
+    MapDemand,
+    Value,
+)
+from ugv_acceptance.evaluation.criteria.measurement import (
+    Examination,
+    KnownTime,
+    MapMeasure,
+    ValueMeasure,
+)
+from ugv_acceptance.evaluation.criteria.messages import (
+    demand_words,
+    missing_reasons,
+    violation_words,
+)
+from ugv_acceptance.evaluation.criteria.quantities import measured_of, shown, unit_of
+from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, moment_json
+from ugv_acceptance.evaluation.permitted_limits import relaxed_words
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.type_aliases import Json
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """What verdicts are made from: measures, alerts, the data's numbers (a result), bounds."""
+
+    examination: Examination
+    alerts: Sequence[Alert]
+    data: Json
+    bounds: Bounds
+
+    @property
+    def settings(self) -> Settings:
+        """Return the settings of the evaluation."""
+        return self.examination.settings
+
+    def seconds(self, time: int) -> float:
+        """Return seconds since the start of the recording."""
+        return (time - self.examination.start) / 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A verdict, why, and the numbers and sentences behind it, ready for JSON."""
+
+    verdict: str
+    reason: str
+    measured: Json
+    evidence: tuple[str, ...] = ()
+
+
+def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> str | None:
+    """Return why too little of a criterion's window was evaluated; None where enough was."""
+    examination = findings.examination
+    start, end = examination.span_of(criterion.window)
+    share, needed = evaluated / (end - start) if end > start else 0.0, examination.criteria.coverage
+    if share >= needed and end > start:
+        return None
+    what = 'the recording'
+    if criterion.window is not None:
+        what = f'{criterion.window[0]:g} to {criterion.window[1]:g} s'
+    return f'only {share:.1%} of {what} could be evaluated ({needed:.0%} needed)'
+
+
+def alert_words(alert: Alert, findings: Findings) -> str:
+    """Return an alert as a sentence with its times."""
+    end = 'the end' if alert.end is None else f'{findings.seconds(alert.end):.2f} s'
+    return (
+        f'{LEVELS[alert.rule.level]} {alert.rule.code} from {findings.seconds(alert.start):.2f} s '
+        f'to {end}: {describe(alert, findings.settings)}'
+    )
+
+
+def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
+    """Return what becomes of a criterion on a value."""
+    measure = findings.examination.measures[criterion.name]
+    assert isinstance(measure, ValueMeasure)  # noqa: S101 - by its demand
+    measured = _measured(measure, findings)
+    evidence = tuple(_related(measure, findings))
+    short = short_of_data(measure.evaluated, criterion, findings)
+    if not measure.samples:
+        return Outcome(INCONCLUSIVE, f'{criterion.name}: no value was known', measured)
+    if not _met(measure):
+        if measure.demand.dwell is not None and short:
+            return Outcome(INCONCLUSIVE, short, measured, evidence)
+        return Outcome(
+            FAIL, violation_words(measure, findings.settings, measured), measured, evidence
+        )
+    if short:
+        return Outcome(INCONCLUSIVE, short, measured, evidence)
+    if measure.demand.always and measured['inside_bound'] and _decides(criterion, findings):
+        bound = measured['uncertainty']
+        text = (
+            f'{criterion.name}: met by {measured["distance"]:.3g} {measured["unit"]}, within the '
+            f'uncertainty of {bound["bound"]:.3g} {measured["unit"]}'
+        )
+        return Outcome(INCONCLUSIVE, text.replace(' ,', ','), measured, evidence)
+    return Outcome(PASS, demand_words(criterion, findings.settings), measured, evidence)
+
+
+def _decides(criterion: Criterion, findings: Findings) -> bool:
+    return findings.examination.criteria.uncertainty_of(criterion) != IGNORED
+
+
+def _met(measure: ValueMeasure) -> bool:
+    demand, violation = measure.demand, measure.violation
+    if demand.dwell is not None:
+        return _length(measure.kept.longest) >= demand.dwell
+    if demand.always:
+        worst = measure.worst[0].value
+        return worst < demand.limit if demand.below else worst > demand.limit
+    share = violation.total / measure.evaluated if measure.evaluated else 0.0
+    spent = (
+        (violation.total / 1e9, demand.time_in_violation),
+        (_length(violation.longest), demand.longest_violation),
+        (share, demand.share_in_violation),
+    )
+    return all(most is None or found <= most for found, most in spent)
+
+
+def _length(span: tuple[int, int]) -> float:
+    return (span[1] - span[0]) / 1e9
+
+
+def _measured(measure: ValueMeasure, findings: Findings) -> Json:
+    """Return a value's numbers in the unit people see."""
+    demand, violation = measure.demand, measure.violation
+    scale, unit = shown(demand.signal, demand.of, findings.settings)
+    method = findings.examination.criteria.uncertainty_of(measure.criterion)
+    worst = measure.worst[0] if measure.worst and isfinite(measure.worst[0].value) else None
+    bound, first = findings.bounds.worst(measure, method), measure.first
+    start, end = measure.span
+    distance = demand.distance(worst.value) * scale if worst else None
+    return {
+        'signal': demand.signal,
+        'of': demand.of,
+        'unit': unit,
+        'limit': demand.limit * scale,
+        'must_be': 'below' if demand.below else 'above',
+        'worst': worst.value * scale if worst else None,
+        'worst_of': worst.subject if worst else None,
+        'at_s': findings.seconds(worst.time) if worst else None,
+        'distance': distance,
+        'moment': moment_json(worst, findings.settings) if worst else None,
+        'first_violation': moment_json(first, findings.settings) if first else None,
+        'uncertainty': bound,
+        'inside_bound': bool(bound and distance and distance > 0.0 >= bound['excess']),
+        'evaluated_s': measure.evaluated / 1e9,
+        'evaluated_share': measure.evaluated / (end - start) if end > start else 0.0,
+        'time_in_violation_s': violation.total / 1e9,
+        'share_in_violation': violation.total / measure.evaluated if measure.evaluated else 0.0,
+        'violations': violation.count,
+        'longest_violation_s': _length(violation.longest),
+        'first_violations_s': [
+            [findings.seconds(a), findings.seconds(b)] for a, b in violation.first
+        ],
+        'longest_kept_s': _length(measure.kept.longest) if demand.dwell is not None else None,
+    }
+
+
+_ALERT_OF = {
+    'torque_utilisation': 'TORQUE_LIMIT',
+    'torque': 'TORQUE_LIMIT',
+    'torque_margin': 'TORQUE_LIMIT',
+    'tip_angle': 'TIP_OVER',
+    'speed': 'STATIC_MODEL',
+}
+
+
+def _related(measure: ValueMeasure, findings: Findings) -> list[str]:
+    """Return the alerts about the same margin, in words with their times."""
+    code, subject = _ALERT_OF.get(measure.demand.signal), measure.demand.of
+    start, end = measure.span
+    return [
+        alert_words(a, findings)
+        for a in findings.alerts
+        if a.rule.code == code
+        and subject in (a.rule.subject, ANY)
+        and a.start <= end
+        and (a.end is None or a.end >= start)
+    ]
+
+
+def judge_criteria(findings: Findings) -> Json:
+    """Return verdict, reasons and every criterion's outcome, ready for JSON."""
+    criteria = findings.examination.criteria
+    outcomes = [(c, _outcome(c, findings)) for c in criteria.criteria]
+    word, reasons = _overall([outcome for _, outcome in outcomes], findings)
+    return {
+        'verdict': word,
+        'reasons': reasons,
+        'criteria': {
+            'name': criteria.name,
+            'version': criteria.version,
+            'path': criteria.path,
+            'sha256': criteria.sha256,
+            'uncertainty': criteria.uncertainty,
+            'coverage': criteria.coverage,
+            'results': [_json(c, outcome, findings) for c, outcome in outcomes],
+        },
+    }
+
+
+def _overall(outcomes: Sequence[Outcome], findings: Findings) -> tuple[str, list[str]]:
+    for word in (FAIL, INCONCLUSIVE):
+        reasons = list(dict.fromkeys(o.reason for o in outcomes if o.verdict == word))
+        if reasons and word == INCONCLUSIVE:
+            reasons += missing_reasons(findings.alerts, findings.settings)
+        if reasons:
+            return word, reasons
+    share = findings.data['coverage']['fraction']
+    text = 'all margins kept' if findings.examination.criteria.path is None else 'all criteria met'
+    wider = relaxed_words(findings.settings)
+    return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
+
+
+def _json(criterion: Criterion, outcome: Outcome, findings: Findings) -> Json:
+    return {
+        'name': criterion.name,
+        'requirement': criterion.requirement,
+        'reference': criterion.reference,
+        'kind': KINDS[type(criterion.demand)],
+        'window_s': None if criterion.window is None else list(criterion.window),
+        'demand': demand_words(criterion, findings.settings),
+        'verdict': outcome.verdict,
+        'reason': outcome.reason,
+        'measured': outcome.measured,
+        'evidence': list(outcome.evidence),
+    }
+
+
+def _outcome(criterion: Criterion, findings: Findings) -> Outcome:
+    judge = JUDGES[type(criterion.demand)]
+    return judge(criterion, findings)
+
+
+def _judge_alert(criterion: Criterion, findings: Findings) -> Outcome:
+    demand, measure = criterion.demand, findings.examination.measures[criterion.name]
+    assert isinstance(demand, AlertDemand)  # noqa: S101 - by its kind
+    assert isinstance(measure, KnownTime)  # noqa: S101 - the same
+    start, end = measure.span
+    matching = [a for a in findings.alerts if _matches(a, demand)]
+    if demand.raised:
+        found = [a for a in matching if start <= a.start <= end]
+    else:
+        found = [a for a in matching if a.start <= end and (a.end is None or a.end > start)]
+    evidence = tuple(alert_words(a, findings) for a in found)
+    measured: Json = {'alerts': len(found), 'evaluated_s': measure.evaluated / 1e9}
+    short = short_of_data(measure.evaluated, criterion, findings)
+    if found and not demand.raised:
+        return Outcome(FAIL, f'{criterion.name}: {evidence[0]}', measured, evidence)
+    if found:
+        return Outcome(PASS, evidence[0], measured, evidence)
+    if short:
+        return Outcome(INCONCLUSIVE, short, measured)
+    if demand.raised:
+        text = (
+            f'{criterion.name}: {demand_words(criterion, findings.settings)}, but it did not come'
+        )
+        return Outcome(FAIL, text, measured)
+    return Outcome(PASS, demand_words(criterion, findings.settings), measured)
+
+
+def _matches(alert: Alert, demand: AlertDemand) -> bool:
+    rule = alert.rule
+    asked = (
+        (demand.code, rule.code),
+        (demand.of, rule.subject),
+        (demand.level, LEVELS[rule.level]),
+    )
+    return all(wanted in (None, found) for wanted, found in asked)
+
+
+def _judge_data(criterion: Criterion, findings: Findings) -> Outcome:
+    demand = criterion.demand
+    assert isinstance(demand, DataDemand)  # noqa: S101 - by its demand
+    found = measured_of(demand.quantity, demand.of, findings.data)
+    measured: Json = {
+        'quantity': demand.quantity,
+        'unit': unit_of(demand.quantity),
+        'least': demand.least if isfinite(demand.least) else None,
+        'most': demand.most if isfinite(demand.most) else None,
+        'values': found,
+    }
+    unmet = {k: x for k, x in found.items() if x is None or not demand.least <= x <= demand.most}
+    if not unmet:
+        return Outcome(PASS, demand_words(criterion, findings.settings), measured)
+    text = _unmet_words(criterion, demand, unmet, findings)
+    return Outcome(FAIL if demand.fails else INCONCLUSIVE, text, measured)
+
+
+def _unmet_words(
+    criterion: Criterion, demand: DataDemand, unmet: dict[str, float | None], findings: Findings
+) -> str:
+    data = findings.data
+    if demand.quantity == 'coverage':
+        return (
+            f'only {data["coverage"]["fraction"]:.1%} of the recording could be evaluated '
+            f'({demand.least:.0%} needed)'
+        )
+    if demand.quantity == 'salvaged':
+        return f'the recording breaks off: {data["bag"]["salvaged"]}'
+    if demand.quantity == 'lost_messages':
+        return f'{data["bag"]["lost_messages"]} messages that metadata.yaml tells of are missing'
+    unit = unit_of(demand.quantity)
+    texts = {k: 'unknown' if x is None else f'{x:.4g} {unit}'.strip() for k, x in unmet.items()}
+    numbers = ', '.join(f'{k} {text}'.removeprefix('run ') for k, text in texts.items())
+    return f'{criterion.name}: {numbers}; {demand_words(criterion, findings.settings)}'
+
+
+def _judge_map(criterion: Criterion, findings: Findings) -> Outcome:
+    demand, measure = criterion.demand, findings.examination.measures[criterion.name]
+    assert isinstance(demand, MapDemand)  # noqa: S101 - by its kind
+    assert isinstance(measure, MapMeasure)  # noqa: S101 - the same
+    cells, visited = measure.visited.size, int(measure.visited.sum())
+    measured: Json = {'cells': cells, 'visited': visited, 'share': visited / cells}
+    if visited / cells >= demand.least:
+        return Outcome(PASS, demand_words(criterion, findings.settings), measured)
+    text = (
+        f'{criterion.name}: the run visited {visited} of {cells} cells ({visited / cells:.1%}); '
+        f'{demand.least:.0%} needed'
+    )
+    return Outcome(INCONCLUSIVE, text, measured)
+
+
+KINDS = {Value: 'value', AlertDemand: 'alert', DataDemand: 'data', MapDemand: 'map'}
+JUDGES: dict[type, Callable[[Criterion, Findings], Outcome]] = {
+    Value: judge_value,
+    AlertDemand: _judge_alert,
+    DataDemand: _judge_data,
+    MapDemand: _judge_map,
+}

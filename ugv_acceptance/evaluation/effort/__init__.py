@@ -1,0 +1,1 @@
+"""Measured joint efforts beside the static model."""

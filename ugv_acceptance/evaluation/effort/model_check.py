@@ -1,0 +1,262 @@
+"""The model held against the run: measured efforts beside static torque, at rest and in motion.
+
+At rest: bias, scale and sign of each joint's effort, and the payload that would explain the
+difference. In motion: friction, and the paper's F test of the run against its own slow part.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtri, stdtrit
+
+from ugv_acceptance.evaluation.downsampling import Sampler
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.type_aliases import Floats, Json
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Coefficients (k,), half the width of each one's 95 % interval, and what samples count for.
+
+    `independent` is the number of independent samples that n samples of one run are worth.
+    """
+
+    value: Floats
+    half_width: Floats
+    independent: float
+
+
+def independent_samples(residual: Floats) -> float:
+    """Return n (1 - r) / (1 + r) for the correlation r of neighbours (not below 0)."""
+    n = len(residual)
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return float(n)
+    r = min(max(float(centred[1:] @ centred[:-1]) / power, 0.0), 0.999)
+    return n * (1.0 - r) / (1.0 + r)
+
+
+def least_squares(columns: Floats, y: Floats) -> Fit | None:
+    """Return the fit of y (n,) by columns (n, k); None where it is not determined."""
+    n, k = columns.shape
+    scale = np.sqrt((columns**2).sum(axis=0))
+    if n <= k or not (scale > 0.0).all():
+        return None
+    scaled = columns / scale
+    _, _, rank, singular = np.linalg.lstsq(scaled, y, rcond=None)
+    if rank < k or singular[-1] < 1e-6 * singular[0]:
+        return None
+    inverse = np.linalg.inv(scaled.T @ scaled)
+    value = inverse @ (scaled.T @ y)
+    residual = y - scaled @ value
+    worth = independent_samples(residual)
+    freedom = max(worth - k, 1.0)
+    variance = float(residual @ residual) / (n - k) * (n / max(worth, 1.0))
+    deviation = np.sqrt(variance * np.diag(inverse))
+    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    return Fit(value / scale, quantile * deviation / scale, worth)
+
+
+# Slower than this (rad/s or m/s) is at rest, faster than MOVING is in motion.
+REST, MOVING = 0.02, 0.05
+# Samples are taken this far apart (ns).
+SPACING = 100_000_000
+# Fewer samples tell nothing.
+LEAST = 30
+# A scale needs torques that differ (standard deviation, N m or N), a payload a lever (N m a kg).
+SPREAD, LEVER = 0.5, 0.5
+ALPHA = 0.05
+# An effort from this share of the joint's limit on is clipped: it does not tell the load.
+CLIPPED = 0.99
+# Less friction (N m, N m s/rad; N, N s/m) than this is rounding.
+ROUNDING = 1e-6
+
+
+@dataclass(slots=True)
+class ModelCheck:
+    """Gathers samples of a run (at most ten a second) and compares them with the model."""
+
+    settings: Settings
+    _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch of margins. A robot that has tipped rests on its arm: not those."""
+        self._samples.add(rows, standing=True)
+
+    def _lever(self, q: Floats, gravity: Floats) -> Floats:
+        robot = self.settings.robot
+        one, none = (Payload(mass, robot.payload.cog) for mass in (1.0, 0.0))
+        lever: Floats = static_torque(robot, q, gravity, one) - static_torque(
+            robot, q, gravity, none
+        )
+        return lever
+
+    def result(self) -> Json:
+        """Return the comparison for JSON: each joint's, the payload of all, the speed's share."""
+        names = self.settings.robot.joint_names
+        time, (effort, torque, rate, q, gravity) = self._samples.samples(len(names))
+        lever = self._lever(q, gravity)
+        slow = np.abs(np.nan_to_num(rate)).max(axis=1, initial=0.0) <= REST
+        clipped = np.abs(effort) >= CLIPPED * np.array(self.settings.limits.torque)
+        effort = np.where(clipped, np.nan, effort)
+        columns = zip(effort.T, torque.T, lever.T, rate.T, clipped.T, strict=True)
+        samples = [_Samples(*column, slow) for column in columns]
+        return {
+            'samples': len(time),
+            'spacing_s': self._samples.spacing / 1e9,
+            'speed_validity': self._speed_validity(rate),
+            'payload': _pooled_payload(samples),
+            'joints': {name: _joint(s) for name, s in zip(names, samples, strict=True)},
+        }
+
+    def _speed_validity(self, rate: Floats) -> Json:
+        """Return the share of samples in which every joint was slow enough for the static model."""
+        speeds = self.settings.limits.speed or (np.inf,) * rate.shape[1]
+        bounds = np.array(speeds)
+        judged = np.isfinite(bounds) & np.isfinite(rate).any(axis=0)
+        if not judged.any():
+            return {'share': None, 'joints': []}
+        slow = (np.nan_to_num(np.abs(rate[:, judged])) <= bounds[judged]).all(axis=1)
+        names = np.array(self.settings.robot.joint_names)[judged]
+        return {'share': float(slow.mean()), 'joints': names.tolist()}
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """One joint's samples (n,): effort, torque, lever of a kg of payload, rate; slow: all rest."""
+
+    effort: Floats
+    torque: Floats
+    lever: Floats
+    rate: Floats
+    clipped: NDArray[np.bool_]
+    slow: NDArray[np.bool_]
+
+    @property
+    def difference(self) -> Floats:
+        """Measured effort less static torque."""
+        return self.effort - self.torque
+
+    def rest(self) -> NDArray[np.bool_]:
+        """Which samples tell of the robot at rest."""
+        return self.slow & np.isfinite(self.effort)
+
+    def motion(self) -> NDArray[np.bool_]:
+        """Which samples tell of this joint in motion."""
+        return (np.abs(np.nan_to_num(self.rate)) > MOVING) & np.isfinite(self.effort)
+
+
+def _joint(s: _Samples) -> Json:
+    told = np.isfinite(s.effort)
+    if told.sum() < LEAST:
+        return {'effort': 'not recorded' if not told.any() else 'too few samples'}
+    if np.ptp(s.effort[told]) == 0.0:
+        return {'effort': f'constant at {s.effort[told].max():g}'}
+    return {
+        'effort': 'recorded',
+        'clipped_samples': int(s.clipped.sum()),
+        'rest_samples': int(s.rest().sum()),
+        'motion_samples': int(s.motion().sum()),
+        **_rest(s),
+        **_friction(s),
+        'f_test': _f_test(s),
+    }
+
+
+def _rest(s: _Samples) -> Json:
+    rest = s.rest()
+    if rest.sum() < LEAST:
+        return {'bias': None, 'scale': None, 'sign': 'unknown', 'payload_kg': None}
+    difference, torque, lever = s.difference[rest], s.torque[rest], s.lever[rest]
+    ones = np.ones((len(difference), 1))
+    scale = None
+    if torque.std() > SPREAD:
+        scale = least_squares(np.column_stack((torque, ones)), s.effort[rest])
+    payload = None
+    if np.sqrt((lever**2).mean()) > LEVER:
+        payload = least_squares(lever[:, None], difference)
+    return {
+        'bias': _interval(least_squares(ones, difference)),
+        'rms': float(np.sqrt((difference**2).mean())),
+        'scale': _interval(scale),
+        'sign': _sign(scale),
+        'payload_kg': _interval(payload),
+    }
+
+
+def _sign(scale: Fit | None) -> str:
+    if scale is None or abs(scale.value[0]) <= scale.half_width[0]:
+        return 'unknown'
+    return 'same' if scale.value[0] > 0.0 else 'opposite'
+
+
+def _interval(fit: Fit | None, k: int = 0) -> Json | None:
+    """Return a coefficient with its 95 % interval."""
+    if fit is None or not np.isfinite([fit.value[k], fit.half_width[k]]).all():
+        return None
+    value, half = float(fit.value[k]), float(fit.half_width[k])
+    return {'value': value, 'low': value - half, 'high': value + half}
+
+
+def _friction(s: _Samples) -> Json:
+    """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate.
+
+    `friction` is None where the run does not tell it; `friction_unknown` says why, else is empty.
+    """
+    motion = s.motion()
+    rate = s.rate[motion]
+    if len(rate) < LEAST:
+        return {'friction': None, 'friction_unknown': 'too little motion'}
+    # Of motion one way alone the sign and the bias are one column: there is no fit.
+    columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
+    fit = least_squares(columns, s.difference[motion])
+    if fit is None:
+        return {'friction': None, 'friction_unknown': 'motion one way or at one speed alone'}
+    found = {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
+    # Friction takes power: what certainly gives some is inertia, or a load that moves the arm.
+    if any(part is not None and part['high'] < -ROUNDING for part in found.values()):
+        return {'friction': None, 'friction_unknown': 'other forces outweigh it'}
+    return {'friction': found, 'friction_unknown': ''}
+
+
+def _f_test(s: _Samples) -> Json | None:
+    """Return F of the motion's mean square error against that at rest (equations 9 and 10)."""
+    rest, motion = s.difference[s.rest()], s.difference[s.motion()]
+    if min(len(rest), len(motion)) < LEAST or not (rest**2).sum() > 0.0:
+        return None
+    mean_squares = [float((x**2).sum()) / (len(x) - 1) for x in (motion, rest)]
+    freedom = [max(independent_samples(x) - 1.0, 1.0) for x in (motion, rest)]
+    f = mean_squares[0] / mean_squares[1]
+    critical = float(fdtri(freedom[0], freedom[1], 1.0 - ALPHA))
+    return {
+        'f': f,
+        'critical': critical,
+        'alpha': ALPHA,
+        'freedom': freedom,
+        'rms_motion': float(np.sqrt(mean_squares[0])),
+        'rms_rest': float(np.sqrt(mean_squares[1])),
+        'static_model_holds': f < critical,
+    }
+
+
+def _pooled_payload(samples: list[_Samples]) -> Json | None:
+    """Return the payload beside the declared one that explains all joints at rest best (kg)."""
+    columns, y = [], []
+    for s in samples:
+        rest = s.rest()
+        if rest.sum() < LEAST or np.sqrt((s.lever[rest] ** 2).mean()) <= LEVER:
+            continue
+        spread = float(np.std(s.difference[rest])) or 1e-6
+        columns.append(s.lever[rest] / spread)
+        y.append(s.difference[rest] / spread)
+    if not columns:
+        return None
+    fit = least_squares(np.concatenate(columns)[:, None], np.concatenate(y))
+    return _interval(fit)

@@ -1,0 +1,280 @@
+"""IMU messages to the gravity vector in `base_link`, and what is wrong with them.
+
+The orientation is used where the message claims it and it is a rotation that says something; else
+the low-passed accelerometer, and unless the message says that it has none, that is a fault.
+Orientation and accelerometer must agree at rest, and the accelerometer must show gravity: while
+they do not, there is no gravity. The same steps are written for one message and for columns; a
+property test holds that both give the same rows.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.alerts.state_machine import WARN, Signal, feed
+from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
+from ugv_acceptance.evaluation.samples import ImuColumns
+from ugv_acceptance.evaluation.settings import ImuInput, Settings
+from ugv_acceptance.model.attitude import (
+    angle_between,
+    up_from_acceleration,
+    up_from_orientation,
+)
+from ugv_acceptance.model.expressions import add, cross, rotate, scale
+from ugv_acceptance.model.robot import Vector
+from ugv_acceptance.model.row_selection import Values
+from ugv_acceptance.type_aliases import Floats, Times
+
+Mask = NDArray[np.bool_]
+
+# A unit quaternion's norm may be this far from 1 (single precision, rounding).
+NORM_SLACK = 0.01
+# Share of g by which the accelerometer may differ from g and still show where up is.
+GRAVITY_SLACK = 0.15
+# A specific force below this share of g is that of a fall, or no specific force.
+FALL = 0.5
+# What came of the orientations of messages.
+ORIENTATIONS = ('used', 'not_given', 'told_nothing')
+
+
+@dataclass(frozen=True, slots=True)
+class ImuRows:
+    """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
+
+    `unusable` (n,) says that gravity cannot be told or that a number cannot be believed.
+    """
+
+    time: Times
+    stamp: Times
+    gravity: Floats
+    unusable: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSignals:
+    """What is watched of the way to gravity: where the IMU sits, what it says, what contradicts."""
+
+    frame: Signal
+    orientation: Signal
+    strange: Signal
+    disagreement: Signal
+
+
+@dataclass(slots=True)
+class ImuTracker:
+    """The smooth acceleration, and the faults of what messages say about the attitude.
+
+    While one of them is active and not just a warning there is no gravity. `taken` counts messages
+    as ORIENTATIONS says; not given is covariance -1.
+    """
+
+    settings: Settings
+    faults: AttitudeSignals
+    low_pass: LowPass = field(init=False)
+    taken: list[int] = field(default_factory=lambda: [0, 0, 0])
+    _frame: str | None = None
+    _foreign: float = 0.0
+    _busy: bool = False
+
+    def __post_init__(self) -> None:
+        self.low_pass = LowPass(self.settings.imu.low_pass)
+
+    def step(
+        self,
+        now: int,
+        stamp: int,
+        orientation: Sequence[float],
+        covariance_0: float,
+        omega: Sequence[float],
+        acceleration: Sequence[float],
+        frame: str = '',
+    ) -> tuple[Vector, bool]:
+        """Take one message; return its gravity and unusable as in ImuRows."""
+        smooth = self.low_pass.step(stamp, acceleration)
+        size = _norm(smooth)
+        imu, g = self.settings.imu, self.settings.robot.gravity
+        if frame != self._frame:
+            self._frame, self._foreign = frame, _foreign(frame, imu.frame)
+        x, y, z, w = orientation
+        spin, off = _norm(omega), abs(size - g)
+        still = spin <= imu.rest_rate
+        rotation = covariance_0 != -1.0 and bool(_is_rotation(x, y, z, w))
+        told = rotation and not (imu.attitude == 'auto' and x == y == z == 0.0)
+        shown = off <= GRAVITY_SLACK * g
+        by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if rotation else NOWHERE
+        by_acceleration = up_from_acceleration(*smooth, imu.mounting) if shown else NOWHERE
+        apart = math.nan
+        if rotation and shown and still and off <= imu.rest_acceleration:
+            apart = angle_between(by_orientation, by_acceleration)
+        self.taken[0 if told else 1 if covariance_0 == -1.0 else 2] += 1
+        empty = 0.0 if told or covariance_0 == -1.0 else _empty(rotation, apart, imu)
+        strange = off / g if still else math.nan
+        believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
+        doubted = apart if told else math.nan
+        of, seen = self.faults, self._busy or self._foreign or empty >= 0.5
+        # Quiet signals have nothing to do with small values: most calls are saved.
+        seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
+        if seen and self._judge(now, empty, strange, doubted):
+            return NOWHERE, True
+        if imu.specific_force:
+            if not believable or size < FALL * g:
+                return NOWHERE, True
+            return _force(smooth, omega, imu), False
+        if not believable and imu.attitude == 'auto':
+            return NOWHERE, True
+        up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
+        return (-g * up[0], -g * up[1], -g * up[2]), not believable or up[0] != up[0]
+
+    def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
+        """Feed the faults with a message; return whether one of them takes gravity away."""
+        of, lost = self.faults, False
+        signals = (of.frame, of.orientation, of.strange, of.disagreement)
+        for signal, value in zip(signals, (self._foreign, empty, strange, apart), strict=True):
+            signal.step(now, value)
+            signal.advance(now)
+            lost = lost or (signal.alert is not None and signal.alert.rule.level > WARN)
+        self._busy = not all(signal.quiet for signal in signals)
+        return lost
+
+    def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
+        """Take many messages: the same rows as `step` one at a time, in order of receipt."""
+        columns = [s for s in segments if len(s.log_time)]
+        if not columns:
+            none = np.empty(0, np.int64)
+            return ImuRows(none, none, np.empty((0, 3)), none != 0)
+        time = np.concatenate([s.log_time for s in columns])
+        order = np.argsort(time, kind='stable') if (np.diff(time) < 0).any() else slice(None)
+        time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
+        q = _lines([s.orientation for s in columns])[:, order]
+        covariance_0 = np.concatenate([s.orientation_covariance_0 for s in columns])[order]
+        omega = _lines([s.angular_velocity for s in columns])[:, order]
+        acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
+        frame = self.settings.imu.frame
+        lengths = [len(s.log_time) for s in columns]
+        foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
+        with np.errstate(all='ignore'):
+            smooth = self.low_pass.columns(stamp, acceleration)
+            return self._rows(time, stamp, (q, covariance_0, omega), smooth, foreign)
+
+    def _rows(
+        self,
+        time: Times,
+        stamp: Times,
+        told_by: tuple[Floats, Floats, Floats],
+        smooth: Floats,
+        foreign: Floats,
+    ) -> ImuRows:
+        """Return the rows of orientation, its covariance and rate, and the smooth acceleration."""
+        imu, g = self.settings.imu, self.settings.robot.gravity
+        q, covariance_0, omega = told_by
+        size, spin = _norms(smooth), _norms(omega)
+        off, still = np.abs(size - g), spin <= imu.rest_rate
+        given = covariance_0 != -1.0
+        rotation = given & _is_rotation(q[0], q[1], q[2], q[3])
+        told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
+        self._count(told, given)
+        by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
+        oriented = np.where(rotation, by_orientation, np.nan)
+        up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
+        leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
+        rest = still & (off <= imu.rest_acceleration)
+        apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
+        believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
+        if imu.specific_force:
+            force = np.array(_force(tuple(smooth), tuple(omega), imu))
+            gravity = np.where(believable & ~(size < FALL * g), force, np.nan)
+        else:
+            use = told & (imu.attitude != 'accelerometer')
+            gravity = -g * np.where(use, oriented, leaning)
+            if imu.attitude == 'auto' and not believable.all():
+                gravity[:, ~believable] = np.nan
+        faults = (foreign, np.zeros(len(time)), np.where(still, off / g, np.nan), apart)
+        if not told.all():
+            faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
+            faults[3][~told] = np.nan
+        self._judge_rows(time, faults, gravity)
+        self._busy = True
+        return ImuRows(time, stamp, gravity.T, ~believable | np.isnan(gravity[0]))
+
+    def _count(self, told: Mask, given: Mask) -> None:
+        used, none = int(told.sum()), len(given) - int(given.sum())
+        self.taken = [
+            a + b for a, b in zip(self.taken, (used, none, len(told) - used - none), strict=True)
+        ]
+
+    def _judge_rows(self, time: Times, faults: Sequence[Floats], gravity: Floats) -> None:
+        """Feed the faults; take gravity away while one is active that is not just a warning."""
+        of = self.faults
+        signals = (of.frame, of.orientation, of.strange, of.disagreement)
+        for signal, values in zip(signals, faults, strict=True):
+            for start, end in feed_spans(signal, time, values):
+                if signal.rule.level > WARN:
+                    gravity[:, (time >= start) & (time < end)] = np.nan
+
+
+def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[float, float]]:
+    """Feed a signal; yield from when until before when (ns) each of its alerts is active."""
+    before, seen = signal.alert, len(signal.log)
+    feed(signal, time, values)
+    for alert in [before, *signal.log[seen:]]:
+        if alert is not None and alert.rule is signal.rule:
+            yield alert.start, math.inf if alert.end is None else alert.end
+
+
+def _foreign(frame: str, expected: str) -> float:
+    """Return 1 where a message names another frame than it should; a prefix of names is none."""
+    named = frame.lstrip('/')
+    same = named in ('', expected) or named.endswith(f'/{expected}')
+    return 0.0 if same or not expected else 1.0
+
+
+def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:
+    return abs(x * x + y * y + z * z + w * w - 1.0) <= 2.0 * NORM_SLACK
+
+
+def _empty(rotation: bool, apart: float, imu: ImuInput) -> float:  # noqa: FBT001 - as of rows
+    """Return 1 where an orientation that is given tells nothing; NaN where that is not known.
+
+    The identity may be true: it tells nothing where the accelerometer at rest denies it.
+    """
+    if imu.attitude == 'accelerometer':
+        return 0.0
+    if not rotation:
+        return 1.0
+    return math.nan if math.isnan(apart) else float(apart >= imu.agreement)
+
+
+def _empty_rows(rotation: Mask, apart: Floats, imu: ImuInput) -> Floats:
+    """Return `_empty` of many."""
+    if imu.attitude == 'accelerometer':
+        return np.zeros(len(apart))
+    denied = np.where(np.isnan(apart), np.nan, apart >= imu.agreement)
+    return np.where(rotation, denied, 1.0)
+
+
+def _norm(v: Sequence[float]) -> float:
+    x, y, z = v
+    return math.sqrt(x * x + y * y + z * z)
+
+
+def _lines(tables: Sequence[Floats]) -> Floats:
+    """Return tables (n, k) one after the other as k contiguous lines."""
+    out = np.empty((tables[0].shape[1], sum(map(len, tables))))
+    return np.concatenate([table.T for table in tables], axis=1, out=out)
+
+
+def _norms(v: Floats) -> Floats:
+    x, y, z = v
+    size: Floats = np.sqrt(x * x + y * y + z * z)
+    return size
+
+
+def _force(smooth: Values, omega: Values, imu: ImuInput) -> Values:
+    """Return minus the specific force at base_link's origin (m/s2, base axes)."""
+    force = rotate(imu.mounting, smooth)
+    spin = rotate(imu.mounting, omega)
+    arm = scale(imu.position, -1.0)
+    return scale(add(force, cross(spin, cross(spin, arm))), -1.0)

@@ -1,0 +1,87 @@
+"""What is carried: a declared payload where it can be believed, and which was declared when."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ugv_acceptance.evaluation.samples import PayloadColumns
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.type_aliases import Floats, Times
+
+# More than any load or reach of a robot arm: the number is not a mass (kg), not a distance (m).
+ABSURD_MASS = 1e5
+ABSURD_DISTANCE = 1e3
+# Before any message.
+BEFORE = -(2**62)
+
+
+def payload_from(robot: Robot, mass: float, com: Sequence[float], frame: str) -> Payload | None:
+    """Return the payload of a message, None where it cannot be used.
+
+    The mass (kg) must be a believable number and not negative, the centre of gravity (m) too, and
+    given in the axes of the robot's payload link (an empty frame is taken for that).
+    """
+    x, y, z = (float(c) for c in com)
+    known = robot.payload_link is not None and frame.lstrip('/') in ('', robot.payload_link)
+    if not known or not 0.0 <= mass <= ABSURD_MASS:
+        return None
+    if not math.hypot(x, y, z) <= ABSURD_DISTANCE:
+        return None
+    return Payload(float(mass), (x, y, z))
+
+
+@dataclass(slots=True)
+class PayloadHistory:
+    """Which payload was in force when: since (ns) and the payload, oldest first."""
+
+    initial: Payload
+    _since: list[int] = field(init=False)
+    _declared: list[Payload] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._since, self._declared = [BEFORE], [self.initial]
+
+    def declare(self, when: int, payload: Payload) -> None:
+        """Take a payload that counts from the first joint state at or after `when` (ns) on."""
+        self._since.append(when)
+        self._declared.append(payload)
+
+    def at(self, times: Times) -> tuple[Floats | float, ...]:
+        """Return mass and centre of gravity (4) in force at `times` (n,): floats if all the same.
+
+        What was in force before the last of `times` is forgotten.
+        """
+        since = np.array(self._since)
+        first, last = (np.searchsorted(since, times[[0, -1]], side='right') - 1).tolist()
+        table = [(p.mass, *p.cog) for p in self._declared[first : last + 1]]
+        del self._since[:last], self._declared[:last]
+        if len(table) == 1:
+            return table[0]
+        place = np.searchsorted(since, times, side='right') - 1
+        return tuple(np.array(table)[place - first].T)
+
+
+@dataclass(slots=True)
+class PayloadLog:
+    """Every declared payload and since when (ns), so that a row's can be found again."""
+
+    settings: Settings
+    since: list[int] = field(default_factory=list)
+    payloads: list[Payload] = field(default_factory=list)
+
+    def take(self, segments: Sequence[PayloadColumns]) -> None:
+        """Take the payload messages of a batch."""
+        messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
+        for when, s, k in sorted(messages, key=lambda message: message[0]):
+            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
+            if payload and payload != self.at(when):
+                self.since.append(when)
+                self.payloads.append(payload)
+
+    def at(self, time: int) -> Payload:
+        """Return the payload in force for a joint state received at `time` (ns)."""
+        k = int(np.searchsorted(np.array(self.since, dtype=np.int64), time, side='right'))
+        return self.payloads[k - 1] if k else self.settings.robot.payload

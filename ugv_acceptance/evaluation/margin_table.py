@@ -1,0 +1,63 @@
+"""Margins of a stretch of a recording: what every sink, a summary, a file or a criterion, takes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.inputs.imu import ImuRows
+from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.type_aliases import Floats, Times
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """The newest message of each input at every row: row numbers `of_joints` and `of_imu` (n,)."""
+
+    joints: JointRows
+    imu: ImuRows
+    of_joints: NDArray[np.intp]
+    of_imu: NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class MarginRows:
+    """Margins of a stretch of a recording, one row a message of either input, in order of receipt.
+
+    `until` (ns) is how long a row holds: to the next message or until an input is stale; `known`
+    says which rows have margins, the others are NaN and their `state` is UNKNOWN. Torques (n, j)
+    in N m (N), angles (n, 4) rad to SIDES. Moments (n, 4) N m, energies (n, 4) J and ZMP distance
+    (n,) m are empty unless the evaluator was asked for them.
+    """
+
+    time: Times
+    stamp: Times
+    until: Times
+    known: NDArray[np.bool_]
+    torque: Floats
+    angle: Floats
+    state: NDArray[np.int8]
+    moment: Floats
+    energy: Floats
+    zmp: Floats
+    pairs: Pairs
+
+    @property
+    def q(self) -> Floats:
+        """Joint positions (n, j), rad or m."""
+        return self.pairs.joints.q[self.pairs.of_joints]
+
+    @property
+    def qd(self) -> Floats:
+        """Joint rates (n, j), NaN where not reported."""
+        return self.pairs.joints.qd[self.pairs.of_joints]
+
+    @property
+    def effort(self) -> Floats:
+        """Measured efforts (n, j), N m or N, NaN where not reported."""
+        return self.pairs.joints.effort[self.pairs.of_joints]
+
+    @property
+    def gravity(self) -> Floats:
+        """Effective gravity (n, 3), m/s2 in `base_link`."""
+        return self.pairs.imu.gravity[self.pairs.of_imu]

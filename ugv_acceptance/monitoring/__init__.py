@@ -1,0 +1,1 @@
+"""A running robot watched: session, alarms, diagnostics and advice, without ROS."""

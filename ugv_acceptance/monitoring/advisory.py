@@ -1,0 +1,154 @@
+"""What to do and what comes next, worked out for the verdict: never on the way of a message.
+
+Advice takes some hundredths of a second, so a thread works it out while messages are taken.
+"""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.effort.plateaus import PayloadEstimate, payload_estimate
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.model.sliding import slide_left
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.faults import what_to_do
+from ugv_acceptance.monitoring.trends import Ahead, Outlook
+
+# How old (ns) computed advice may be.
+FRESH = 250_000_000
+# Times in a row (once a second) that efforts must tell of another load before it is told.
+PERSISTENT = 3
+# Seconds to a limit below which the operator is told at once, and ns before it is told again.
+URGENT, AGAIN = 2.0, 1_000_000_000
+
+
+@dataclass(slots=True)
+class Counsel:
+    """The advice of one session; `advice` is the newest, best first; `on_problem` for the log."""
+
+    evaluator: LiveEvaluator
+    outlook: Outlook
+    on_problem: Callable[[str], None]
+    advice: tuple[Advice, ...] = ()
+    estimate: PayloadEstimate | None = None
+    _made: int = 0
+    _told: int = 0
+    _felt: int = 0
+    _pool: ThreadPoolExecutor = field(
+        default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
+    )
+    _asked: 'Future[tuple[Advice, ...]] | None' = None
+
+    def renew(self, now: int, active: list[Alert]) -> None:
+        """Have the advice worked out anew where it is asked for and old."""
+        margins, evaluator = self.evaluator.margins, self.evaluator
+        if margins is None or not any(alert.rule.code in COMPUTED for alert in active):
+            self.advice = ()
+        elif self._asked is None and now - self._made >= FRESH:
+            case = evaluator.settings, margins.q, margins.gravity, evaluator.payload
+            self._asked, self._made = self._pool.submit(advise, *case), now
+
+    def arrived(self) -> bool:
+        """Take advice that was worked out; return whether it says another thing than before."""
+        if self._asked is None or not self._asked.done():
+            return False
+        asked, self._asked, before = self._asked, None, self.advice
+        error = asked.exception()
+        if error is not None:
+            self.on_problem(f'advice: fault of the monitor: {error!r}')
+        self.advice = () if error is not None else asked.result()
+        return [a.subject for a in self.advice] != [b.subject for b in before]
+
+    def close(self) -> None:
+        """Give no more advice."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def feel(self) -> None:
+        """Look at the efforts; to be called once a second."""
+        margins, evaluator = self.evaluator.margins, self.evaluator
+        found = None
+        if margins is not None:
+            rates, efforts = evaluator.measured
+            found = payload_estimate(
+                evaluator.settings, margins.q, rates, efforts, margins.gravity, evaluator.payload
+            )
+        self.felt(found)
+
+    def felt(self, found: PayloadEstimate | None) -> None:
+        """Take what the efforts tell of the load; None, such as in motion, changes nothing."""
+        if found is None:
+            return
+        self._felt = self._felt + 1 if found.differs else 0
+        if self._felt == 0 or self._felt >= PERSISTENT:
+            self.estimate = found if self._felt else None
+
+    def do(self, alert: Alert) -> str:
+        """Return what to do about an alert: computed for its margin if it is, else in general."""
+        rule = alert.rule
+        if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
+            return self.advice[0].sentence
+        return what_to_do(alert.rule.code)
+
+    def ahead(self, now: int) -> tuple[Ahead, ...]:
+        """Return the margins that are used up soon."""
+        return self.outlook.ahead(now) if self.evaluator.margins is not None else ()
+
+    def urgent(self, now: int) -> bool:
+        """Return whether a margin is used up so soon that it must be said before the next second.
+
+        Does not cost more than a look at a few numbers most of the time.
+        """
+        if now - self._told < AGAIN:
+            return False
+        soon = self.ahead(now)
+        if soon and soon[0].seconds <= URGENT:
+            self._told = now
+            return True
+        return False
+
+    def values(self, now: int) -> dict[str, object]:
+        """Return the numbers of the verdict: time left, near misses, sliding, load."""
+        values: dict[str, object] = {}
+        for ahead in reversed(self.ahead(now)):
+            kind = 'tip' if ahead.subject in SIDES else 'saturation'
+            values |= {f'{kind}_in_s': round(ahead.seconds, 2), f'{kind}_of': ahead.subject}
+        for miss in self.outlook.near_misses():
+            tilt = miss.subject in SIDES
+            left = math.degrees(miss.left) if tilt else miss.left
+            name = 'near_miss_tilt_deg' if tilt else 'near_miss_torque'
+            values |= {name: round(left, 2), f'{name}_of': miss.subject, f'{name}_ns': miss.time}
+        left = self.slide()
+        if math.isfinite(left):
+            values['slide_left_deg'] = round(math.degrees(left), 2)
+        if self.estimate is not None:
+            values['payload_estimate_kg'] = round(max(self.estimate.mass, 0.0), 2)
+        for k, advice in enumerate(self.advice[:3]):
+            values[f'advice_{k + 1}'] = advice.sentence
+        return values
+
+    def slide(self) -> float:
+        """Return the slope (rad) left until the tracks slide; infinite where it is not known."""
+        margins, settings = self.evaluator.margins, self.evaluator.settings
+        if margins is None:
+            return math.inf
+        return float(slide_left(margins.gravity, settings.limits.friction))
+
+    def hints(self, now: int) -> list[str]:
+        """Return what the operator should know beside the alerts, in plain words."""
+        hints = []
+        soon = self.ahead(now)
+        if soon and soon[0].seconds > 0.0:
+            hints.append(_ahead_words(soon[0]))
+        return hints
+
+
+def _ahead_words(ahead: Ahead) -> str:
+    if ahead.subject in SIDES:
+        rate = abs(math.degrees(ahead.rate))
+        what, unit = f'it tips to the {ahead.subject}', 'deg/s'
+    else:
+        what, unit, rate = f'{ahead.subject} saturates', 'N m/s', abs(ahead.rate)
+    return f'shrinking by {rate:.0f} {unit}: {what} in {ahead.seconds:.1f} s'

@@ -1,0 +1,344 @@
+"""What the monitor says: verdict and diagnostics as plain values, ready to be published."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+from ugv_acceptance import __version__
+from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
+from ugv_acceptance.monitoring.faults import suspect_of
+from ugv_acceptance.monitoring.session import Session
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One line of a diagnosis: `level` as in DiagnosticStatus, what is the case, and numbers."""
+
+    level: int
+    name: str
+    message: str
+    values: dict[str, object] = field(default_factory=dict)
+
+
+def worst_joint(margins: Margins, settings: Settings) -> tuple[str, float]:
+    """Return the joint that uses most of its limit, and its share; '' where none has a limit."""
+    joints = zip(settings.robot.joint_names, margins.torque, settings.limits.torque, strict=True)
+    uses = [(name, abs(tau) / limit) for name, tau, limit in joints if math.isfinite(limit)]
+    return max(uses, key=lambda use: use[1], default=('', 0.0))
+
+
+def least_tilt(margins: Margins) -> tuple[str, float]:
+    """Return the side to which least tilt is left, and how much (rad); NaN where none is known."""
+    angles = map(float, margins.stability.angle)
+    known = [(s, a) for s, a in zip(SIDES, angles, strict=True) if not math.isnan(a)]
+    return min(known, key=lambda side: side[1], default=('', math.nan))
+
+
+def what_is_left(margins: Margins, settings: Settings) -> str:
+    """Return the margins in a few words."""
+    side, angle = least_tilt(margins)
+    joint, use = worst_joint(margins, settings)
+    tilt = f'{math.degrees(angle):.1f} deg of tilt left ({side})' if side else 'no tilt margin'
+    return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
+
+
+def verdict_of(session: Session) -> Status:
+    """Return the one line an operator reads: the most severe cause, what is left, what to do."""
+    follower, now = session.follower, session.clock.now()
+    margins, active = session.evaluator.margins, session.active
+    session.counsel.renew(now, active)
+    left = what_is_left(margins, session.settings) if margins else 'margins not known'
+    unseen = sum(alarm.state.unseen for alarm in follower.alarms.table.values())
+    values: dict[str, object] = {
+        'left': left,
+        'alerts_active': len(active),
+        'alerts_unacknowledged': unseen,
+        **_limits(session),
+    }
+    known = session.counsel.values(now)
+    left = '; '.join([left, *session.counsel.hints(now)])
+    if active:
+        return _worst(session, active, left, values | known)
+    if margins is None:
+        text = 'waiting for joint_states and imu: no margins yet'
+        return Status(STALE, '', text, values | known)
+    if follower.waiting:
+        return _over(session, follower.waiting[-1], left, values | known)
+    return Status(OK, '', f'all margins kept: {left}', values | known)
+
+
+def _worst(
+    session: Session, active: Sequence[Alert], left: str, values: dict[str, object]
+) -> Status:
+    """Return the verdict while alerts are active: the most severe one speaks."""
+    follower, counsel = session.follower, session.counsel
+    first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
+    words = relaxed_words(session.settings)
+    if words and first.rule.code != 'LIMITS_RELAXED':  # else it says so itself
+        left = f'{left}; {words}'
+    more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
+    do = counsel.do(first)
+    text = f'{session.faults.sentence(_now(first, session), session.settings)}{more}; {left}; {do}'
+    own = {
+        **_named(first),
+        'do': do,
+        'acknowledged': all(map(follower.acknowledged, active)),
+    }
+    return Status(session.level, '', text, own | values)
+
+
+def _limits(session: Session) -> dict[str, object]:
+    """Return by what limits is judged, and which of them are wider than permitted, and why."""
+    values: dict[str, object] = {'limits_hash': session.limits_hash}
+    found = relaxed(session.settings)
+    if found:
+        names = ', '.join(breach.name for breach in found)
+        values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
+    return values
+
+
+def _now(alert: Alert, session: Session) -> Alert:
+    """Return an alert with the margin of now in place of its worst."""
+    code, subject = alert.rule.code, alert.rule.subject
+    margins, names = session.evaluator.margins, session.settings.robot.joint_names
+    peak = math.nan
+    if margins is not None and code == 'TORQUE_LIMIT' and subject in names:
+        peak = abs(margins.torque[names.index(subject)])
+    elif margins is not None and code == 'TIP_OVER' and subject in SIDES:
+        peak = -float(margins.stability.angle[SIDES.index(subject)])
+    return alert if math.isnan(peak) else replace(alert, peak=peak)
+
+
+def _over(session: Session, alarm: Alarm, left: str, values: dict[str, object]) -> Status:
+    """Return the verdict while a failure that is over waits to be acknowledged or reset."""
+    latched = alarm.state is State.LATCHED
+    text = (
+        f'over now, {"latched until reset" if latched else "not acknowledged"}: '
+        f'{session.faults.sentence(alarm.alert, session.settings)}; {left}'
+    )
+    own = {**_named(alarm.alert), 'do': 'reset' if latched else 'acknowledge'}
+    return Status(max(session.level, WARN), '', text, own | values)
+
+
+def _named(alert: Alert) -> dict[str, object]:
+    rule = alert.rule
+    return {'code': rule.code, 'subject': rule.subject, 'class': suspect_of(rule.code)}
+
+
+def _severity(alert: Alert) -> tuple[int, bool]:
+    """At the same level a robot that tips over comes before a motor that gives way."""
+    return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
+
+
+def alert_status(change: Change, session: Session) -> Status:
+    """Return a change of an alert, ready to be published."""
+    alert, rule = change.alert, change.alert.rule
+    shelved = session.follower.alarms.shelved(key_of(rule))
+    values: dict[str, object] = {
+        'state': change.how,
+        'code': rule.code,
+        'subject': rule.subject,
+        'level': LEVELS[rule.level],
+        'start_ns': alert.start,
+        'end_ns': '' if alert.end is None else alert.end,
+        'peak': float(alert.peak),
+        'do': session.counsel.do(alert),
+        'class': suspect_of(rule.code),
+        'alarm': change.state.value,
+        'offers': ','.join(_offers(change, shelved=shelved)),
+        'shelved': shelved,
+        'time_ns': change.time,
+        'who': change.who,
+        'note': change.note,
+        'limits_hash': session.limits_hash,
+    }
+    level = OK if change.how in {'cleared', 'reset'} else rule.level
+    sentence = session.faults.sentence(alert, session.settings)
+    return Status(level, f'{rule.code} {rule.subject}', f'{change.how}: {sentence}', values)
+
+
+def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
+    """Yield what an operator may do about an alert now."""
+    if change.state.unseen:
+        yield 'acknowledge'
+    if change.state.active and change.alert.rule.level == WARN:
+        yield 'unshelve' if shelved else 'shelve'
+    if change.state is State.LATCHED:
+        yield 'reset'
+
+
+def margin_statuses(
+    settings: Settings, margins: Margins | None, active: Sequence[Alert]
+) -> Iterator[Status]:
+    """Yield the state of every judged joint and of the tip-over margins."""
+    for j, name in enumerate(settings.robot.joint_names):
+        limit = settings.limits.torque[j]
+        if math.isfinite(limit):
+            torque = margins.torque[j] if margins else math.nan
+            level = _level(active, 'TORQUE_LIMIT', name, margins)
+            use = abs(torque) / limit
+            text = f'{use:.0%} of its limit' if margins else 'not known'
+            numbers: dict[str, object] = {
+                'torque': torque,
+                'limit': limit,
+                'margin': limit - abs(torque),
+                'utilisation': use,
+            }
+            yield Status(level, f'Torque {name}', text, numbers)
+    yield _tip_status(margins, active)
+
+
+def _tip_status(margins: Margins | None, active: Sequence[Alert]) -> Status:
+    level = max(_level(active, code, None, margins) for code in ('TIP_OVER', 'NO_SUPPORT'))
+    if margins is None:
+        return Status(level, 'Tip-over', 'not known')
+    stability = margins.stability
+    state = STATES[int(stability.state)]
+    values: dict[str, object] = {'state': state}
+    for side, angle, moment in zip(SIDES, stability.angle, stability.moment, strict=True):
+        values[f'{side}_deg'] = math.degrees(angle)
+        values[f'{side}_moment_nm'] = float(moment)
+    if stability.state >= NO_CONTACT:
+        return Status(level, 'Tip-over', f'no margin: {state}', values)
+    side, angle = least_tilt(margins)
+    values['edge'] = side
+    return Status(level, 'Tip-over', f'{math.degrees(angle):.1f} deg of tilt left ({side})', values)
+
+
+def _level(active: Sequence[Alert], code: str, subject: str | None, margins: Margins | None) -> int:
+    levels = [
+        alert.rule.level
+        for alert in active
+        if alert.rule.code == code and subject in (None, alert.rule.subject)
+    ]
+    return max([*levels, OK if margins else STALE])
+
+
+def unavailable(problem: str) -> Status:
+    """Return the verdict of a monitor that is not active."""
+    text = f'the monitor is not active: {problem}' if problem else 'the monitor is not active'
+    return Status(STALE, '', text, {'do': problem or 'configure and activate it'})
+
+
+class Subscribed(Protocol):
+    """What is told of a subscription."""
+
+    @property
+    def topic_name(self) -> str:
+        """The name of its topic, remaps and namespace applied."""
+
+
+class Publishing(Protocol):
+    """What is told of the publishers of an input."""
+
+    @property
+    def restarted(self) -> Sequence[str]:
+        """Drivers that were started again."""
+
+
+class InputSources(Protocol):
+    """What diagnostics tell of the inputs' subscriptions; nodes/monitor/subscriptions.py has it."""
+
+    @property
+    def publishers(self) -> Mapping[str, Sequence[str]]:
+        """The full names of the nodes that publish each input."""
+
+    @property
+    def subscriptions(self) -> Mapping[str, Subscribed]:
+        """The subscription of each input."""
+
+    @property
+    def voices(self) -> Mapping[str, Publishing]:
+        """Who really publishes each input."""
+
+
+def diagnostics_of(
+    verdict: Status, config: Config | None, session: Session | None, inputs: 'InputSources | None'
+) -> list[Status]:
+    """Return all statuses for /diagnostics; the first is the monitor itself."""
+    statuses = [_monitor(verdict, config, session)]
+    if session is not None:
+        active = session.active
+        statuses += margin_statuses(session.settings, session.evaluator.margins, active)
+        statuses += [_input(name, session, inputs, active) for name in session.counts]
+    return statuses
+
+
+def _monitor(verdict: Status, config: Config | None, session: Session | None) -> Status:
+    values: dict[str, object] = {'version': __version__}
+    if config is not None:
+        values |= {
+            'robot': config.name,
+            'config': config.path,
+            'sha256': config.sha256,
+            'warnings': len(config.warnings),
+        }
+    if session is not None:
+        values |= {
+            'evaluated': session.evaluator.evaluated,
+            'use_sim_time': session.clock.simulated,
+        }
+    return Status(verdict.level, 'Monitor', verdict.message, {**values, **verdict.values})
+
+
+def _input(
+    name: str, session: Session, inputs: 'InputSources | None', active: list[Alert]
+) -> Status:
+    count, now = session.counts[name], session.clock.now()
+    mine = [a for a in active if a.rule.subject == name]
+    nodes = inputs.publishers.get(name, []) if inputs else []
+    age = (now - count.last) / 1e9 if count.taken else float('nan')
+    rate = session.rates.get(name, 0.0)
+    values: dict[str, object] = {
+        'topic': inputs.subscriptions[name].topic_name if inputs else '',
+        'rate_hz': rate,
+        'age_s': age,
+        'messages': count.taken,
+        'malformed': count.malformed,
+        'lost': count.lost,
+        'publishers': len(nodes),
+        'published_by': ', '.join(nodes),
+    }
+    if inputs and inputs.voices[name].restarted:
+        values['restarted'] = ', '.join(inputs.voices[name].restarted)
+    if name == 'imu':
+        of = session.evaluator.orientations
+        values |= {f'orientation_{how}': number for how, number in of.items()}
+    if count.reason:
+        values['last_malformed'] = count.reason
+    level = max([a.rule.level for a in mine], default=OK)
+    if not count.taken and name != 'payload':
+        level = STALE
+    text = '; '.join(session.faults.sentence(a, session.settings) for a in mine)
+    return Status(level, f'Input {name}', text or f'{rate:.1f} Hz', values)
+
+
+class Watcher(Protocol):
+    """What `guarded` needs of a monitor."""
+
+    session: Session | None
+
+    def get_logger(self) -> Any:  # noqa: ANN401 - rclpy's logger
+        """Return its logger."""
+
+
+def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
+    """Return a timer's work that outlives a fault of ours: the watch goes on, and says so."""
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+            text = f'{work.__name__}: fault of the monitor: {error!r}'
+            watcher.get_logger().error(text, throttle_duration_sec=5.0)
+            if watcher.session is not None:
+                watcher.session.fail(work.__name__, error)
+
+    return run

@@ -1,0 +1,224 @@
+"""What lives from activation to deactivation: raw messages in, margins and alerts out. No ROS here.
+
+The three `take_*` are the hot path. Bytes are decoded by the decoder that reads bags, so no message
+object is made; whatever they hold, the worst that happens is that they are counted as malformed.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from operator import attrgetter
+from typing import Any
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.permitted_limits import limits_hash
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.monitoring.advisory import Counsel
+from ugv_acceptance.monitoring.alarm_tracker import Follower
+from ugv_acceptance.monitoring.faults import Faults
+from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.trends import Outlook
+
+# What the evaluator takes of a sample behind its time and stamp.
+JOINT_FIELDS = attrgetter('names', 'position', 'velocity', 'effort')
+IMU_FIELDS = attrgetter(
+    'orientation',
+    'orientation_covariance_0',
+    'angular_velocity',
+    'linear_acceleration',
+    'frame_id',
+)
+INPUTS = ('joint_states', 'imu', 'payload')
+# Measurements, one a second, over which a rate is taken: what comes in bursts is even over them.
+_MEASUREMENTS = 4
+
+
+@dataclass(slots=True)
+class InputCount:
+    """Messages of one input so far: all of them, those not decoded, and when the newest came."""
+
+    taken: int = 0
+    malformed: int = 0
+    lost: int = 0
+    last: int = 0
+    reason: str = ''
+    _before: int = 0
+    _past: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_MEASUREMENTS))
+
+    def rate(self, now: int, known: float | None) -> float | None:
+        """Return the rate (Hz) now (ns), from the one `known` a second before; None: not known.
+
+        It is that between messages: one a second is 1 Hz, also where a second has none or two. What
+        is silent for two periods has 0 Hz, and is measured anew when it comes again.
+        """
+        came, self._before = self.taken - self._before, self.taken
+        if came:
+            self._past.append((self.taken, self.last))
+            (first, since), (taken, until) = self._past[0], self._past[-1]
+            return (taken - first) * 1e9 / (until - since) if until > since else (known or None)
+        if known and (now - self.last) * known > 2e9:
+            self._past.clear()
+            return 0.0
+        return known
+
+
+@dataclass(slots=True)
+class Session:
+    """The evaluation of a running robot.
+
+    `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
+    stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log.
+    """
+
+    settings: Settings
+    on_margins: Callable[[int, Margins], None]
+    on_change: Callable[[], None]
+    on_problem: Callable[[str], None]
+    clock: ReceiptClock = field(default_factory=ReceiptClock)
+    evaluator: LiveEvaluator = field(init=False)
+    faults: Faults = field(init=False)
+    follower: Follower = field(init=False)
+    counts: dict[str, InputCount] = field(init=False)
+    take_joint_state: Callable[[bytes], None] = field(init=False)
+    take_imu: Callable[[bytes], None] = field(init=False)
+    take_payload: Callable[[bytes], None] = field(init=False)
+    outlook: Outlook = field(init=False)
+    counsel: Counsel = field(init=False)
+    rates: dict[str, float] = field(default_factory=dict)
+    limits_hash: str = field(init=False)
+    _known: bool = False
+
+    def __post_init__(self) -> None:
+        self.evaluator = LiveEvaluator(self.settings)
+        self.limits_hash = limits_hash(self.settings)
+        log = self.evaluator.watch.log
+        self.faults, self.follower = Faults(log), Follower(log)
+        self.outlook = Outlook(self.settings)
+        self.counsel = Counsel(self.evaluator, self.outlook, self.on_problem)
+        self.counts = {name: InputCount() for name in INPUTS}
+        self.evaluator.start(self.clock.now())
+        decode, evaluator = joint_state_decoder().one, self.evaluator
+        take = self._evaluating('joint_states', decode, JOINT_FIELDS, evaluator.joint_state)
+        self.take_joint_state = self._guard('joint_states', take)
+        take = self._evaluating('imu', imu_decoder().one, IMU_FIELDS, evaluator.imu)
+        self.take_imu = self._guard('imu', take)
+        self.take_payload = self._guard('payload', self._payload())
+
+    @property
+    def active(self) -> list[Alert]:
+        """The alerts that are active now, of the robot, its inputs and this node."""
+        return [*self.evaluator.watch.active, *self.faults.active]
+
+    @property
+    def level(self) -> int:
+        """The most severe level now."""
+        return max([self.evaluator.level, *(a.rule.level for a in self.faults.active)])
+
+    def tick(self) -> None:
+        """Let time pass: silence, delays and faults that are over."""
+        now = self.clock.now()
+        self.evaluator.tick(now)
+        self.faults.advance(now)
+        self._look()
+
+    def feel(self) -> None:
+        """Look whether the motors feel the declared load; to be called once a second."""
+        self.counsel.feel()
+        now, found = self.clock.now(), self.counsel.estimate
+        if found is None:
+            self.faults.clear(now, 'PAYLOAD_DIFFERS', 'payload')
+        else:
+            more = abs(found.mass - found.declared)
+            self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
+
+    def measure_rates(self) -> None:
+        """Set `rates` (Hz) of the inputs; to be called once a second."""
+        now = self.clock.now()
+        rates = {name: c.rate(now, self.rates.get(name)) for name, c in self.counts.items()}
+        self.rates = {name: rate for name, rate in rates.items() if rate is not None}
+
+    def adopt(self, settings: Settings) -> None:
+        """Judge by other limits and delays from now on; what was learnt and is active stays."""
+        self.settings = self.outlook.settings = settings
+        self.limits_hash = limits_hash(settings)
+        self.evaluator.adopt(settings)
+        self.tick()
+
+    def _look(self) -> None:
+        known = self.evaluator.margins is not None
+        if known is not self._known or self.follower.changed():
+            self._known = known
+            self.on_change()
+
+    def _evaluating(
+        self,
+        name: str,
+        decode: Callable[[bytes], Any],
+        fields: Callable[[Any], tuple[Any, ...]],
+        evaluate: Callable[..., Margins | None],
+    ) -> Callable[[bytes], None]:
+        """Return the way of a message: decoded, and these fields of the sample evaluated."""
+        clock, count, follower = self.clock, self.counts[name], self.follower
+        see = self.outlook.see
+
+        def take(data: bytes) -> None:
+            now = time.monotonic_ns() + clock.offset
+            sample = decode(data)
+            stamp = sample.stamp
+            count.taken += 1
+            count.last = now
+            local = clock.stamp(now, stamp) if clock.simulated else stamp
+            margins = evaluate(now, local, *fields(sample))
+            if margins is not None:
+                see(margins)
+                self.on_margins(stamp, margins)
+            if (margins is not None) is not self._known or follower.changed():
+                self._look()
+
+        return take
+
+    def _payload(self) -> Callable[[bytes], None]:
+        decode, count = payload_decoder().one, self.counts['payload']
+
+        def take(data: bytes) -> None:
+            now = self.clock.now()
+            _, frame, mass, com = decode(data)
+            count.taken += 1
+            count.last = now
+            self.evaluator.carry(now, mass, com, frame)
+            self._look()
+
+        return take
+
+    def _guard(self, name: str, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        """Return `take` such that no content of a message can end the node."""
+
+        def guarded(data: bytes) -> None:
+            try:
+                take(data)
+            except BadSample as error:
+                self._malformed(name, error)
+            except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+                self.fail(name, error)
+
+        return guarded
+
+    def fail(self, where: str, error: Exception) -> None:
+        """Say that our own code failed: the margins are not known then, and never OK."""
+        self.evaluator.margins = None
+        self.faults.set(self.clock.now(), 'MONITOR_FAULT', where, 1.0, repr(error))
+        self.on_problem(f'{where}: fault of the monitor: {error!r}')
+        self._look()
+
+    def _malformed(self, name: str, error: BadSample) -> None:
+        count = self.counts[name]
+        count.malformed += 1
+        count.reason = str(error)
+        now = self.clock.now()
+        self.faults.set(now, 'INPUT_MALFORMED', name, float(count.malformed), count.reason)
+        self.on_problem(f'{name}: malformed message ignored: {error}')
+        self._look()

@@ -1,0 +1,121 @@
+"""What margins were and where they go: the smallest since the start, and the time that is left.
+
+Fed with every sample at the cost of a few comparisons; what it knows is worked out when asked.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ugv_acceptance.evaluation.alerts.prediction import time_to
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.stability import SIDES
+
+# Samples of this spacing and span (ns) give the rates; fewer than so many give none.
+SPACING, SPAN, LEAST = 50_000_000, 1_000_000_000, 8
+# A margin is told to shrink from these rates on (rad/s; share of the limit a second), and its time
+# left up to this long (s).
+TILT_RATE, LOAD_RATE, SOON = math.radians(1.0), 0.03, 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class NearMiss:
+    """The smallest margin of a kind since the start: when (ns), which, and how much.
+
+    `left` is in rad of tilt, or N m (N) of torque.
+    """
+
+    time: int
+    subject: str
+    left: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """A margin that shrinks: `rate` (rad/s; N m/s or N/s), and `seconds` until nothing is left."""
+
+    subject: str
+    rate: float
+    seconds: float
+
+
+@dataclass(slots=True)
+class Outlook:
+    """Takes the margins of a running robot."""
+
+    settings: Settings
+    tilt: list[tuple[float, int]] = field(init=False)
+    load: list[tuple[float, int]] = field(init=False)
+    _recent: deque[Margins] = field(default_factory=lambda: deque(maxlen=SPAN // SPACING + 1))
+    _due: int = 0
+
+    def __post_init__(self) -> None:
+        self.tilt = [(math.inf, 0)] * len(SIDES)
+        self.load = [(math.inf, 0)] * len(self.settings.robot.joint_names)
+
+    def see(self, margins: Margins) -> None:
+        """Take a sample."""
+        for k, angle in enumerate(margins.stability.angle):
+            if angle < self.tilt[k][0]:
+                self.tilt[k] = (float(angle), margins.time)
+        for j, (tau, limit) in enumerate(
+            zip(margins.torque, self.settings.limits.torque, strict=True)
+        ):
+            left = limit - abs(tau)
+            if left < self.load[j][0]:
+                self.load[j] = (left, margins.time)
+        if margins.time >= self._due:
+            self._due = margins.time + SPACING
+            self._recent.append(margins)
+
+    def near_misses(self) -> tuple[NearMiss, ...]:
+        """Return the smallest tilt and the smallest torque margin (as share of its limit)."""
+        names, limits = self.settings.robot.joint_names, self.settings.limits.torque
+        tilts = [(left, at, side) for (left, at), side in zip(self.tilt, SIDES, strict=True)]
+        shares = [
+            (left / limit, at, name, left)
+            for (left, at), name, limit in zip(self.load, names, limits, strict=True)
+            if math.isfinite(left)
+        ]
+        found = []
+        if math.isfinite(min(tilts)[0]):
+            left, at, side = min(tilts)
+            found.append(NearMiss(at, side, left))
+        if shares:
+            _, at, name, left = min(shares)
+            found.append(NearMiss(at, name, left))
+        return tuple(found)
+
+    def ahead(self, now: int) -> tuple[Ahead, ...]:
+        """Return the margins that are used up within SOON at their present rates, soonest first.
+
+        Nothing where the samples of the last second (before `now`, ns) are too few to tell.
+        """
+        recent = [m for m in self._recent if m.time > now - SPAN]
+        if len(recent) < LEAST:
+            return ()
+        time = np.array([m.time - now for m in recent]) / 1e9
+        limits = np.array(self.settings.limits.torque)
+        tilt = np.array([m.stability.angle for m in recent], dtype=np.float64)
+        left = limits - np.abs([m.torque for m in recent])
+        least = (*[TILT_RATE] * len(SIDES), *(LOAD_RATE * limits).tolist())
+        names = (*SIDES, *self.settings.robot.joint_names)
+        found = []
+        for name, values, slowest in zip(names, np.hstack((tilt, left)).T, least, strict=True):
+            value, rate = _line(time, values)
+            if -rate >= slowest:
+                seconds = float(time_to(0.0, -value, -value - rate, 1.0))
+                found.append(Ahead(name, rate, seconds))
+        return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))
+
+
+def _line(time: 'np.ndarray', values: 'np.ndarray') -> tuple[float, float]:
+    """Return value at time 0 and rate of a line through the values; NaN where one is not finite."""
+    if not np.isfinite(values).all():
+        return math.nan, math.nan
+    away = time - time.mean()
+    rate = float(away @ values / (away @ away))
+    return float(values.mean() - rate * time.mean()), rate

@@ -1,0 +1,298 @@
+"""The console's live feed: the monitor's word on the robot, and the inputs it speaks of.
+
+The verdict and the alerts are the monitor's: if it falls silent there are NO DATA. What is drawn is
+computed here from the same inputs by the same code, so that a page costs the monitor nothing. What
+came is taken in bursts, just before it is shown: a thread that wakes for each message would cost
+twice as much, and show it no sooner.
+"""
+
+import gc
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import InertiaStamped
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.config import Config
+from ugv_acceptance.console import latest_messages as hearing
+from ugv_acceptance.console.alert_list import AlertBook, row_of
+from ugv_acceptance.console.hub import number_in
+from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
+from ugv_acceptance.evaluation.inputs.payload import payload_from
+from ugv_acceptance.monitoring.faults import what_to_do
+from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.session import INPUTS, Session
+from ugv_acceptance.nodes.executor import Stop, ros
+from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
+from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
+from ugv_acceptance.nodes.monitor.subscriptions import Inputs, qos_of
+
+MONITOR = 'acceptance_monitor'
+# Seconds without a verdict (it comes each second), and without margins while inputs arrive, after
+# which nothing that was said counts any more.
+VERDICT_SILENCE = 2.5
+MARGIN_SILENCE = 0.5
+# Messages of an input that may wait for the next snapshot.
+_DEPTH = 400
+# Seconds between looks at what the console itself thinks of its inputs. Silence is looked at in
+# each snapshot that nothing new came for.
+_LOOK = 0.5
+
+
+class ConsoleNode(Node):
+    """Listens to a robot and its monitor whenever a snapshot is asked for; has no thread."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__('acceptance_console')
+        self.config, self.settings = config, config.settings
+        self.book = AlertBook()
+        self.verdict: DiagnosticStatus | None = None
+        self.said: dict[str, str] = {}
+        self.heard, self.margins = hearing.Heartbeat(), hearing.Heartbeat()
+        self.session = Session(
+            self.settings,
+            lambda _stamp, _margins: None,
+            self._take_own,
+            self._complain,
+            ReceiptClock(bool(self.get_parameter('use_sim_time').value)),
+        )
+        session = self.session
+        self._heard = {
+            'joint_states': hearing.Newest(session.take_joint_state, hearing.newest_of_joints()),
+            'imu': hearing.Newest(session.take_imu, hearing.newest_attitude(self.settings.imu)),
+        }
+        session.take_joint_state = self._heard['joint_states']
+        session.take_imu = self._heard['imu']
+        self._inputs = Inputs(self, config.topics, session, _DEPTH)
+        self._due = self._look_due = 0.0
+        self._own: dict[str, AlertRow] = {}
+        self._rows: tuple[InputRow, ...] = ()
+        self._load: InertiaStamped | None = None
+        self._load_out: Any = None
+        self._known_since: float | None = None
+        self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
+        self.create_subscription(DiagnosticArray, f'{MONITOR}/alerts', self._on_alerts, 50)
+        self.create_subscription(
+            JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
+        )
+        self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
+        self._executor, self._never = EventsExecutor(), Future()
+        self._executor.add_node(self)
+
+    def describe(self) -> dict[str, Any]:
+        """Return where the numbers come from."""
+        where = self.get_namespace()
+        return {'source': 'live', 'title': 'live' if where == '/' else f'live {where}'}
+
+    def extra(self) -> dict[str, Any]:
+        """Return nothing: a live robot adds nothing to a frame."""
+        return {}
+
+    def snapshot(self) -> Snapshot:
+        """Take what has come since the last time, and return what is known now."""
+        self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
+        silent = not all(newest.waiting for newest in self._heard.values())
+        for name, newest in self._heard.items():
+            # The count is read after what is handed on was counted, never before.
+            left_out = newest.hand_on()
+            self.session.counts[name].taken += left_out
+        now, clock = time.monotonic(), self.session.clock
+        if clock.simulated:
+            clock.follow(clock.now(), self.get_clock().now().nanoseconds)
+        if now >= self._due:
+            self._due = now + 1.0
+            self._every_second()
+        if silent or now >= self._look_due:
+            self._look_due = now + _LOOK
+            self._look_around()
+        return self._look(now)
+
+    def command(self, do: str, values: dict[str, Any]) -> str:
+        """Do about alerts what the monitor offers, or declare a payload; BadSample for else."""
+        if do in DOINGS:
+            self._hand.publish(self._operation(do, values))
+            return f'asked the monitor: {do}'
+        if do == 'payload':
+            return self._declare(values)
+        raise BadSample(f'a live robot cannot do {do!r}')
+
+    def _operation(self, do: str, values: dict[str, Any]) -> DiagnosticStatus:
+        message = DiagnosticStatus(name=do, message=str(values.get('note') or '')[:200])
+        message.hardware_id = str(values.get('by') or 'console')[:40]
+        if values.get('key') is not None:
+            row = self.book.row(values['key'])
+            named = {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]}
+            seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
+            message.values = key_values(named | {'seconds': seconds})
+        return message
+
+    def _declare(self, values: dict[str, Any]) -> str:
+        cog = values.get('cog_m')
+        if not isinstance(cog, list) or len(cog) != 3:
+            raise BadSample(f'cog_m: expected three numbers, got {cog!r}')
+        numbers = dict(zip('xyz', cog, strict=True))
+        mass, com = number_in(values, 'mass_kg'), [number_in(numbers, k) for k in 'xyz']
+        link = self.settings.robot.payload_link or ''
+        if payload_from(self.settings.robot, mass, com, link) is None:
+            raise BadSample(f'expected a mass in kg from 0 on, in reach of {link}, got {mass}')
+        message = InertiaStamped()
+        message.header.frame_id = link
+        message.inertia.m = mass
+        message.inertia.com.x, message.inertia.com.y, message.inertia.com.z = com
+        self._carry(message)
+        return f'declared {mass:g} kg'
+
+    def _carry(self, message: InertiaStamped) -> None:
+        topic = self.config.topics.payload
+        if self._load_out is None:
+            self._load_out = self.create_publisher(
+                InertiaStamped, topic.name, qos_of(topic, topic.depth)
+            )
+        self._load = message
+        self._say_load()
+
+    def _say_load(self) -> None:
+        """Say it each second: who comes later hears it too."""
+        if self._load is not None:
+            self._load.header.stamp = self.get_clock().now().to_msg()
+            self._load_out.publish(self._load)
+
+    def _beat(self, _: bytes) -> None:
+        self.margins.beat(time.monotonic())
+
+    def _on_verdict(self, status: DiagnosticStatus) -> None:
+        self.verdict = status
+        self.heard.beat(time.monotonic())
+        self.said = values = {pair.key: pair.value for pair in status.values}
+        none = values.get('alerts_active') == values.get('alerts_unacknowledged') == '0'
+        if none and 'code' not in values:
+            self.book.clear()
+
+    def _on_alerts(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            self.book.take(values, status.message)
+
+    def _take_own(self) -> None:
+        self.session.follower.take()
+
+    def _complain(self, text: str) -> None:
+        self.get_logger().warning(text, throttle_duration_sec=5.0)
+
+    def _every_second(self) -> None:
+        self._inputs.look_around([])
+        self.session.measure_rates()
+        self._say_load()
+
+    def _look_around(self) -> None:
+        """Let time pass, and see what is active and how the inputs are."""
+        self.session.tick()
+        active = self.session.active
+        say = self.session.faults.sentence
+        rows = [row_of(a, say(a, self.settings), what_to_do(a.rule.code)) for a in active]
+        self._own = {row.key: row for row in rows}
+        self._rows = tuple(self._input(name, active) for name in INPUTS)
+
+    def _problem(self, now: float) -> str:
+        """Return why nothing may be believed; '' where the monitor is heard."""
+        margins = self.session.evaluator.margins
+        if margins is None:
+            self._known_since = None
+        elif self._known_since is None:
+            self._known_since = now
+        if self.verdict is None:
+            return 'no monitor is heard: start `ugv-acceptance monitor`'
+        since = now - (self.heard.last or 0.0)
+        if since > VERDICT_SILENCE:
+            return f'the monitor has been silent for {since:.0f} s'
+        arriving = self._known_since is not None and now - self._known_since > MARGIN_SILENCE
+        if arriving and self.margins.silent(now, MARGIN_SILENCE):
+            return 'the monitor is silent although its inputs arrive'
+        level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
+        silent = level == STALE or margins is None
+        # An alert says better what is missing, and what to do.
+        told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
+        return self.verdict.message if silent and not told else ''
+
+    def _look(self, now: float) -> Snapshot:
+        evaluator, problem = self.session.evaluator, self._problem(now)
+        margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
+        alerts = tuple(map(self._newest, self.book.also(self._own.values())))
+        told = () if problem and self.verdict is None else alerts
+        moment, rows = self.session.clock.now(), self._rows
+        if margins is None or problem or self.verdict is None:
+            q = tuple(joints.q)
+            load = evaluator.payload or NO_LOAD
+            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
+        return Snapshot(
+            moment,
+            self.verdict.level[0],
+            '',
+            known=True,
+            q=margins.q,
+            effort=tuple(joints.effort),
+            gravity=margins.gravity,
+            torque=margins.torque,
+            angle=tuple(float(a) for a in margins.stability.angle),
+            state=int(margins.stability.state),
+            payload=evaluator.payload,
+            alerts=told,
+            inputs=rows,
+            hints=hearing.hints_of(self.said),
+            stamp=margins.stamp,
+        )
+
+    def _newest(self, row: AlertRow) -> AlertRow:
+        """Return an active alert with its worst until now, and the newest advice on it."""
+        if row.end is not None:
+            return row
+        about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
+        advice = self.said.get('do', row.advice) if about else row.advice
+        return replace(row, text=self._own.get(row.key, row).text, advice=advice)
+
+    def _input(self, name: str, active: list[Alert]) -> InputRow:
+        count, now = self.session.counts[name], self.session.clock.now()
+        unknown = float('nan') if count.taken else 0.0
+        mine = [a for a in active if a.rule.subject == name]
+        silent = STALE if not count.taken and name != 'payload' else OK
+        sentences = [self.session.faults.sentence(a, self.settings) for a in mine]
+        optional = NO_PAYLOAD if name == 'payload' and not count.taken else ''
+        return InputRow(
+            name,
+            self._inputs.subscriptions[name].topic_name,
+            max([a.rule.level for a in mine], default=silent),
+            self.session.rates.get(name, unknown),
+            (now - count.last) / 1e9 if count.taken else float('nan'),
+            tuple(self._inputs.publishers.get(name, ())),
+            '; '.join(sentences) or optional,
+        )
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._executor.remove_node(self)
+        self._executor.shutdown()
+        self.destroy_node()
+
+
+@contextmanager
+def live_feed(config: Config, args: list[str] | None = None) -> Iterator[tuple[ConsoleNode, Stop]]:
+    """Run the console's node for as long as it is asked for snapshots; yield also when to stop."""
+    with ros(args) as stop:
+        node = ConsoleNode(config)
+        # What is there now stays: the garbage collector need not look through it between frames.
+        gc.collect()
+        gc.freeze()
+        try:
+            yield node, stop
+        finally:
+            node.close()

@@ -1,0 +1,226 @@
+"""What a doctor says: findings from what was heard of a robot, each with what to do."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from statistics import fmean, median
+
+from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
+from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.settings import ImuInput
+from ugv_acceptance.model.attitude import (
+    angle_between,
+    up_from_acceleration,
+    up_from_orientation,
+)
+from ugv_acceptance.model.robot import Joint, Vector
+from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
+
+OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
+# Clocks may differ this much (s) before it is worth a word.
+CLOCK_SLACK = 1.0
+# The slowest input (Hz) that leaves time to react, and the tilt (rad) a floor may have.
+SLOWEST = 10.0
+LEVEL = math.radians(15)
+# A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
+OUTSIDE = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line: how it is, about what, what was seen, what to do (empty: nothing)."""
+
+    level: str
+    about: str
+    seen: str
+    do: str = ''
+
+
+def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
+    """Yield what is to be said of a set-up."""
+    where = f'{around.distribution}, {around.middleware}, domain {around.domain}'
+    yield Finding(OK, 'ROS', f'{where}, discovery {around.discovery}')
+    yield Finding(OK, 'configuration', f'{config.name} from {config.path}')
+    for warning in config.warnings:
+        yield Finding(WARN, 'configuration', warning, 'see docs/robot_configuration.md')
+    if len(around.monitors) > 1:
+        text = f'{len(around.monitors)} monitors of the same name run'
+        yield Finding(WARN, 'monitor', text, 'stop all but one, or give them namespaces')
+    yield from _topic('joint_states', around.joint_states, around.seconds)
+    if around.joint_states.samples:
+        yield from _joints(around.joint_states.samples, config)
+    yield from _topic('imu', around.imu, around.seconds)
+    if around.imu.samples:
+        yield from _imu(around.imu.samples, config)
+
+
+def _topic(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
+    if not heard.publishers:
+        other = f'topics.{name}.name: {heard.alike[0].lstrip("/")}' if heard.alike else ''
+        do = f'set {other} in the configuration, or remap it' if other else 'start its driver'
+        if not other:
+            do += '; check that ROS_DOMAIN_ID and the network are the same on both sides'
+        yield Finding(FAIL, name, f'nobody publishes {heard.topic}', do)
+        return
+    types = sorted({kind for _, kind, _ in heard.publishers})
+    if types != [heard.type]:
+        text = f'{heard.topic} carries {", ".join(types)}, expected {heard.type}'
+        yield Finding(FAIL, name, text, f'set topics.{name}.name to another topic')
+    for node, _, reason in heard.publishers:
+        if reason:
+            do = f'set topics.{name}.qos to what is offered'
+            yield Finding(FAIL, name, f'QoS of {node} does not match: {reason}', do)
+    if len(heard.publishers) > 1:
+        nodes = ', '.join(sorted(node for node, _, _ in heard.publishers))
+        yield Finding(
+            WARN, name, f'{heard.topic} has several publishers: {nodes}', 'stop all but one'
+        )
+    if heard.malformed:
+        text = f'{len(heard.malformed)} messages cannot be decoded: {heard.malformed[-1]}'
+        yield Finding(FAIL, name, text, 'check the version of the message type at the publisher')
+    yield from _rate(name, heard, seconds)
+
+
+def _rate(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
+    if len(heard.times) < 2:
+        text = f'{len(heard.times)} messages on {heard.topic} in {seconds:g} s'
+        yield Finding(FAIL, name, text, 'check the driver, its QoS and the network')
+        return
+    steps = [b - a for a, b in zip(heard.times, heard.times[1:], strict=False)]
+    rate = 1e9 / max(median(steps), 1)
+    worst = max(steps) / 1e9
+    text = f'{heard.topic}: {rate:.0f} Hz, longest gap {worst * 1e3:.0f} ms'
+    if rate < SLOWEST:
+        yield Finding(WARN, name, text, f'raise the rate to at least {SLOWEST:g} Hz')
+    elif worst > max(3 / rate, 0.1):
+        yield Finding(
+            WARN, name, text, 'such gaps are STALE to the monitor: check load and network'
+        )
+    else:
+        yield Finding(OK, name, text)
+    yield from _clock(name, heard)
+
+
+def _clock(name: str, heard: Heard) -> Iterator[Finding]:
+    if not heard.samples:
+        return
+    pairs = zip(heard.times, heard.samples, strict=False)
+    offset = median((received - sample.stamp) / 1e9 for received, sample in pairs)
+    about = f'{name} clock'
+    if abs(offset) <= CLOCK_SLACK:
+        yield Finding(OK, about, f'stamps are {offset * 1e3:.1f} ms before receipt')
+    elif not any(sample.stamp for sample in heard.samples):
+        yield Finding(WARN, about, 'stamps are all zero', 'let the driver fill header.stamp')
+    else:
+        do = 'synchronise the clocks; for a simulation set use_sim_time; play a recording restamped'
+        yield Finding(WARN, about, f'stamps are {offset:.1f} s before receipt', do)
+
+
+def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Finding]:
+    settings = config.settings
+    names = {name for sample in samples for name in sample.names}
+    wanted = {
+        joint.topic_name: (name, joint)
+        for name, joint in zip(settings.robot.joint_names, settings.joints, strict=True)
+    }
+    missing = sorted(set(wanted) - names)
+    if missing:
+        do = (
+            f'set joints.<joint>.topic_name; the topic has {", ".join(sorted(names)) or "no names"}'
+        )
+        yield Finding(FAIL, 'joint names', f'not on the topic: {", ".join(missing)}', do)
+    else:
+        text = f'all {len(wanted)} of the robot, {len(names) - len(wanted)} others'
+        yield Finding(OK, 'joint names', text)
+    newest: dict[str, float] = {}
+    for sample in samples:
+        if len(sample.position) == len(sample.names):
+            newest |= dict(zip(sample.names, sample.position, strict=True))
+    for topic_name, (name, how) in wanted.items():
+        if topic_name not in newest:
+            continue
+        told, joint = newest[topic_name], settings.robot.joint(name)
+        q = how.sign * told + how.offset
+        if not _within(joint, q):
+            text = f'at {q:.3f}, limits {joint.lower:.3f} to {joint.upper:.3f}'
+            do = f'check joints.{name}.sign and offset'
+            # An endless joint has no limits: at any angle it says nothing of the unit.
+            in_degrees = how.sign * math.radians(told) + how.offset
+            if joint.kind != 'prismatic' and _within(joint, in_degrees):
+                do += '; are degrees sent in place of radians?'
+            yield Finding(FAIL, name, text, do)
+
+
+def _within(joint: Joint, q: float) -> bool:
+    return joint.lower - OUTSIDE <= q <= joint.upper + OUTSIDE
+
+
+def _imu(samples: Sequence[ImuSample], config: Config) -> Iterator[Finding]:
+    imu, g = config.settings.imu, config.settings.robot.gravity
+    spin = median(math.hypot(*sample.angular_velocity) for sample in samples)
+    if not spin <= imu.rest_rate:
+        text = (
+            'angular velocity is NaN'
+            if math.isnan(spin)
+            else f'the robot turns at {spin:.2f} rad/s'
+        )
+        yield Finding(WARN, 'imu', f'{text}: gravity cannot be judged', 'let it stand still')
+        return
+    ax, ay, az = (fmean(sample.linear_acceleration[k] for sample in samples) for k in range(3))
+    size = math.sqrt(ax * ax + ay * ay + az * az)
+    yield _gravity(size, g)
+    up: Vector = up_from_acceleration(ax, ay, az, imu.mounting)
+    if size > g / 2:
+        yield _mounting(up)
+    yield from _orientation(samples, imu, up, known=abs(size - g) <= 0.15 * g)
+    expected, frames = config.topics.imu.frame_id, {sample.frame_id for sample in samples}
+    if expected is not None and frames != {expected}:
+        text = f'frame_id is {", ".join(sorted(frames)) or "empty"}, expected {expected}'
+        yield Finding(WARN, 'imu frame', text, 'check that this is the IMU whose mounting is given')
+
+
+def _gravity(size: float, g: float) -> Finding:
+    about, seen = 'imu gravity', f'at rest the acceleration is {size:.2f} m/s2'
+    if abs(size - g) <= 0.05 * g:
+        return Finding(OK, about, seen)
+    if abs(size - 1.0) <= 0.15:
+        return Finding(FAIL, about, seen, 'it is in g: let the driver send m/s2 (REP-145)')
+    if size <= 0.15 * g:
+        return Finding(
+            FAIL, about, seen, 'gravity is removed: let the driver send raw acceleration'
+        )
+    return Finding(FAIL, about, seen, f'expected {g:.2f}: calibrate it, or check its unit')
+
+
+def _mounting(up: Vector) -> Finding:
+    tilt = math.acos(max(-1.0, min(1.0, up[2])))
+    about, seen = 'imu mounting', f'the robot leans {math.degrees(tilt):.1f} deg by acceleration'
+    if tilt <= LEVEL:
+        return Finding(OK, about, seen)
+    if tilt >= math.pi - LEVEL:
+        do = 'upside down, or the sign is wrong (+g up at rest, REP-145): set imu.mounting_rpy_deg'
+        return Finding(FAIL, about, seen, do)
+    return Finding(WARN, about, seen, 'if it stands level, set imu.mounting_rpy_deg')
+
+
+def _orientation(
+    samples: Sequence[ImuSample], imu: ImuInput, up: Vector, *, known: bool
+) -> Iterator[Finding]:
+    about, last = 'imu orientation', samples[-1]
+    x, y, z, w = last.orientation
+    size = math.sqrt(x * x + y * y + z * z + w * w)
+    do = 'set imu.attitude: accelerometer, or let the driver send an orientation'
+    if last.orientation_covariance_0 == -1.0:
+        yield Finding(WARN, about, 'not given (covariance -1): the accelerometer is used', do)
+    elif not abs(size - 1.0) <= 0.01:
+        yield Finding(FAIL, about, f'the quaternion has norm {size:.3g}, expected 1', do)
+    elif x == y == z == 0.0:
+        yield Finding(WARN, about, 'always the identity: taken for not given', do)
+    elif known:
+        angle = angle_between(up_from_orientation(x, y, z, w, imu.mounting), up)
+        seen = f'{math.degrees(angle):.1f} deg from the acceleration'
+        if angle <= imu.agreement:
+            yield Finding(OK, about, seen)
+        else:
+            do = 'check imu.mounting_rpy_deg and the axes of the driver (REP-103: z up)'
+            yield Finding(FAIL, about, seen, do)

@@ -1,0 +1,157 @@
+"""What can be heard of a robot in a few seconds: who publishes what, and samples of it."""
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
+from rclpy.utilities import get_rmw_implementation_identifier
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointStateSample
+from ugv_acceptance.config import Topic, Topics
+from ugv_acceptance.nodes.bag_player import message_type
+from ugv_acceptance.nodes.executor import RANGE, ros, spin
+from ugv_acceptance.nodes.monitor.publishers import MARGIN_TOPICS
+from ugv_acceptance.nodes.monitor.subscriptions import qos_of
+
+# Samples of an input that are kept.
+KEPT = 5000
+# Seconds until all publishers should be known; then the listening begins.
+DISCOVERY = 4.0
+# What a monitor calls its margins, whatever it is called itself.
+_MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
+
+
+@dataclass(slots=True)
+class Heard:
+    """What came on one input: receipt times and samples; publishers as (node, type, why no match).
+
+    `alike` are the other topics that carry messages of the input's type, but for what a monitor
+    publishes itself.
+    """
+
+    topic: str
+    type: str
+    publishers: list[tuple[str, str, str]] = field(default_factory=list)
+    alike: list[str] = field(default_factory=list)
+    times: list[int] = field(default_factory=list)
+    samples: list[Any] = field(default_factory=list)
+    malformed: list[str] = field(default_factory=list)
+
+    def take(self, decode: Callable[[bytes], JointStateSample | ImuSample], data: bytes) -> None:
+        """Take a message."""
+        try:
+            sample = decode(data)
+        except BadSample as error:
+            self.malformed.append(str(error))
+        else:
+            if len(self.samples) < KEPT:
+                self.samples.append(sample)
+        if len(self.times) < KEPT:
+            self.times.append(time.time_ns())
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """The ROS environment, and what was heard on the two inputs in `seconds`."""
+
+    distribution: str
+    middleware: str
+    domain: str
+    discovery: str
+    monitors: list[str]
+    seconds: float
+    joint_states: Heard
+    imu: Heard
+
+
+def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
+    """Listen to a robot for `seconds`."""
+    discovery = os.environ.get(RANGE, 'SUBNET')
+    with ros(args) as stop:
+        node = Node('doctor')
+        joints = _subscribe(node, topics.joint_states, Decoder(JOINT_STATE))
+        imu = _subscribe(node, topics.imu, Decoder(IMU))
+        began = time.monotonic()
+
+        def found_all() -> bool:
+            all_there = all(node.count_publishers(heard.topic) for heard in (joints, imu))
+            return all_there or time.monotonic() > began + DISCOVERY
+
+        spin(node, stop, found_all)
+        end = time.monotonic() + seconds
+        spin(node, stop, lambda: time.monotonic() >= end)
+        stop.leave()
+        for heard, topic in ((joints, topics.joint_states), (imu, topics.imu)):
+            _look(node, heard, topic)
+        found = Surroundings(
+            _distribution(),
+            get_rmw_implementation_identifier(),
+            os.environ.get('ROS_DOMAIN_ID', '0'),
+            discovery,
+            [name for name in node.get_node_names() if name == 'acceptance_monitor'],
+            seconds,
+            joints,
+            imu,
+        )
+        node.destroy_node()
+        return found
+
+
+def _distribution() -> str:
+    """Return the sourced ROS, or the wheels in its place."""
+    if sourced := os.environ.get('ROS_DISTRO'):
+        return sourced
+    try:
+        return f'jazzy wheels, rclpy {version("ros-jazzy-rclpy")}'
+    except PackageNotFoundError:
+        return 'ROS_DISTRO not set'
+
+
+def _subscribe(node: Node, topic: Topic, decoder: Decoder[Any]) -> Heard:
+    heard = Heard(node.resolve_topic_name(topic.name), topic.type)
+
+    def take(data: Any) -> None:  # noqa: ANN401 - bytes, for it is raw
+        heard.take(decoder.one, data)
+
+    # Best effort, volatile: hears every publisher, whatever the configuration says.
+    anything = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+    node.create_subscription(
+        message_type(topic.type),
+        topic.name,
+        take,
+        anything,
+        raw=True,
+    )
+    return heard
+
+
+def _look(node: Node, heard: Heard, topic: Topic) -> None:
+    wanted = qos_of(topic, 1)
+    for info in node.get_publishers_info_by_topic(heard.topic):
+        level, reason = qos_check_compatible(info.qos_profile, wanted)
+        name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        bad = level == QoSCompatibility.ERROR
+        heard.publishers.append((name, info.topic_type, reason if bad else ''))
+    heard.alike = [
+        name
+        for name, types in node.get_topic_names_and_types()
+        if topic.type in types
+        and name != heard.topic
+        and node.count_publishers(name)
+        and not _told_by_a_monitor(node, name)
+    ]
+
+
+def _told_by_a_monitor(node: Node, topic: str) -> bool:
+    """Return whether a topic is what a monitor makes of its inputs, live or played again."""
+    if topic.rpartition('/')[2] in _MARGINS:
+        return True
+    infos = node.get_publishers_info_by_topic(topic)
+    names = {f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in infos}
+    return bool(names) and all(node.count_publishers(f'{name}/verdict') for name in names)

@@ -1,0 +1,142 @@
+"""Run a node until it is interrupted: a bounded loop on the events executor, a clean end.
+
+EventsExecutor hears a signal only when a callback runs, so a timer has one run twice a second. Each
+call of it leaks some bytes: it is called once an hour.
+"""
+
+import gc
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, MutableMapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import get_rmw_implementation_identifier, ok, try_shutdown
+
+from ugv_acceptance import AcceptanceError
+
+BAD_INPUT = 2
+# Seconds after which a signal is heard at the latest.
+PATIENCE = 0.5
+# Seconds that the executor is given; without a limit it never ends.
+LONG = 3600.0
+# Seconds after which a thread gives the interpreter to one that waits.
+TURN = 0.0002
+# Fast DDS takes its transports from this, or from a file of profiles under its new or old name.
+TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS'
+PROFILES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+# A second of a fast robot's messages finds room, if net.core.rmem_max allows it.
+UDP = 'UDPv4?sockets_size=4MB&non_blocking=true'
+LOOPBACK = str(Path(__file__).with_name('loopback.xml'))
+
+
+@dataclass(slots=True)
+class Stop:
+    """Whether the process was asked to end, and by which signal."""
+
+    asked: bool = False
+    signal: int = 0
+
+    def leave(self) -> None:
+        """End the process where it was asked to, without a result: cli/termination.py."""
+        if self.asked:
+            raise SystemExit(128 + self.signal)
+
+
+def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
+    """Build a node, bring it up, spin it until SIGINT or SIGTERM; return the exit code."""
+    try:
+        with ros(args) as stop:
+            node = make()
+            try:
+                node.bring_up()
+                spin(node, stop)
+            finally:
+                end(node)
+    except AcceptanceError as error:
+        sys.stderr.write(f'ugv-acceptance: {error}\n')
+        return BAD_INPUT
+    return 0
+
+
+@contextmanager
+def ros(args: list[str] | None = None) -> Iterator[Stop]:
+    """Initialise rclpy with signals that only set `asked`, and shut it down, come what may.
+
+    `args` are those behind a program's name: ROS arguments such as remaps among them.
+    """
+    if not {'HOME', 'ROS_HOME', 'ROS_LOG_DIR'} & set(os.environ):
+        os.environ['ROS_LOG_DIR'] = str(Path(tempfile.gettempdir(), 'ros_log'))
+    choose_transport(os.environ)
+    stop = Stop()
+
+    def ask(number: int, _: object) -> None:
+        stop.asked, stop.signal = True, number
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield stop
+    finally:
+        try_shutdown()
+        # Once asked to end, a second Ctrl-C must not break off what is left of it.
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if stop.asked else handler)
+
+
+def choose_transport(environment: MutableMapping[str, str]) -> None:
+    """Leave Fast DDS's shared memory out, unless somebody chose: docs/decisions/0010-transport.md.
+
+    Its queues are locked between processes: one that stops or dies holds up whoever publishes.
+    """
+    chosen = {environment[name] for name in (TRANSPORT, *PROFILES) if name in environment}
+    fast_dds = get_rmw_implementation_identifier().startswith('rmw_fastrtps')
+    if chosen - {UDP, LOOPBACK} or not fast_dds:
+        return
+    if environment.get(RANGE) == 'LOCALHOST' and not environment.get('ROS_STATIC_PEERS'):
+        # This range brings shared memory of its own, whatever the transports are.
+        environment.update(dict.fromkeys(PROFILES, LOOPBACK), **{RANGE: 'SUBNET'})
+    elif not chosen:
+        environment[TRANSPORT] = UDP
+
+
+def end(node: Node) -> None:
+    """Take a node down."""
+    node.destroy_node()
+
+
+def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
+    """Spin until the process is asked to stop, or `until` says so (asked twice a second)."""
+    executor, over = EventsExecutor(), Future()
+
+    def look() -> None:
+        if stop.asked or not ok() or until():
+            over.set_result(None)
+
+    # Steady: a frozen /clock must not keep the process from ending.
+    timer = node.create_timer(PATIENCE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    executor.add_node(node)
+    # What is there now stays: the garbage collector need not look through it between messages.
+    gc.collect()
+    gc.freeze()
+    # A message must not wait the usual 5 ms for a thread that works out advice.
+    sys.setswitchinterval(TURN)
+    try:
+        while not over.done():
+            executor.spin_until_future_complete(over, timeout_sec=LONG)
+    finally:
+        executor.remove_node(node)
+        executor.shutdown()
+        node.destroy_timer(timer)

@@ -1,0 +1,1 @@
+"""`acceptance_monitor`, the lifecycle node that watches a robot."""

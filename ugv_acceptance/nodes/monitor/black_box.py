@@ -1,0 +1,175 @@
+"""The black box: the seconds before and after each critical alert, saved as a small recording.
+
+Messages are kept as they came, in memory. On a critical alert what is kept goes to the file at
+once, what follows is written as it comes: a process that is killed later loses half a second.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+
+from ugv_acceptance import AcceptanceError
+from ugv_acceptance.bag.writer import BagWriter, Qos
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
+
+# Nanoseconds kept before a critical alert, and recorded after it.
+BEFORE, AFTER = 30_000_000_000, 10_000_000_000
+# Recordings a session makes at most: an alert that comes and goes must not fill the disk.
+MOST = 100
+# Messages kept at most, however fast they come.
+KEPT = 200_000
+
+# Seconds after which what was written is handed to the system, and to wait for a thread's end.
+FLUSH, PATIENCE = 0.25, 10.0
+
+Take = Callable[[bytes], None]
+# Time of receipt (ns), channel, content.
+Kept = tuple[int, str, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic that is recorded. `lasting`: its newest message counts until the next comes."""
+
+    topic: str
+    type: str
+    reliability: str = 'best_effort'
+    lasting: bool = False
+
+
+def is_critical(alert: Alert) -> bool:
+    """Return whether an alert is a failure of the robot: what a recording is made for."""
+    return alert.rule.level == ERROR and alert.rule.code in FAILURES
+
+
+@dataclass(slots=True)
+class BlackBox:
+    """Keeps what comes in, and writes recordings into `folder` (None: it does nothing).
+
+    Times in ns of receipt, `offset` what is added to the steady clock for them. `on_problem` hears
+    why a recording could not be made; the box then goes on keeping. `saved` are the recordings
+    whose past is in the file. Writing is done by a thread, so that no message has to wait.
+    """
+
+    folder: Path | None
+    channels: dict[str, Channel]
+    offset: int
+    on_problem: Callable[[str], None] = lambda _text: None
+    most: int = MOST
+    saved: list[Path] = field(default_factory=list)
+    _kept: deque[Kept] = field(default_factory=lambda: deque(maxlen=KEPT))
+    _lasting: dict[str, bytes] = field(default_factory=dict)
+    _queue: 'SimpleQueue[Kept | None] | None' = None
+    _until: int = 0
+    _threads: list[Thread] = field(default_factory=list)
+    _problems: 'SimpleQueue[str]' = field(default_factory=SimpleQueue)
+
+    def tap(self, name: str, take: Take) -> Take:
+        """Return `take` such that every message of a channel is kept before it is taken."""
+        if self.folder is None:
+            return take
+        keep, offset, clock = self.keep, self.offset, time.monotonic_ns
+
+        def tapped(data: bytes) -> None:
+            keep(clock() + offset, name, data)
+            take(data)
+
+        return tapped
+
+    def keep(self, now: int, name: str, data: bytes) -> None:
+        """Take a message, serialised."""
+        kept = self._kept
+        while kept and kept[0][0] < now - BEFORE:
+            _, old, content = kept.popleft()
+            if self.channels[old].lasting:
+                self._lasting[old] = content
+        kept.append((now, name, data))
+        if self._queue is not None and now <= self._until:
+            self._queue.put((now, name, data))
+
+    def alerts(self, now: int, raised: Sequence[Alert], summary: bytes) -> None:
+        """Take a message of the channel `alerts`, and the alerts that were raised in it.
+
+        A critical one starts a recording, or prolongs it. Who acknowledged what is kept as well.
+        """
+        if self.folder is None:
+            return
+        critical = [alert for alert in raised if is_critical(alert)]
+        if critical:
+            self._until = now + AFTER
+        self.keep(now, 'alerts', summary)
+        if critical and self._queue is None and len(self._threads) < self.most:
+            self._begin(self.folder, now, critical[0])
+
+    def advance(self, now: int) -> None:
+        """Let time pass: end a recording that is long enough, tell what went wrong."""
+        if self._queue is not None and now > self._until:
+            self._queue.put(None)
+            self._queue = None
+        while not self._problems.empty():
+            self.on_problem(f'black box: {self._problems.get()}')
+
+    def close(self) -> None:
+        """End the recording that is being made, and wait until all are in their files."""
+        self.advance(self._until + 1)
+        for thread in self._threads:
+            thread.join(PATIENCE)
+        self.advance(self._until + 1)
+
+    def _begin(self, folder: Path, now: int, alert: Alert) -> None:
+        when = datetime.fromtimestamp(now // 1_000_000_000, timezone.utc)
+        stem = f'{when:%Y%m%dT%H%M%SZ}_{alert.rule.code}_{alert.rule.subject}'.lower()
+        path = _unused(folder / ''.join(c if c.isalnum() else '_' for c in stem))
+        past = [message for message in self._kept if message[0] >= now - BEFORE]
+        first = past[0][0] if past else now
+        lasting = [(first, name, data) for name, data in self._lasting.items()]
+        self._queue = SimpleQueue()
+        work = (path, [*lasting, *past], self._queue)
+        thread = Thread(target=self._record, args=work, name='black_box', daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _record(self, path: Path, past: list[Kept], queue: 'SimpleQueue[Kept | None]') -> None:
+        """Write a recording; a full disk must not end the watch."""
+        try:
+            # Not compressed: that would keep the processor from the messages that come now.
+            with BagWriter(path, compression='') as writer:
+                for channel in self.channels.values():
+                    qos = Qos('reliable' if channel.reliability == 'reliable' else 'best_effort')
+                    writer.add_topic(channel.topic, channel.type, qos)
+                for when, name, data in past:
+                    writer.write(self.channels[name].topic, when, data)
+                writer.flush()
+                self.saved.append(path)
+                self._follow(writer, queue)
+        except (OSError, AcceptanceError) as error:
+            self._problems.put(str(error))
+
+    def _follow(self, writer: BagWriter, queue: 'SimpleQueue[Kept | None]') -> None:
+        """Write what comes until the end is said, and hand it on twice a second or more."""
+        flushed = time.monotonic()
+        while True:
+            with suppress(Empty):
+                message = queue.get(timeout=FLUSH)
+                if message is None:
+                    return
+                writer.write(self.channels[message[1]].topic, message[0], message[2])
+            if time.monotonic() - flushed > FLUSH:
+                writer.flush()
+                flushed = time.monotonic()
+
+
+def _unused(path: Path) -> Path:
+    """Return a path that does not exist: the one given, or with a number behind it."""
+    number, found = 1, path
+    while found.exists():
+        number += 1
+        found = path.with_name(f'{path.name}_{number}')
+    return found

@@ -1,0 +1,331 @@
+"""`acceptance_monitor`: the lifecycle node that watches a robot's margins. docs/ros_interface.md.
+
+It advises; it is not a safety function. It brings itself up unless `autostart` is false. Inputs are
+subscribed as raw bytes on activation, so an inactive monitor costs nothing.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from rclpy.timer import Timer
+from std_srvs.srv import Trigger
+
+from ugv_acceptance import AcceptanceError, BadConfig, BadSample
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.evaluation.alerts.alarms import Change
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.monitoring.diagnostics import (
+    Status,
+    alert_status,
+    diagnostics_of,
+    guarded,
+    unavailable,
+    verdict_of,
+)
+from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.executor import run
+from ugv_acceptance.nodes.monitor.black_box import BlackBox
+from ugv_acceptance.nodes.monitor.operator_commands import (
+    all_reset,
+    black_box_of,
+    by_service,
+    operate,
+)
+from ugv_acceptance.nodes.monitor.parameters import (
+    FREE,
+    Knob,
+    changed,
+    check_at_rest,
+    check_locked,
+    declare_all,
+    knobs_of,
+    unknown,
+)
+from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
+from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+
+NAME = 'acceptance_monitor'
+INACTIVE = 'the monitor is not active'
+# Takes (alert or verdict, what is said).
+Listener = Callable[[str, Status], None]
+
+
+class Monitor(LifecycleNode):
+    """The monitor. `listener` hears all verdicts and changes of alerts, for a console."""
+
+    def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
+        super().__init__(NAME, **node)
+        self.listener = listener
+        self.config: Config | None = None
+        self.session: Session | None = None
+        self.problem = ''
+        self._settings: Settings | None = None
+        self.knobs: tuple[Knob, ...] = ()
+        self._inputs: Inputs | None = None
+        self._margins: MarginOutput | None = None
+        self._tick: Timer | None = None
+        self._box: BlackBox | None = None
+        declare_all(self)
+        self.output = StatusOutput(self)
+        self.markers = MarkerOutput(self, lambda: self.session)
+        self.add_on_set_parameters_callback(self._judge_parameters)
+        self.add_post_set_parameters_callback(self._take_parameters)
+        # Steady: a frozen /clock must not silence the diagnostics.
+        self.steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0, guarded(self, self._every_second), clock=self.steady)
+        self.create_service(Trigger, '~/acknowledge', self._acknowledge)
+        self.create_service(Trigger, '~/reset', self._reset)
+        self.create_subscription(DiagnosticStatus, '~/operator', self._on_operator, 10)
+        self.say()
+
+    # Lifecycle
+
+    def bring_up(self) -> None:
+        """Configure and activate if `autostart`; BadConfig says why that was not possible."""
+        if not self._value('autostart'):
+            return
+        success = TransitionCallbackReturn.SUCCESS
+        if self.trigger_configure() != success or self.trigger_activate() != success:
+            raise BadConfig(self.problem)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Read the robot's files, declare its parameters, make the margin topics."""
+        return self._transition(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start a new evaluation and subscribe the inputs."""
+        return self._transition(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening; the verdict is STALE from now on."""
+        return self._transition(self._deactivate)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the robot."""
+        return self._transition(self._clean_up)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening for good."""
+        return self._transition(self._deactivate)
+
+    def _transition(self, step: Callable[[], None]) -> TransitionCallbackReturn:
+        # rclpy swallows what a transition raises, so it is said here.
+        self.problem = ''
+        try:
+            step()
+        except Exception as error:  # noqa: BLE001 - whatever it is, the node lives on and says it
+            self.problem = str(error) if isinstance(error, AcceptanceError) else repr(error)
+            self.get_logger().error(self.problem)
+        self.say()
+        success, failure = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+        return failure if self.problem else success
+
+    def _configure(self) -> None:
+        urdf = self._value('urdf')
+        self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
+        defaults = self.config.settings
+        knobs = knobs_of(defaults)
+        for knob in knobs:
+            if not self.has_parameter(knob.name):
+                self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
+        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        for warning in [*self.config.warnings, *unknown(given, knobs)]:
+            self.get_logger().warning(warning)
+        values = {knob.name: self._value(knob.name) for knob in knobs}
+        self._settings, self.knobs = changed(defaults, knobs, values), knobs
+        self.output.hardware_id = self.config.serial or self.config.name
+        self._margins = MarginOutput(self, self._settings)
+
+    def _activate(self) -> None:
+        if self._settings is None or self.config is None:
+            raise BadConfig('expected a configured monitor')
+        self.session = self._new_session(self._settings)
+        self._box = black_box_of(self, self.config.topics, self.session)
+        self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
+        self._take_rates()
+        tick = self._settings.delays.tick
+        self._tick = self.create_timer(tick, guarded(self, self._on_tick), clock=self.steady)
+
+    def _new_session(self, settings: Settings) -> Session:
+        return Session(
+            settings,
+            self._margins.publish if self._margins else lambda _stamp, _margins: None,
+            self._on_change,
+            lambda text: self.get_logger().warning(text, throttle_duration_sec=5.0),
+            ReceiptClock(bool(self._value('use_sim_time'))),
+        )
+
+    def _deactivate(self) -> None:
+        if self.session is not None:
+            self._tell(all_reset(self.session))
+            self.session.counsel.close()
+        if self._box is not None:
+            self._box.close()
+        if self._inputs is not None:
+            self._inputs.destroy()
+        if self._tick is not None:
+            self.destroy_timer(self._tick)
+        self._inputs = self._tick = self.session = self._box = None
+
+    def _clean_up(self) -> None:
+        for knob in self.knobs:
+            self.undeclare_parameter(knob.name)
+        if self._margins is not None:
+            self._margins.destroy()
+        self.knobs, self._margins, self.config, self._settings = (), None, None, None
+
+    # Time
+
+    def _on_tick(self) -> None:
+        if (session := self.session) is None:
+            return
+        if session.clock.simulated:
+            session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
+        session.tick()
+        self._tell_load()
+        self._tell(session.follower.alarms.advance(now := session.clock.now()))
+        if self._box is not None:
+            self._box.advance(now)
+        session.counsel.renew(now, session.active)
+        if session.counsel.arrived() or session.counsel.urgent(now):
+            self.say()
+
+    def _every_second(self) -> None:
+        if self.session is not None and self._inputs is not None:
+            self._inputs.look_around(self._value('allowed_publishers'))
+            self.session.measure_rates()
+            self.session.feel()
+            self.session.tick()
+        if self._margins is not None:
+            self._margins.look_for_listeners()
+        self.say()
+
+    # What is said
+
+    def verdict(self) -> Status:
+        """Return the verdict now: STALE in every state but active."""
+        return unavailable(self.problem) if self.session is None else verdict_of(self.session)
+
+    def say(self) -> None:
+        """Publish the verdict and the diagnostics."""
+        status = self.verdict()
+        self.output.verdict(status)
+        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.listener('verdict', status)
+
+    def _on_change(self) -> None:
+        if self.session is not None:
+            self._tell(self.session.follower.take())
+            self.say()
+
+    def _tell(self, changes: list[Change]) -> None:
+        """Publish changes of alerts, and give those to the black box that it is made for."""
+        session = self.session
+        if session is None or not changes:
+            return
+        statuses = [alert_status(change, session) for change in changes]
+        message = self.output.alerts(statuses)
+        for status in statuses:
+            self.listener('alert', status)
+        raised = [change.alert for change in changes if change.how == 'raised']
+        if self._box is not None:
+            self._box.alerts(session.clock.now(), raised, serialize_message(message))
+
+    # Services and parameters
+
+    def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self.session is not None, INACTIVE
+        if self.session is not None:
+            seen = by_service(self.session)
+            self._tell(seen)
+            response.message = f'acknowledged {len(seen)} alerts'
+            self.say()
+        return response
+
+    def _on_operator(self, message: DiagnosticStatus) -> None:
+        """Take what a person did, with name and note: docs/operator.md."""
+        try:
+            if self.session is None:
+                raise BadSample(INACTIVE)
+            self._tell(operate(self.session, message))
+        except AcceptanceError as error:
+            self.get_logger().warning(f'operator: {error}')
+        self.say()
+
+    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = self.session is not None, INACTIVE
+        if self.session is not None:
+            self._deactivate()
+            self._activate()
+            response.message = 'started a new evaluation: filters, alerts and clock are fresh'
+            self.say()
+        return response
+
+    def _value(self, name: str) -> Any:  # noqa: ANN401 - a parameter's value
+        return self.get_parameter(name).value
+
+    def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse a set as a whole, with the reason; what it would change is not touched here."""
+        values = {parameter.name: parameter.value for parameter in parameters}
+        try:
+            if self.session is not None:
+                check_at_rest(values)
+                if self._value('lock_parameters'):
+                    check_locked(values, self.knobs)
+            if self._settings is not None:
+                changed(self._in_force(self._settings), self.knobs, values)
+        except (BadConfig, TypeError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_parameters(self, parameters: list[Parameter]) -> None:
+        values = {parameter.name: parameter.value for parameter in parameters}
+        if self._settings is not None:
+            self._settings = changed(self._in_force(self._settings), self.knobs, values)
+            if self.session is not None:
+                self.session.adopt(self._settings)
+        self._take_rates()
+
+    def _in_force(self, settings: Settings) -> Settings:
+        """Return settings with the load that a message may have declared."""
+        load = settings.robot.payload if self.session is None else self.session.evaluator.payload
+        return replace(settings, robot=replace(settings.robot, payload=load))
+
+    def _tell_load(self) -> None:
+        """Let the parameters of the load say what is in force when a message has changed it."""
+        if self._settings is None or self._in_force(self._settings) == self._settings:
+            return
+        self._settings = self._in_force(self._settings)
+        told = [
+            Parameter(k.name, value=k.get(self._settings)) for k in self.knobs if k.name in FREE
+        ]
+        self.set_parameters_atomically(told)
+
+    def _take_rates(self) -> None:
+        rate = self._value('publish_rate')
+        if self._margins is not None and self._settings is not None:
+            self._margins.period = int(1e9 / rate) if rate > 0 else 0
+            self._margins.limits = self._settings.limits.torque
+
+
+def build(config: str | None, urdf: str | None, listener: Listener) -> Monitor:
+    """Return a monitor of a robot; None: what the ROS arguments say."""
+    given = {'config': config, 'urdf': urdf}
+    overrides = [Parameter(name, value=value) for name, value in given.items() if value]
+    return Monitor(listener, parameter_overrides=overrides)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the monitor until it is interrupted; exit code 2 where the configuration is bad."""
+    sys.exit(run(Monitor, args))

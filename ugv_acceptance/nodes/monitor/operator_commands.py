@@ -1,0 +1,106 @@
+"""What a person does about alerts: acknowledge, shelve, unshelve, reset; who, and with what note.
+
+On `~/operator` as a DiagnosticStatus: `name` is what to do, `hardware_id` who, `message` the note,
+`values` the alert: code, subject, level, and for shelve seconds. No alert named: all of them.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.node import Node
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.config import Topics
+from ugv_acceptance.evaluation.alerts.alarms import Change, Key, State
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
+from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.monitor.black_box import BlackBox, Channel
+
+DOINGS = ('acknowledge', 'shelve', 'unshelve', 'reset')
+# Who acknowledges by the service, which does not say.
+SERVICE = 'service'
+LONGEST_TEXT = 500
+# Seconds of shelving where none are given.
+SHELVED = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """What to do, who does it, to which alarm (None: all), why, and for how long (s)."""
+
+    do: str
+    who: str
+    key: Key | None = None
+    note: str = ''
+    seconds: float = SHELVED
+
+
+def operation_from(message: DiagnosticStatus) -> Operation:
+    """Return the operation of a message; BadSample says what is wrong with it."""
+    values = {pair.key: pair.value for pair in message.values}
+    if message.name not in DOINGS:
+        raise BadSample(f'name: expected one of {", ".join(DOINGS)}, got {message.name[:80]!r}')
+    key = None
+    if 'code' in values:
+        level = values.get('level', '')
+        if level not in LEVELS:
+            raise BadSample(f'level: expected one of {", ".join(LEVELS)}, got {level[:80]!r}')
+        key = (values['code'], values.get('subject', ''), LEVELS.index(level))
+    try:
+        seconds = float(values.get('seconds', SHELVED))
+    except ValueError:
+        raise BadSample(f'seconds: expected a number, got {values["seconds"][:80]!r}') from None
+    if not 0.0 <= seconds <= 1e6:
+        raise BadSample(f'seconds: expected a number from 0 on, got {seconds:g}')
+    who, note = message.hardware_id[:LONGEST_TEXT], message.message[:LONGEST_TEXT]
+    return Operation(message.name, who or 'unknown', key, note, seconds)
+
+
+def by_service(session: Session) -> list[Change]:
+    """Acknowledge all; a service of type Trigger does not say who it was."""
+    return session.follower.alarms.acknowledge(session.clock.now(), SERVICE)
+
+
+def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
+    """Do what a message asks; return what changed. AcceptanceError where it is refused."""
+    alarms, now, o = session.follower.alarms, session.clock.now(), operation_from(message)
+    if o.do == 'acknowledge':
+        return alarms.acknowledge(now, o.who, o.note, o.key)
+    if o.do == 'reset':
+        return alarms.reset(now, o.who, o.note, o.key)
+    if o.key is None:
+        raise BadSample(f'{o.do}: expected the code, subject and level of an alert')
+    if o.do == 'shelve':
+        return alarms.shelve(now, o.key, int(o.seconds * 1e9), o.who, o.note)
+    return alarms.unshelve(now, o.key, o.who)
+
+
+def all_reset(session: Session) -> list[Change]:
+    """Return what is told of all alarms when an evaluation ends."""
+    now, table = session.clock.now(), session.follower.alarms.table
+    return [Change(now, alarm.alert, 'reset', State.NORMAL) for alarm in table.values()]
+
+
+def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
+    """Return a black box before the inputs of a session; it does nothing without a folder."""
+    names = {
+        'joint_states': (topics.joint_states, 'sensor_msgs/msg/JointState'),
+        'imu': (topics.imu, 'sensor_msgs/msg/Imu'),
+        'payload': (topics.payload, 'geometry_msgs/msg/InertiaStamped'),
+    }
+    channels = {
+        name: Channel(
+            node.resolve_topic_name(topic.name), kind, topic.reliability, lasting=name == 'payload'
+        )
+        for name, (topic, kind) in names.items()
+    }
+    alerts = node.resolve_topic_name('~/alerts')
+    channels['alerts'] = Channel(alerts, 'diagnostic_msgs/msg/DiagnosticArray', 'reliable')
+    folder = node.get_parameter('black_box').value
+    path = Path(folder).expanduser() if folder else None
+    box = BlackBox(path, channels, session.clock.offset, session.on_problem)
+    session.take_joint_state = box.tap('joint_states', session.take_joint_state)
+    session.take_imu = box.tap('imu', session.take_imu)
+    session.take_payload = box.tap('payload', session.take_payload)
+    return box

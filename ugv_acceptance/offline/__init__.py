@@ -1,0 +1,1 @@
+"""A recording judged: evaluation, tables, annotation, verification."""

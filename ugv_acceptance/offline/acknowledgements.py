@@ -1,0 +1,62 @@
+"""Who saw which alert, and when: from the monitor's alerts topic, where a recording holds it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from rosbags.typesys import Stores, get_typestore
+
+from ugv_acceptance.bag.reader import Bag
+from ugv_acceptance.type_aliases import Json
+
+TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
+# The monitor dates an alert by its own clock: starts that differ by less (ns) are one alert's.
+SAME = 500_000_000
+
+
+def add_acknowledgements(result: Json, bag: Bag) -> None:
+    """Add to a result's alerts when, by whom and with what note each was acknowledged.
+
+    `acknowledged_s` is None where the topic was recorded but nobody acknowledged; without the
+    topic nothing is added.
+    """
+    topics = [n for n, t in bag.topics.items() if t.type == TYPE and n.endswith('/alerts')]
+    if not topics:
+        return
+    seen = [found for path in bag.paths for found in _acknowledged(path, topics)]
+    for alert in result['alerts']:
+        start = bag.start_ns + round(alert['start_s'] * 1e9)
+        of = [values for values in seen if _is_of(values, alert, start)]
+        first = min(of, key=lambda values: int(values['time_ns']), default=None)
+        alert['acknowledged_s'] = (int(first['time_ns']) - bag.start_ns) / 1e9 if first else None
+        alert['acknowledged_by'] = first.get('who', '') if first else None
+        alert['note'] = first.get('note', '') if first else None
+
+
+def _is_of(values: dict[str, str], alert: Json, start: int) -> bool:
+    named = all(values.get(key) == alert[key] for key in ('code', 'subject', 'level'))
+    return named and abs(int(values['start_ns']) - start) <= SAME
+
+
+def _acknowledged(path: Path, topics: list[str]) -> Iterator[dict[str, str]]:
+    """Yield the values of every status that says an alert was acknowledged.
+
+    What cannot be read is left out: the verdict does not depend on it.
+    """
+    store = get_typestore(Stores.ROS2_JAZZY)
+    try:
+        with path.open('rb') as file:
+            for _, _, message in make_reader(file).iter_messages(topics=topics):
+                array: Any = store.deserialize_cdr(message.data, TYPE)
+                for status in array.status:
+                    values = {pair.key: pair.value for pair in status.values}
+                    if values.get('state') == 'acknowledged' and _dated(values):
+                        yield values
+    except (McapError, OSError, ValueError, KeyError, AssertionError):
+        return
+
+
+def _dated(values: dict[str, str]) -> bool:
+    return all(values.get(key, '').isdigit() for key in ('time_ns', 'start_ns'))

@@ -1,0 +1,221 @@
+"""What the monitor would have said of a recording, as the messages it publishes. No ROS here.
+
+Margins are those of the evaluation, alerts those of its judgement; verdict and words come from the
+live monitor's own functions, which are given the recording's moments one after another.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ugv_acceptance.bag.annotated import Said
+from ugv_acceptance.bag.encode import JointStateBytes
+from ugv_acceptance.bag.encode_views import Diagnosis, diagnoses_cdr, diagnosis_cdr, markers_cdr
+from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.summary import ordered
+from ugv_acceptance.model.stability import SIDES, Stability
+from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
+from ugv_acceptance.monitoring.drawing import (
+    FRAME,
+    LIFETIME,
+    PERIOD,
+    Figure,
+    figure_of,
+    shapes_of,
+    skeleton_of,
+)
+from ugv_acceptance.offline.evaluate import Judgement
+from ugv_acceptance.offline.replayed_session import Retold, moment_of
+
+MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
+_JOINT_STATE = 'sensor_msgs/msg/JointState'
+_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+# What the monitor publishes, by the last word of its topic.
+TYPES = {
+    'static_torque': _JOINT_STATE,
+    'torque_margin': _JOINT_STATE,
+    'stability': _JOINT_STATE,
+    'verdict': 'diagnostic_msgs/msg/DiagnosticStatus',
+    'alerts': _ARRAY,
+    'diagnostics': _ARRAY,
+    'markers': 'visualization_msgs/msg/MarkerArray',
+}
+# Nanoseconds between verdicts, and between drawings.
+SECOND, DRAWING = 1_000_000_000, round(PERIOD * 1e9)
+
+
+def topic_names(bag: Bag) -> dict[str, str]:
+    """Return the topic of each of TYPES: the monitor's, or another where it was recorded too."""
+    usual = {word: f'/{MONITOR}/{word}' for word in TYPES} | {'diagnostics': '/diagnostics'}
+    return {
+        word: f'/{OTHER}/{word}' if topic in bag.topics else topic for word, topic in usual.items()
+    }
+
+
+@dataclass(slots=True)
+class Annotation:
+    """Retells one judged recording; `hardware_id` names the robot."""
+
+    bag: Bag
+    topics: Topics
+    settings: Settings
+    judgement: Judgement
+    hardware_id: str
+    names: dict[str, str] = field(init=False)
+    _session: Retold = field(init=False)
+    _figure: Figure = field(init=False)
+    _bytes: tuple[JointStateBytes, JointStateBytes] = field(init=False)
+    _events: list[tuple[int, int, Alert]] = field(init=False)
+    _open: dict[int, Alert] = field(default_factory=dict)
+    _due: list[int] = field(init=False)
+    _until: int = 0
+    _stamp: int = 0
+
+    def __post_init__(self) -> None:
+        self.names = topic_names(self.bag)
+        log, results = ordered(self.judgement.evaluator.watch.log), self.judgement.result['alerts']
+        told = {moment_of(a): r['advice'] for a, r in zip(log, results, strict=True)}
+        nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
+        self._session = Retold(self.settings, *nothing, told=told)
+        self._figure = figure_of(self.settings.robot)
+        names = self.settings.robot.joint_names
+        self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
+        # Of the same moment an end comes before a beginning, but no alert's end before its own.
+        events = [(a.start, 1, a) for a in log]
+        events += [(a.end, 0 if a.end > a.start else 2, a) for a in log if a.end is not None]
+        self._events = sorted(events, key=lambda event: event[:2], reverse=True)
+        self._due = [self.bag.start_ns, self.bag.start_ns]
+
+    @property
+    def types(self) -> dict[str, str]:
+        """Return the types of the topics that are said."""
+        return {self.names[word]: kind for word, kind in TYPES.items()}
+
+    def said(self) -> Iterator[Said]:
+        """Yield all that is said, in order of log time: the recording is read once more."""
+        evaluator = RecordedEvaluator(self.settings, detail=True)
+        evaluator.start(self.bag.start_ns)
+        for batch in self.bag.batches(self.topics):
+            yield from self._stretch(evaluator.batch(batch))
+        yield from self._up_to(self.bag.end_ns + 1)
+
+    def _stretch(self, rows: MarginRows) -> Iterator[Said]:
+        payloads, heard = self.judgement.examination.payloads, rows.pairs.joints.time
+        of, until = rows.pairs.of_joints.tolist(), rows.until.tolist()
+        felt = (rows.pairs.joints.qd, rows.pairs.joints.effort)
+        measured = list(zip(*(map(tuple, table.tolist()) for table in felt), strict=True))
+        for k, (now, stamp, margins) in enumerate(_margins(rows)):
+            yield from self._up_to(now)
+            self._until, self._stamp = until[k], stamp
+            j = of[k]
+            self._session.take(margins, payloads.at(int(heard[j])), measured[j])
+            if margins is not None:
+                yield from self._margins(now, stamp, margins)
+
+    def _margins(self, now: int, stamp: int, margins: Margins) -> Iterator[Said]:
+        joints, sides = self._bytes
+        torque, stability = margins.torque, margins.stability
+        pairs = zip(self.settings.limits.torque, torque, strict=True)
+        left = [limit - abs(tau) for limit, tau in pairs]
+        angle, moment = map(float, stability.angle), map(float, stability.moment)
+        for word, data in (
+            ('static_torque', joints.fill(stamp, margins.q, torque)),
+            ('torque_margin', joints.fill(stamp, margins.q, left)),
+            ('stability', sides.fill(stamp, tuple(angle), tuple(moment))),
+        ):
+            yield Said(now, self.names[word], data)
+
+    def _up_to(self, end: int) -> Iterator[Said]:
+        """Yield what falls due before `end` (ns), from the margins that held then."""
+        while True:
+            verdict, drawing = self._due
+            event = self._events[-1][0] if self._events else end
+            now = min(verdict, drawing, event)
+            if now >= end:
+                return
+            if now > self._until:
+                self._session.evaluator.margins = None
+            self._session.past.at = now
+            if event == now:
+                yield from self._change(now, *self._events.pop()[1:])
+            elif verdict == now:
+                self._due[0] += SECOND
+                self._session.counsel.feel()
+                yield from self._verdict(now)
+            else:
+                self._due[1] += DRAWING
+                yield from self._draw(now)
+
+    def _change(self, now: int, which: int, alert: Alert) -> Iterator[Said]:
+        """Yield an alert's beginning (which 1) or end, and the verdict since."""
+        session = self._session
+        if which == 1:
+            self._open[id(alert)] = replace(alert, end=None, peak=self._peak(alert))
+            changes = session.raise_alert(self._open[id(alert)])
+        else:
+            mine = self._open.pop(id(alert))
+            mine.end, mine.peak = alert.end, alert.peak
+            changes = session.follower.take()
+        session.counsel.renew(now, session.active)
+        statuses = [alert_status(change, session) for change in changes]
+        yield Said(now, self.names['alerts'], self._array(now, statuses))
+        yield from self._verdict(now)
+
+    def _peak(self, alert: Alert) -> float:
+        """Return how bad it was when it was raised: what came later was not known then."""
+        margins, rule = self._session.evaluator.margins, alert.rule
+        if margins is None or rule.code not in {'TIP_OVER', 'TORQUE_LIMIT'}:
+            return alert.peak
+        if rule.code == 'TIP_OVER':
+            return -float(margins.stability.angle[SIDES.index(rule.subject)])
+        return abs(margins.torque[self.settings.robot.joint_names.index(rule.subject)])
+
+    def _verdict(self, now: int) -> Iterator[Said]:
+        session, status = self._session, verdict_of(self._session)
+        yield Said(now, self.names['verdict'], diagnosis_cdr(self._diagnosis(status)))
+        of = margin_statuses(self.settings, session.evaluator.margins, session.active)
+        monitor = replace(status, name='Monitor')
+        yield Said(now, self.names['diagnostics'], self._array(now, [monitor, *of]))
+
+    def _draw(self, now: int) -> Iterator[Said]:
+        margins = self._session.evaluator.margins
+        if margins is None:
+            return
+        load = self._session.evaluator.payload
+        skeleton = skeleton_of(self._figure, margins.q, margins.gravity, load)
+        if skeleton is not None:
+            shapes = shapes_of(skeleton, margins, self.settings)
+            data = markers_cdr(self._stamp, FRAME, LIFETIME, shapes)
+            yield Said(now, self.names['markers'], data)
+
+    def _array(self, now: int, statuses: Sequence[Status]) -> bytes:
+        return diagnoses_cdr(now, [self._diagnosis(status) for status in statuses])
+
+    def _diagnosis(self, status: Status) -> Diagnosis:
+        name = f'{MONITOR}: {status.name}' if status.name else MONITOR
+        values = {
+            key: f'{value:.6g}' if isinstance(value, float) else str(value)
+            for key, value in status.values.items()
+        }
+        return Diagnosis(status.level, name, status.message, self.hardware_id, values)
+
+
+def _margins(rows: MarginRows) -> Iterator[tuple[int, int, Margins | None]]:
+    """Yield time and header stamp (ns) of each row, and its margins, None where not known."""
+    lists = [np.asarray(x).tolist() for x in (rows.q, rows.gravity, rows.torque)]
+    stable = (rows.angle, rows.moment, rows.energy, rows.zmp, rows.state)
+    lists += [np.asarray(x).tolist() for x in stable]
+    known = zip(rows.time.tolist(), rows.stamp.tolist(), rows.known.tolist(), strict=True)
+    for (now, stamp, there), line in zip(known, zip(*lists, strict=True), strict=True):
+        if not there:
+            yield now, stamp, None
+            continue
+        q, gravity, torque, angle, moment, energy, zmp, state = line
+        stability = Stability(tuple(angle), tuple(moment), tuple(energy), zmp, state)
+        yield now, stamp, Margins(now, stamp, tuple(q), tuple(gravity), tuple(torque), stability)

@@ -1,0 +1,129 @@
+"""Numbers of a result as text: what is not known is a dash, never a zero."""
+
+from ugv_acceptance.evaluation.criteria.quantities import DATA
+from ugv_acceptance.type_aliases import Json
+
+DASH = '\N{EN DASH}'
+# Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
+MISSING, HEAVIER = 0.05, 0.2
+# From here on the digits of a number are counted, not read, and no column holds them.
+LONG = 1e6
+
+
+def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
+    """Return a number with its unit; a dash where there is none, three digits of a long one."""
+    if value is None:
+        return DASH
+    if abs(value) >= LONG:
+        return f'{value:.3g} {unit}'.strip()
+    # Adding 0.0 takes the sign off a rounded zero.
+    return f'{round(value, digits) + 0.0:.{digits}f} {unit}'.strip()
+
+
+def time_text(seconds: float | None, digits: int = 3) -> str:
+    """Return a time as people say it: 45 s, 3.2 min, 6.35 h; a dash where there is none."""
+    if seconds is None:
+        return DASH
+    units = ((3600.0, 'h'), (60.0, 'min'))
+    size, unit = next((u for u in units if seconds >= 2.0 * u[0]), (1.0, 's'))
+    value = seconds / size
+    places = max(0, digits - 1 - (value >= 10.0) - (value >= 100.0))
+    text = f'{value:,.{places}f}'
+    return f'{text.rstrip("0").rstrip(".") if places else text} {unit}'
+
+
+def hours_text(hours: float | None) -> str:
+    """Return a number of hours as people say it."""
+    if hours is None:
+        return DASH
+    # What is still to run of some hundred hours is planned by the hour.
+    return time_text(3600.0 * hours, digits=4 if hours >= 100.0 else 3)
+
+
+def seconds_text(value: float | None) -> str:
+    """Return seconds since the start of the recording."""
+    return 'the end' if value is None else f'{value:.2f} s'
+
+
+def _in_unit(value: float | None, measured: Json) -> str:
+    if value is None:
+        return DASH
+    if measured['signal'] == 'torque_utilisation':
+        return f'{value:.1%}'
+    return f'{value:.{measured.get("digits", 4)}g} {measured["unit"]}'.strip()
+
+
+def _data_text(value: float | None, measured: Json) -> str:
+    if value is None:
+        return DASH
+    if DATA[measured['quantity']].share:
+        return f'{value:.1%}'
+    return f'{value:.4g} {measured["unit"]}'.strip()
+
+
+def worst_text(measured: Json) -> str:
+    """Return what a criterion measured: the worst value, or the numbers of its kind."""
+    if 'signal' in measured:
+        return _in_unit(measured['worst'], measured)
+    if 'values' in measured:
+        pairs = measured['values'].items()
+        several = len(measured['values']) > 1
+        texts = ((name, _data_text(x, measured)) for name, x in pairs)
+        return ', '.join(f'{name} {text}' if several else text for name, text in texts)
+    if 'share' in measured:
+        return f'{measured["visited"]} of {measured["cells"]} cells ({measured["share"]:.1%})'
+    count = measured['alerts']
+    return 'no alert' if not count else f'{count} alert{"s" if count > 1 else ""}'
+
+
+def limit_text(measured: Json) -> str:
+    """Return the limit of a value; a dash for other criteria, whose demand is a sentence."""
+    if 'least' in measured or 'most' in measured:
+        pairs = (('at least', measured['least']), ('at most', measured['most']))
+        return ', '.join(
+            f'{words} {_data_text(bound, measured)}' for words, bound in pairs if bound is not None
+        )
+    if 'signal' not in measured:
+        return DASH
+    return f'{measured["must_be"]} {_in_unit(measured["limit"], measured)}'
+
+
+def bound_text(measured: Json) -> str:
+    """Return the uncertainty of a worst value; a dash where none is known."""
+    bound = measured.get('uncertainty')
+    return DASH if not bound else _in_unit(bound['bound'], {**measured, 'digits': 2})
+
+
+def missing_text(source: Json, duration: float) -> str:
+    """Return which share of an input's messages is missing by its rate; empty: hardly any."""
+    expected = (source['rate_hz'] or 0.0) * duration
+    share = 1.0 - source['messages'] / expected if expected else 0.0
+    return f'{share:.0%} missing' if share > MISSING else ''
+
+
+def doubts_of(result: Json) -> list[str]:
+    """Return what speaks against the margins or their limits, a sentence each."""
+    doubts, wider = [], result.get('limits_relaxed')
+    if wider:
+        doubts = [f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}']
+    load = result['model_check']['payload']
+    if load is None or load['low'] < HEAVIER:
+        return doubts
+    text = (
+        f'efforts at rest tell of {load["value"]:.2f} kg more in the hand than declared (95 %: '
+        f'{load["low"]:.2f} to {load["high"]:.2f} kg): margins are smaller, or efforts are wrong'
+    )
+    return [*doubts, text]
+
+
+def interval_text(found: Json | None, unit: str = '') -> str:
+    """Return a fitted number with its 95 % interval."""
+    if found is None:
+        return DASH
+    half = (found['high'] - found['low']) / 2.0
+    return f'{_short(found["value"])} ± {_short(half)} {unit}'.strip()
+
+
+def _short(value: float) -> str:
+    """Return a number of two places after the point, or three digits of a large one."""
+    return number_text(value, 2) if abs(value) < 100.0 else f'{value:.3g}'

@@ -1,0 +1,208 @@
+"""A run without ROS and as fast as it goes: robot, monitor's evaluation and recording in one place.
+
+Nothing here depends on the speed of the machine: the same seed gives the same recordings, bit for
+bit, and the same verdicts. What is judged, and by what, is the same as over ROS.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ugv_acceptance import BadSample
+from ugv_acceptance.bag.cdr import (
+    Decoder,
+    ImuSample,
+    JointStateSample,
+    imu_decoder,
+    joint_state_decoder,
+)
+from ugv_acceptance.bag.encode import inertia_cdr
+from ugv_acceptance.bag.writer import BagWriter, Qos
+from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.run.simulated_robot import VirtualRobot
+from ugv_acceptance.run.world import Brake, Commands, Positions
+
+
+@dataclass(slots=True)
+class Offline:
+    """The world of a runner in simulated time; `progress` takes the time (s) reached.
+
+    `asked()` ends a wait early: a run of hours hears Ctrl-C.
+    """
+
+    virtual: VirtualRobot
+    on_stop: Callable[[str], None]
+    progress: Callable[[float], None] = lambda _: None
+    asked: Callable[[], bool] = lambda: False
+    brake: Brake = field(init=False)
+    commands: Commands = field(init=False)
+    positions: Positions = field(init=False)
+    evaluator: LiveEvaluator = field(init=False)
+    bag: BagWriter | None = None
+    _joints: Decoder[JointStateSample] = field(default_factory=joint_state_decoder)
+    _imu: Decoder[ImuSample] = field(default_factory=imu_decoder)
+    _open: list[Alert] = field(default_factory=list)
+    _seen: int = 0
+    _ticked: int = 0
+
+    def __post_init__(self) -> None:
+        config = self.virtual.config
+        self.positions = Positions(config)
+        self.evaluator = LiveEvaluator(config.settings)
+        self.evaluator.start(self.stamp())
+        self.commands = OfflineCommands(self)
+        self.brake = Brake(self.commands.freeze, self.on_stop)
+
+    @property
+    def config(self) -> Config:
+        """The configuration of robot and monitor."""
+        return self.virtual.config
+
+    # The world of a runner
+
+    def missing(self) -> str:
+        """Return who was not heard yet: nobody."""
+        return ''
+
+    def dead(self) -> bool:
+        """Return whether the monitor has fallen silent: it is in here."""
+        return False
+
+    def now(self) -> float:
+        """Return the simulated time (s)."""
+        return self.virtual.elapsed
+
+    def fed(self) -> float:
+        """Return the simulated time (s): joint states are waited for."""
+        return self.virtual.elapsed
+
+    def stamp(self) -> int:
+        """Return the time (ns) that recordings carry."""
+        return self.virtual.epoch + round(self.virtual.elapsed * 1e9)
+
+    def wait(self, seconds: float) -> None:
+        """Simulate so many seconds."""
+        end = self.virtual.elapsed + seconds - self.virtual.tick / 2.0
+        while self.virtual.elapsed < end and not self.asked():
+            self.virtual.step()
+            for source, data in self.virtual.due(self.virtual.elapsed):
+                self._receive(source, data)
+            if (now := self.stamp()) - self._ticked >= self.config.settings.delays.tick * 1e9:
+                self._ticked = now
+                self.evaluator.tick(now)
+                self._look()
+        self.progress(self.virtual.elapsed)
+
+    def record(self, folder: Path) -> None:
+        """Record into a new folder from now on."""
+        self.bag = BagWriter(folder)
+        sensor = Qos(reliability='best_effort')
+        for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
+            self.bag.add_topic(topic, kind, qos)
+        self.bag.flush()  # from now on it can be read, whatever happens
+
+    def stop_recording(self) -> None:
+        """Close the recording, if there is one."""
+        bag, self.bag = self.bag, None
+        if bag is not None:
+            bag.close()
+
+    def _topics(self) -> tuple[tuple[str, str], ...]:
+        topics = self.config.topics
+        return (
+            (_absolute(topics.joint_states.name), 'sensor_msgs/msg/JointState'),
+            (_absolute(topics.imu.name), 'sensor_msgs/msg/Imu'),
+            (_absolute(topics.payload.name), 'geometry_msgs/msg/InertiaStamped'),
+        )
+
+    # The monitor
+
+    def _receive(self, source: str, data: bytes) -> None:
+        now, evaluator = self.stamp(), self.evaluator
+        topic = self._topics()[0 if source == 'joint_states' else 1][0]
+        if self.bag is not None:
+            self.bag.write(topic, now, data)
+        try:
+            if source == 'joint_states':
+                stamp, _, names, position, velocity, effort = self._joints.one(data)
+                self.positions.take(names, position)
+                evaluator.joint_state(now, stamp, names, position, velocity, effort)
+            else:
+                stamp, _, turned, omega, force, covariance, *_ = self._imu.one(data)
+                evaluator.imu(now, stamp, turned, covariance, omega, force)
+        except BadSample:
+            return  # as the monitor does; the recording's judge counts it
+        self._look()
+
+    def _look(self) -> None:
+        """Pass on which alerts were raised or cleared since the last look."""
+        log = self.evaluator.watch.log
+        for alert in log[self._seen :]:
+            self._open.append(alert)
+            self.brake.raised(_key(alert), describe(alert, self.config.settings))
+        self._seen = len(log)
+        for alert in [a for a in self._open if a.end is not None]:
+            self._open.remove(alert)
+            self.brake.active.discard(_key(alert))
+
+    def declare(self, mass: float) -> None:
+        """Take a declared load (kg), as the monitor does, and record it."""
+        topics, cog = self.config.topics, self.config.settings.robot.payload.cog
+        frame, now = topics.payload.frame_id or '', self.stamp()
+        if self.bag is not None:
+            self.bag.write(self._topics()[2][0], now, inertia_cdr(now, frame, mass, cog))
+        self.evaluator.carry(now, mass, cog, frame)
+
+
+@dataclass(frozen=True, slots=True)
+class OfflineCommands:
+    """The commands of `run.world.Commands`, obeyed at once by the simulated robot."""
+
+    world: Offline
+
+    def move(self, posture: Mapping[str, float], seconds: float) -> None:
+        """Start a motion to `posture` (rad) that takes `seconds`."""
+        point = (seconds, list(posture.values()))
+        self.world.virtual.remote.follow(list(posture), [point])
+
+    def freeze(self) -> None:
+        """Hold arm and tracks still."""
+        self.world.virtual.remote.freeze()
+
+    def drive(self, forward: float, yaw: float) -> None:
+        """Drive at m/s and rad/s."""
+        self.world.virtual.remote.drive(forward, yaw)
+
+    def declare(self, mass: float) -> None:
+        """Tell the monitor what is carried (kg)."""
+        self.world.declare(mass)
+
+    def tilt(self, tilt: float, heading: float, rate: float) -> None:
+        """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
+        self.world.virtual.tilt(tilt, heading, rate)
+
+    def load(self, mass: float) -> None:
+        """Put a load (kg) into the hand."""
+        cog = self.world.config.settings.robot.payload.cog
+        self.world.virtual.remote.take(Payload(mass, cog))
+
+    def pull(self, force: float) -> None:
+        """Pull backwards at the hitch (N), until told otherwise."""
+        self.world.virtual.pull(force, HITCH)
+
+    def stand_up(self) -> None:
+        """Put the robot on level ground as at the start, its hand empty."""
+        self.world.virtual.remote.reset()
+
+
+def _absolute(name: str) -> str:
+    return name if name.startswith('/') else f'/{name}'
+
+
+def _key(alert: Alert) -> tuple[str, str, str]:
+    return LEVELS[alert.rule.level], alert.rule.code, alert.rule.subject

@@ -1,0 +1,196 @@
+"""A step of a plan judged by the recording made while it was done."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.plan.plan import Step, matches
+from ugv_acceptance.type_aliases import Floats
+
+PASS, FAIL, INCONCLUSIVE, SKIPPED = 'PASS', 'FAIL', 'INCONCLUSIVE', 'SKIPPED'
+VERDICTS = (FAIL, INCONCLUSIVE, SKIPPED, PASS)
+# Less than this share of the hold evaluated: nothing was shown.
+LEAST = 0.95
+# Past its tipping point by more than this (deg), a robot does not merely lean.
+FALLEN = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """What the runner saw of a step; times are ns of the recording's clock.
+
+    `begin` is when the motion began, `hold` and `end` bound the time in which nothing unwanted may
+    be active. `wrong` says how the posture was not reached or held, `stopped` why the motion was
+    frozen, `fault` what was missing, so that nothing was shown; empty: nothing.
+    """
+
+    begin: int
+    hold: int
+    end: int
+    wrong: str = ''
+    stopped: str = ''
+    fault: str = ''
+
+
+@dataclass(slots=True)
+class Seen:
+    """Margins of a recording, gathered stretch by stretch.
+
+    Times (n,) in ns, positions `q` (n, j), shares `use` (n, j) of the torque limits, tilt left
+    (n, 4) in rad towards each of SIDES.
+    """
+
+    limits: Floats
+    time: list[NDArray[np.int64]] = field(default_factory=list)
+    q: list[Floats] = field(default_factory=list)
+    use: list[Floats] = field(default_factory=list)
+    tilt: list[Floats] = field(default_factory=list)
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the next stretch; rows without margins are left out."""
+        known = rows.known
+        self.time.append(rows.time[known])
+        self.q.append(rows.q[known])
+        self.use.append(np.abs(rows.torque[known]) / self.limits)
+        self.tilt.append(rows.angle[known])
+
+    def joined(self) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+        """Return time, q, use and tilt of the whole recording."""
+        none = np.empty((0, len(self.limits)))
+        if not self.time:
+            return np.empty(0, np.int64), none, none, np.empty((0, len(SIDES)))
+        q, use, tilt = (np.concatenate(c) for c in (self.q, self.use, self.tilt))
+        return np.concatenate(self.time), q, use, tilt
+
+
+def judge_step(step: Step, folder: Path, config: Config, done: Done) -> dict[str, Any]:
+    """Return the result of a step for JSON. Raises BadBag where the recording cannot be read."""
+    start, result, seen = _judged(folder, config)
+    window = tuple((t - start) / 1e9 for t in (done.begin, done.hold, done.end))
+    found = {
+        'id': step.id,
+        'title': step.title,
+        'expected': dict(step.expected),
+        'measured': measured(seen, done),
+        'window_s': window,
+        'alerts': result['alerts'],
+        'bag': result['bag'],
+        'covered': covered(seen, done),
+    }
+    if step.action == 'tip' and not done.wrong:
+        done = replace(done, wrong=stood(seen, done))
+    verdict, reasons = decide(step, found['alerts'], window, done, found['covered'])
+    return {'verdict': verdict, 'reasons': reasons, **found}
+
+
+def seen_in(folder: Path, config: Config) -> Seen:
+    """Return the margins of a recording. Raises BadBag where it cannot be read."""
+    return _judged(folder, config)[2]
+
+
+def _judged(folder: Path, config: Config) -> tuple[int, dict[str, Any], Seen]:
+    """Return a recording's first time (ns), its result and its margins."""
+    bag, wanted = open_bag(folder), config.topics
+    topics = choose_topics(bag, wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
+    seen = Seen(np.array(config.settings.limits.torque))
+    result = judge(bag, topics, config.settings, [seen.add]).result
+    return bag.start_ns, result, seen
+
+
+def decide(
+    step: Step,
+    alerts: Iterable[Mapping[str, Any]],
+    window: tuple[float, ...],
+    done: Done,
+    share: float,
+) -> tuple[str, list[str]]:
+    """Return the verdict on a step and its reasons."""
+    begin, hold, end = window
+    alerts = list(alerts)
+    missing = [
+        f'expected {pattern}, it was not raised'
+        for pattern in step.alerts.must
+        if not any(_matches(pattern, a) and _active(a, begin, end) for a in alerts)
+    ]
+    active = [
+        a
+        for a in alerts
+        if _active(a, hold, end) and any(_matches(p, a) for p in step.alerts.must_not)
+    ]
+    # Missing data neither passes nor fails.
+    unwanted = [_told(a) for a in active if a['level'] != 'STALE']
+    unknown = [_told(a) for a in active if a['level'] == 'STALE']
+    if done.fault:
+        return INCONCLUSIVE, [done.fault]
+    if done.stopped:
+        return FAIL, [f'stopped: {done.stopped}']
+    if share < LEAST and not any(p.startswith('STALE') for p in step.alerts.must):
+        unknown.append(f'only {share:.0%} of the hold could be evaluated')
+    # What was not raised may have been due while nothing was seen.
+    wrong = [*unwanted, *([done.wrong] if done.wrong else [])]
+    if wrong or (missing and not unknown):
+        return FAIL, [*missing, *wrong, *unknown]
+    if unknown:
+        return INCONCLUSIVE, [*missing, *unknown]
+    return PASS, ['every alert as expected']
+
+
+def _told(alert: Mapping[str, Any]) -> str:
+    return '{level} {code} {subject} was active: {message}'.format(**alert)
+
+
+def _matches(pattern: str, alert: Mapping[str, Any]) -> bool:
+    return matches(pattern, alert['level'], alert['code'], alert['subject'])
+
+
+def _active(alert: Mapping[str, Any], begin: float, end: float) -> bool:
+    over = alert['end_s'] is not None and alert['end_s'] < begin
+    return bool(alert['start_s'] <= end and not over)
+
+
+def measured(seen: Seen, done: Done) -> dict[str, float]:
+    """Return the median margins of the hold, in the units of `expected`."""
+    time, _, use, tilt = seen.joined()
+    rows = (time >= done.hold) & (time <= done.end)
+    if not rows.any():
+        return {}
+    return {
+        'tilt_left_deg': round(float(np.degrees(np.median(tilt[rows].min(axis=1)))), 2),
+        'use': round(float(np.median(use[rows].max(axis=1))), 4),
+    }
+
+
+def stood(seen: Seen, done: Done) -> str:
+    """Return that a robot did not tip over though it should have; empty: it did."""
+    time, _, _, tilt = seen.joined()
+    rows = tilt[(time >= done.begin) & (time <= done.end)]
+    least = math.degrees(rows.min()) if rows.size else math.inf
+    return '' if least < -FALLEN else f'it did not tip over: {least:.1f} deg of tilt were left'
+
+
+def covered(seen: Seen, done: Done) -> float:
+    """Return the share of the hold with margins: the time between rows under 0.2 s apart."""
+    time = seen.joined()[0]
+    inside = time[(time >= done.hold) & (time <= done.end)]
+    edges = np.concatenate(([done.hold], inside, [done.end]))
+    steps = np.diff(edges)
+    length = max(done.end - done.hold, 1)
+    return float(steps[steps < 200_000_000].sum() / length)
+
+
+def whole(results: Iterable[Mapping[str, Any]]) -> str:
+    """Return the verdict on a run: the worst of its steps; skipped steps leave it inconclusive."""
+    found = {str(r['verdict']) for r in results}
+    if FAIL in found:
+        return FAIL
+    return PASS if found == {PASS} else INCONCLUSIVE
