@@ -19,10 +19,11 @@ from pathlib import Path
 from bench_reading import floor, make  # type: ignore[import-not-found]
 
 from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import evaluate
 
 Stage = Callable[[], object]
 LIVE_MESSAGES = 40_000
@@ -58,9 +59,8 @@ def margins(folder: Path) -> Stage:
 
 def whole(folder: Path) -> Stage:
     """Do all that `evaluate` does but print: hash, margins, alerts, criteria, summary."""
-    bag, settings = open_bag(folder), load(None).settings
-    topics = choose_topics(bag)
-    return lambda: judge(bag, topics, settings)
+    recording, config = open_recording(folder), load()
+    return lambda: evaluate(recording, config=config)
 
 
 def live(_: Path) -> Stage:

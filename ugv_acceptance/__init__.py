@@ -1,8 +1,61 @@
-"""Acceptance of unmanned ground vehicles: torque and tip-over margins, live and from bags."""
+"""Acceptance of unmanned ground vehicles: torque and tip-over margins, live and from recordings.
+
+`evaluate` judges a recording, `LiveEvaluator` a running robot, `open_recording` reads messages,
+`load_config` reads a robot's configuration. They are loaded when first used, so that the import
+itself costs next to nothing.
+"""
 
 import shlex
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ugv_acceptance.bag.recording import Recording as Recording
+    from ugv_acceptance.bag.recording import Sample as Sample
+    from ugv_acceptance.bag.recording import open_recording as open_recording
+    from ugv_acceptance.config import Config as Config
+    from ugv_acceptance.config import load as load_config
+    from ugv_acceptance.model.robot import Payload as Payload
+    from ugv_acceptance.monitoring.live_evaluator import LiveEvaluator as LiveEvaluator
+    from ugv_acceptance.monitoring.live_evaluator import LiveMargins as LiveMargins
+    from ugv_acceptance.offline.evaluate import evaluate as evaluate
+    from ugv_acceptance.offline.evaluation import Evaluation as Evaluation
+    from ugv_acceptance.offline.margins import MarginColumns as MarginColumns
 
 __version__ = '0.1.0'
+
+# What users import from here -> the module it stands in, and its name there.
+_PUBLIC = {
+    'Config': ('config', 'Config'),
+    'Evaluation': ('offline.evaluation', 'Evaluation'),
+    'LiveEvaluator': ('monitoring.live_evaluator', 'LiveEvaluator'),
+    'LiveMargins': ('monitoring.live_evaluator', 'LiveMargins'),
+    'MarginColumns': ('offline.margins', 'MarginColumns'),
+    'Payload': ('model.robot', 'Payload'),
+    'Recording': ('bag.recording', 'Recording'),
+    'Sample': ('bag.recording', 'Sample'),
+    'evaluate': ('offline.evaluate', 'evaluate'),
+    'load_config': ('config', 'load'),
+    'open_recording': ('bag.recording', 'open_recording'),
+}
+
+__all__ = [
+    'AcceptanceError',
+    'BadBag',
+    'BadConfig',
+    'BadSample',
+    'Config',
+    'Evaluation',
+    'LiveEvaluator',
+    'LiveMargins',
+    'MarginColumns',
+    'Payload',
+    'Recording',
+    'Sample',
+    'evaluate',
+    'load_config',
+    'open_recording',
+]
 
 # What only some verbs need, by pip's names. setup.py reads this table as text, the messages of
 # those verbs are made of it: this package is on no index, so its name with [console] gets nothing.
@@ -37,3 +90,18 @@ class BadBag(AcceptanceError):
 
 class BadSample(AcceptanceError):
     """A message whose content cannot be used."""
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first asked for (PEP 562)."""
+    if name not in _PUBLIC:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    module, attribute = _PUBLIC[name]
+    value: object = getattr(import_module(f'{__name__}.{module}'), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names, loaded or not."""
+    return sorted([*globals(), *_PUBLIC])

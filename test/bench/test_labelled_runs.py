@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bench.labelled_runs import SATURATION, TIP, Labelled, cases, label
-from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.run.catalogue import Case, case_of
 from ugv_acceptance.run.record import record
 from ugv_acceptance.simulation.faults import fault_of
@@ -103,9 +102,8 @@ def test_a_label_says_what_the_recording_says(tmp_path: Path, seed: int) -> None
     case = case_of('swing', ROBOT, seed, 8.0)
     case = replace(case, scenario=replace(case.scenario, joint_rate=100.0, imu_rate=200.0))
     record(CONFIG, case, seed, tmp_path / 'run')
-    bag = open_bag(tmp_path / 'run')
-    alerts = judge(bag, choose_topics(bag), CONFIG.settings).result['alerts']
-    started = [a['start_s'] for a in alerts if a['code'] == 'TIP_OVER']
+    alerts = evaluate(tmp_path / 'run', config=CONFIG).alerts
+    started = [a.start_s for a in alerts if a.code == 'TIP_OVER']
     events = [e for e in label(CONFIG, 'swing', seed, case).events if e.kind == TIP]
     for event in events:
         assert min(started) == pytest.approx(event.warned, abs=0.05)

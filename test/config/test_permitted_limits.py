@@ -14,9 +14,9 @@ from evaluation.streams import T0
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
-from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.bag.writer import BagWriter, Qos
-from ugv_acceptance.cli.evaluate import judge_recording
 from ugv_acceptance.cli.verify import again, compare
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
@@ -24,7 +24,7 @@ from ugv_acceptance.evaluation.inputs.timeouts import WINDOW, Freshness
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted, limits_hash, relaxed
 from ugv_acceptance.evaluation.settings import Delays
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import evaluate, judge
 from ugv_acceptance.report.format import doubts_of
 
 MS, S = 1_000_000, 1_000_000_000
@@ -160,7 +160,7 @@ def wide(folder: Path) -> Path:
 
 def judged(folder: Path, config: Path) -> dict[str, Any]:
     """Return the result of a recording, as it is written."""
-    result = judge_recording([record(folder)], load(config))
+    result = evaluate(record(folder), config=config).result
     return dict(json.loads(json.dumps(result)))
 
 
@@ -195,7 +195,7 @@ def test_relaxed_limits_are_told_live_as_of_a_bag(tmp_path: Path) -> None:
     """The same alerts with the same times, messages one by one or as columns."""
     bag = open_bag(record(tmp_path / 'run'))
     settings = load(wide(tmp_path / 'robot')).settings
-    offline = judge(bag, choose_topics(bag), settings).evaluator.watch.log
+    offline = judge(Recording(bag), settings)[1].evaluator.watch.log
     live = LiveEvaluator(settings)
     live.start(bag.start_ns)
     for k in range(500):

@@ -11,30 +11,30 @@ from nodes.live_case import imu, joints
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.encode import inertia_cdr, joint_state_cdr
-from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
-from ugv_acceptance.console.recording import Recording, RecordingFeed, judge_for_console
+from ugv_acceptance.console.recording import RecordingFeed, ShownRecording, shown_recording
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
 from ugv_acceptance.evaluation.live import LiveEvaluator
 
-SETTINGS = load().settings
+CONFIG = load()
+SETTINGS = CONFIG.settings
 BAGS = Path(__file__).parents[2] / 'bags'
 
 
-def judged(name: str) -> Recording:
+def judged(name: str) -> ShownRecording:
     """Return one of the recordings that ship."""
-    bag = open_bag(BAGS / name)
-    return judge_for_console(bag, choose_topics(bag), SETTINGS)
+    return shown_recording(open_recording(BAGS / name), CONFIG)
 
 
 @pytest.fixture(scope='module')
-def fail() -> Recording:
+def fail() -> ShownRecording:
     """Return the run that tips over."""
     return judged('packbot_fail')
 
 
-def test_frames_are_those_of_the_live_evaluator(fail: Recording) -> None:
+def test_frames_are_those_of_the_live_evaluator(fail: ShownRecording) -> None:
     """At every row of the track the live evaluator, fed message by message, knows the same."""
     bag, live = fail.bag, LiveEvaluator(SETTINGS)
     live.start(bag.start_ns)
@@ -59,10 +59,10 @@ def test_frames_are_those_of_the_live_evaluator(fail: Recording) -> None:
     assert compared > 500
 
 
-def messages(recording: Recording) -> list[tuple[int, str, tuple[Any, ...]]]:
+def messages(recording: ShownRecording) -> list[tuple[int, str, tuple[Any, ...]]]:
     """Return a recording's messages one by one, in order of receipt."""
     found: list[tuple[int, str, tuple[Any, ...]]] = []
-    for batch in recording.bag.batches(recording.topics):
+    for batch in recording.bag.batches(recording.evaluation.judgement.topics):
         for p in batch.payload:
             for k, when in enumerate(p.log_time.tolist()):
                 found.append((when, 'load', (float(p.mass[k]), p.com[k].tolist(), p.frame_id)))
@@ -90,7 +90,7 @@ def messages(recording: Recording) -> list[tuple[int, str, tuple[Any, ...]]]:
     return sorted(found, key=lambda m: m[0])
 
 
-def test_the_level_follows_the_alerts(fail: Recording) -> None:
+def test_the_level_follows_the_alerts(fail: ShownRecording) -> None:
     """Early in the run all is well, at its end it is not."""
     start = fail.bag.start_ns
     assert fail.snapshot_at(start + 1_500_000_000).level == OK
@@ -106,7 +106,7 @@ def test_a_gap_is_no_data() -> None:
     assert gap.snapshot_at(gap.bag.start_ns + 13_000_000_000).known
 
 
-def recorded(folder: Path, *parts: tuple[str, float, float, float]) -> Recording:
+def recorded(folder: Path, *parts: tuple[str, float, float, float]) -> ShownRecording:
     """Return a recording of parts: (topic, Hz, from, to) in seconds."""
     types = {
         '/joint_states': 'sensor_msgs/msg/JointState',
@@ -129,11 +129,10 @@ def recorded(folder: Path, *parts: tuple[str, float, float, float]) -> Recording
                 '/payload': lambda t: inertia_cdr(t, link, 1.0, (0.0, 0.0, 0.0)),
             }[topic](when)
             writer.write(topic, when, data)
-    bag = open_bag(folder)
-    return judge_for_console(bag, choose_topics(bag), SETTINGS)
+    return shown_recording(open_recording(folder), CONFIG)
 
 
-def rates_at(recording: Recording, seconds: float) -> list[float]:
+def rates_at(recording: ShownRecording, seconds: float) -> list[float]:
     """Return the rates shown of joint states, IMU and payload, so long after the start."""
     shown = recording.snapshot_at(10**9 + round(seconds * 1e9))
     return [row.rate for row in shown.inputs]
@@ -187,8 +186,8 @@ def test_a_recording_without_one_margin_can_be_shown(tmp_path: Path) -> None:
         writer.add_topic('/imu/data', 'sensor_msgs/msg/Imu', Qos())
         for k in range(5):
             writer.write('/joint_states', 10**9 + k, joint_state_cdr(10**9 + k, '', ['a'], [0.0]))
-    bag = open_bag(tmp_path / 'run')
-    shown = judge_for_console(bag, choose_topics(bag), SETTINGS)
+    shown = shown_recording(open_recording(tmp_path / 'run'), CONFIG)
+    bag = shown.bag
     for when in (bag.start_ns, bag.end_ns):
         snapshot = shown.snapshot_at(when)
         assert (snapshot.level, snapshot.known) == (STALE, False)
@@ -198,7 +197,7 @@ def test_a_recording_without_one_margin_can_be_shown(tmp_path: Path) -> None:
 
 @settings(max_examples=60)
 @given(st.floats(-5.0, 40.0))
-def test_no_alert_tells_what_is_yet_to_come(fail: Recording, seconds: float) -> None:
+def test_no_alert_tells_what_is_yet_to_come(fail: ShownRecording, seconds: float) -> None:
     """At any time an alert of tipping over tells the worst up to then, not later."""
     when = fail.bag.start_ns + int(seconds * 1e9)
     shown = fail.snapshot_at(when)
@@ -210,16 +209,16 @@ def test_no_alert_tells_what_is_yet_to_come(fail: Recording, seconds: float) -> 
             assert said >= math.degrees(known) - 0.1
 
 
-def test_the_timeline_holds_every_alert_and_the_worst(fail: Recording) -> None:
+def test_the_timeline_holds_every_alert_and_the_worst(fail: ShownRecording) -> None:
     """The timeline has the judgement's verdict, all its alerts, and the least tilt left."""
-    line, result = fail.timeline(), fail.judgement.result
+    line, result = fail.timeline(), fail.evaluation.result
     assert line['verdict'] == result['verdict'] == 'FAIL'
     assert len(line['alerts']) == len(result['alerts'])
     least = min(x for x in line['tilt_deg'] if x is not None)
     assert least == pytest.approx(result['stability']['min_angle_deg'], abs=1e-5)
 
 
-def test_commands_are_checked(fail: Recording) -> None:
+def test_commands_are_checked(fail: ShownRecording) -> None:
     """A recording plays, pauses, seeks; what it cannot do is refused with words."""
     feed = RecordingFeed(fail, now=lambda: 0.0)
     feed.command('seek', {'to_s': 7})

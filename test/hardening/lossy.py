@@ -7,9 +7,8 @@ from bag.bag_cases import Message, write_mcap
 from hardening.outcome import Outcome
 
 from ugv_acceptance.bag.raw import messages
-from ugv_acceptance.bag.reader import choose_topics, open_bag
-from ugv_acceptance.config import load
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.offline.evaluate import evaluate
 
 MS = 1_000_000
 # Share of messages lost one by one, bursts lost a minute and their length (s), jitter (s).
@@ -43,8 +42,7 @@ def relayed(recording: Path, way: str, seed: int) -> list[Message]:
 
 def verdict(path: Path) -> str:
     """Return the verdict of a recording."""
-    bag = open_bag(path)
-    return str(judge(bag, choose_topics(bag), load().settings).result['verdict'])
+    return evaluate(path).verdict
 
 
 def trial(recording: Path, folder: Path, way: str, seeds: int) -> Outcome:

@@ -11,11 +11,9 @@ from hardening.wire import Ears, child, line_of
 from nodes.live_case import live_nodes, ros_context
 from rclpy.node import Node
 
-from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter
-from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.type_aliases import Json
 
 PLAYER = 'from ugv_acceptance.cli import main; main()'
@@ -45,8 +43,7 @@ class Recorder(Node):
 
 def judged(path: Path) -> Json:
     """Return the result of a recording."""
-    bag = open_bag(path)
-    return judge(bag, choose_topics(bag), load().settings).result
+    return evaluate(path).result
 
 
 def failures(result: Json) -> Failures:

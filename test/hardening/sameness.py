@@ -19,8 +19,9 @@ from ugv_acceptance.bag.cdr import (
     payload_decoder,
 )
 from ugv_acceptance.bag.raw import messages
-from ugv_acceptance.bag.reader import Bag, Topics, choose_topics, open_bag
+from ugv_acceptance.bag.reader import Bag, Topics, open_bag
 from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
 from ugv_acceptance.offline.evaluate import judge
@@ -81,7 +82,7 @@ class Singly(Iterator[Batch]):
 
 def result(way: Any) -> str:
     """Return the result as it is written, but for the paths and the hash of the files."""
-    found = judge(way, choose_topics(way.bag), load().settings).result
+    found = judge(Recording(way), load().settings)[0]
     for key in ('path', 'sha256', 'findings'):
         del found['bag'][key]
     return json.dumps(found, indent=2, allow_nan=False, default=str)

@@ -15,11 +15,11 @@ from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomic
 from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter, Qos
-from ugv_acceptance.cli.evaluate import judge_recording
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.inputs.timeouts import Freshness
 from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted
 from ugv_acceptance.nodes.monitor.parameters import knobs_of
+from ugv_acceptance.offline.evaluate import evaluate
 
 AT = '/acceptance_monitor'
 WHY = 'bench test, robot tied down'
@@ -221,7 +221,7 @@ def test_the_hash_is_that_of_a_recording_judged_by_the_same_file(
             now = 1_700_000_000 * S + k * S // 100
             writer.write('/joint_states', now, joint_state_cdr(now, '', names, (0.0,) * len(names)))
             writer.write('/imu/data', now, imu_cdr(now, 'imu_link', *still))
-    result = json.loads(json.dumps(judge_recording([tmp_path / 'run'], load())))
+    result = json.loads(evaluate(tmp_path / 'run').to_json())
     assert monitor.verdict().values['limits_hash'] == result['limits_hash']
     assert put(live, limits__tip_warn_deg=11.0)[0].successful
     assert monitor.verdict().values['limits_hash'] != result['limits_hash']

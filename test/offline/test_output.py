@@ -3,14 +3,16 @@
 from pathlib import Path
 
 import pytest
-from bag.bag_cases import JOINT_STATE, cdr, joint_state, write_mcap
+from bag.bag_cases import IMU, JOINT_STATE, cdr, joint_state
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.atomic_files import CsvSink, check_writable
-from ugv_acceptance.bag.reader import choose_topics, open_bag
+from ugv_acceptance.bag.atomic_files import check_writable
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.recording import Recording, open_recording
+from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
-from ugv_acceptance.offline.evaluate import Terms, judge
-from ugv_acceptance.offline.parquet import ParquetSink
+from ugv_acceptance.offline.evaluate import Options, judge
+from ugv_acceptance.offline.output import CsvSink, ParquetSink
 
 SETTINGS = load().settings
 REPOSITORY = Path(__file__).parents[2]
@@ -18,16 +20,19 @@ REPOSITORY = Path(__file__).parents[2]
 
 def judged(source: Path, sink: CsvSink | ParquetSink) -> None:
     """Judge a recording into a sink."""
-    bag = open_bag(source)
-    topics = choose_topics(bag, imu_required=False)
+    recording = open_recording(source)
     with sink:
-        judge(bag, topics, SETTINGS, sink.sinks, terms=Terms(detail=True))
+        options = Options(tuple(sink.sinks), detail=True)
+        judge(recording, SETTINGS, options=options)
 
 
 def without_imu(folder: Path) -> Path:
     """Write a recording of which no margin is known."""
-    joints = cdr(joint_state())
-    return write_mcap(folder / 'in.mcap', [('/joint_states', JOINT_STATE, 10**9, joints)])
+    with BagWriter(folder / 'in') as writer:
+        writer.add_topic('/joint_states', JOINT_STATE, Qos())
+        writer.add_topic('/imu/data', IMU, Qos())
+        writer.write('/joint_states', 10**9, cdr(joint_state()))
+    return folder / 'in'
 
 
 def test_a_table_without_a_row_is_a_table(tmp_path: Path) -> None:
@@ -57,7 +62,7 @@ def test_a_table_that_is_not_whole_has_no_name(
         raise ValueError('no more')
 
     with pytest.raises(ValueError, match='no more'), sink:
-        judge(bag, choose_topics(bag), SETTINGS, [*sink.sinks, fault], terms=Terms(detail=True))
+        judge(Recording(bag), SETTINGS, options=Options((*sink.sinks, fault), detail=True))
     assert (tmp_path / 'out').read_text() == 'old'
 
 

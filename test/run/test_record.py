@@ -10,9 +10,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from ugv_acceptance import BadBag, BadConfig
-from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import load
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.run.catalogue import case_of, names
 from ugv_acceptance.run.fault_text import fault_from
 from ugv_acceptance.run.record import lasting, record
@@ -122,8 +121,7 @@ TOLD: dict[str, str | None] = {
 def test_a_fault_is_told_or_known_to_be_hidden(tmp_path: Path, kind: str) -> None:
     """A fault that shows in the inputs raises its alert; on level ground the others raise none."""
     folder = recorded(tmp_path / 'run', f'fault-{kind}', seconds=9.0)
-    bag = open_bag(folder)
-    result = judge(bag, choose_topics(bag), CONFIG.settings).result
+    result = evaluate(folder, config=CONFIG).result
     codes = {alert['code'] for alert in result['alerts']}
     assert codes == (set() if TOLD[kind] is None else {TOLD[kind]}) or TOLD[kind] in codes
 

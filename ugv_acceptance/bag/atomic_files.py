@@ -1,28 +1,17 @@
-"""What an evaluation writes, whole or not at all: the result as JSON, the margins as CSV."""
+"""Files written whole or not at all, under a name of their own until they are."""
 
-import io
 import json
 import os
 import re
 import secrets
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from math import isfinite
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO, TextIO
-
-import numpy as np
+from typing import BinaryIO
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.evaluation.margin_table import MarginRows
-from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.stability import SIDES, STATES
 
-# Units of columns, of a joint that turns and of one that slides.
-POSITION, TORQUE = ('rad', 'm'), ('nm', 'n')
 # Names of files that this process holds open: 1 and 2, or those a shell made for us, as in >(gzip).
 _OPEN = re.compile(r'/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)')
 
@@ -124,100 +113,3 @@ def check_writable(path: Path | None) -> None:
         raise unwritable(path, error.strerror) from None
     if not os.access(folder, os.W_OK):
         raise unwritable(path, f'no permission in {folder}')
-
-
-class CsvSink:
-    """Takes margins and writes one line a message; without a path it does nothing.
-
-    Angles in degrees, all else in SI; unknown margins are empty fields.
-    """
-
-    def __init__(self, path: Path | None, settings: Settings, start: int) -> None:
-        self._path = path
-        self._settings = settings
-        self._start = start
-        self._file: TextIO | None = None
-        self._stack = ExitStack()
-
-    def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
-        """Open the file under a name that says it is not whole."""
-        if self._path is not None:
-            binary = self._stack.enter_context(whole(self._path))
-            self._file = io.TextIOWrapper(binary, encoding='utf-8', newline='\n')
-            self._file.write(','.join(self._header()) + '\n')
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Give the file its name if it is whole."""
-        if self._file is not None and kind is None:
-            self._stack.callback(self._told, self._file.flush)
-        self._stack.__exit__(kind, error, trace)
-
-    @property
-    def sinks(self) -> list[Callable[[MarginRows], None]]:
-        """Return the sink, if there is a file to write."""
-        return [] if self._file is None else [self._write]
-
-    def _header(self) -> list[str]:
-        robot = self._settings.robot
-        return [
-            'time_s',
-            'stamp_ns',
-            'state',
-            *joint_columns(robot, 'position', POSITION),
-            *joint_columns(robot, 'static_torque', TORQUE),
-            *joint_columns(robot, 'torque_margin', TORQUE),
-            *(f'{side}_angle_deg' for side in SIDES),
-            *(f'{side}_moment_nm' for side in SIDES),
-            *(f'{side}_energy_j' for side in SIDES),
-            'zmp_m',
-        ]
-
-    def _write(self, rows: MarginRows) -> None:
-        limits = np.array(self._settings.limits.torque)
-        table = np.column_stack(
-            (
-                rows.q,
-                rows.torque,
-                limits - np.abs(rows.torque),
-                np.degrees(rows.angle),
-                rows.moment,
-                rows.energy,
-                rows.zmp,
-            )
-        )
-        times = (rows.time - self._start) / 1e9
-        states = [STATES[s] for s in rows.state.tolist()]
-        lines = zip(times.tolist(), rows.stamp.tolist(), states, table.tolist(), strict=True)
-        file = self._file
-        if file is not None:
-            text = (
-                f'{time:.9f},{stamp},{state},{",".join(map(_cell, numbers))}\n'
-                for time, stamp, state, numbers in lines
-            )
-            self._told(lambda: file.writelines(text))
-
-    def _told(self, write: Callable[[], None]) -> None:
-        """Write; of a disk that is full say which file was to be written."""
-        try:
-            write()
-        except OSError as error:
-            raise unwritable(self._path or Path(), error.strerror) from None
-
-
-def joint_columns(robot: Robot, what: str, units: tuple[str, str]) -> list[str]:
-    """Return the name of a column for each joint, with the unit of one that turns or slides."""
-    turns, slides = units
-    return [
-        f'{name}_{what}_{slides if robot.joint(name).kind == "prismatic" else turns}'
-        for name in robot.joint_names
-    ]
-
-
-def _cell(number: Any) -> str:  # noqa: ANN401 - a float
-    return repr(number) if isfinite(number) else ''

@@ -3,20 +3,19 @@
 import hashlib
 import time
 from dataclasses import dataclass, replace
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag, __version__
 from ugv_acceptance.bag.atomic_files import json_text
-from ugv_acceptance.bag.reader import Bag, choose_topics, open_bag
+from ugv_acceptance.bag.reader import Bag, open_bag
+from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.campaign.not_judged import is_of_the_machine
 from ugv_acceptance.campaign.run_table import Row, row_of
 from ugv_acceptance.campaign.sources import Source, local_paths
 from ugv_acceptance.config import Config
-from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
-from ugv_acceptance.offline.evaluate import RESULT_VERSION, Terms, judge
+from ugv_acceptance.offline.evaluate import RESULT_VERSION, Options, evaluate
 from ugv_acceptance.type_aliases import Json
 
 
@@ -112,23 +111,9 @@ def _judged(bag: Bag, brief: Brief) -> _Found:
     size = sum(path.stat().st_size for path in bag.paths)
     if key in brief.known:
         return _Found(key, size, None)
-    wanted = config.topics
-    topics = choose_topics(bag, wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
     # One thread: the other cores have runs of their own.
-    terms = Terms(criteria, sources_from(config), readers=1)
-    result = judge(bag, topics, config.settings, terms=terms).result
-    result['robot'] = {
-        'name': config.name,
-        'serial': config.serial,
-        'config': str(config.path),
-        'urdf': str(config.urdf_path),
-        'sha256': config.sha256,
-        'warnings': list(config.warnings),
-    }
-    result['software'] = {'version': __version__}
-    result['identity'] = {}
-    began = datetime.fromtimestamp(bag.start_ns // 10**9, timezone.utc)
-    result['recorded'] = began.strftime('%Y-%m-%d %H:%M:%S UTC') if bag.start_ns else None
+    found = evaluate(Recording(bag), config=config, criteria=criteria, options=Options(readers=1))
+    result = found.result
     result['start_ns'] = bag.start_ns
     return _Found(key, size, result)
 

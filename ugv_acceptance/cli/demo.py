@@ -30,9 +30,8 @@ def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
 
     That is 0 where live and recording were both judged.
     """
-    from ugv_acceptance.cli.evaluate import judge_recording
     from ugv_acceptance.cli.result_text import print_result
-    from ugv_acceptance.config import load
+    from ugv_acceptance.offline.evaluate import evaluate
 
     console = Console(highlight=False)
     path = find(bag)
@@ -45,7 +44,7 @@ def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
     )
     alerts, played = live(path, rate, console, page=page)
     console.rule('2. The same run from the recording')
-    result = judge_recording([path], load(), compare_effort=False)
+    result = evaluate(path).result
     print_result(result)
     return conclude(console, alerts, played, result)
 

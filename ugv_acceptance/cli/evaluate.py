@@ -9,10 +9,7 @@ from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from ugv_acceptance.cli.evidence import Papers
-    from ugv_acceptance.config import Config
+    pass
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 BAD_INPUT = 2
@@ -82,7 +79,7 @@ def evaluate(
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_json
     from ugv_acceptance.cli import output_kinds as kinds
-    from ugv_acceptance.cli.evidence import Papers, write_junit
+    from ugv_acceptance.cli.evidence import Papers, evaluate_files, write_junit
     from ugv_acceptance.cli.result_text import print_result, while_read
     from ugv_acceptance.config import load
     from ugv_acceptance.config.identity import file_of, identity_from
@@ -97,9 +94,9 @@ def evaluate(
     codes: list[int] = []
     for paths in groups:
         try:
-            result = judge_recording(
+            result = evaluate_files(
                 paths, loaded, papers, compare_effort=compare_effort, identity=entered
-            )
+            ).result
         except AcceptanceError as error:
             typer.echo(f'ugv-acceptance: {error}', err=True)
             result = {'verdict': 'BAD INPUT', 'reasons': [str(error)], 'bag': {'path': paths}}
@@ -132,21 +129,3 @@ def recordings(paths: list[Path]) -> list[list[Path]]:
         key = (path.parent, stem) if part else (path, '')
         groups.setdefault(key, []).append(path)
     return list(groups.values())
-
-
-def judge_recording(
-    paths: list[Path],
-    config: 'Config',
-    papers: 'Papers | None' = None,
-    *,
-    compare_effort: bool = False,
-    identity: 'Mapping[str, str] | None' = None,
-) -> dict[str, Any]:
-    """Judge one recording, write its papers, and return its result."""
-    from ugv_acceptance.cli.evidence import Papers, judge_files, write_papers
-
-    papers = papers or Papers()
-    result, recorder = judge_files(paths, config, papers, compare_effort=compare_effort)
-    result['identity'] = dict(identity or {})
-    write_papers(papers, result, recorder, config.settings)
-    return result

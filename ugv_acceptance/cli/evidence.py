@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ugv_acceptance import AcceptanceError, __version__
+from ugv_acceptance import AcceptanceError
 from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
-    from ugv_acceptance.bag.reader import Bag, Topics
+    from collections.abc import Mapping
+
     from ugv_acceptance.cli.outputs import Output
     from ugv_acceptance.config import Config
-    from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
     from ugv_acceptance.evaluation.downsampling import StripRecorder
     from ugv_acceptance.evaluation.settings import Settings
-    from ugv_acceptance.offline.evaluate import Judgement
+    from ugv_acceptance.offline.evaluation import Evaluation
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,92 +56,54 @@ class Papers:
         return found
 
 
-def judge_files(
-    paths: list[Path], config: 'Config', papers: Papers, *, compare_effort: bool = False
-) -> tuple[Json, 'StripRecorder | None']:
-    """Return the result of one recording, and its strips where a report is asked for."""
-    from ugv_acceptance.bag.atomic_files import CsvSink
-    from ugv_acceptance.bag.reader import choose_topics, open_bag
+def evaluate_files(
+    paths: list[Path],
+    config: 'Config',
+    papers: Papers,
+    *,
+    compare_effort: bool = False,
+    identity: 'Mapping[str, str] | None' = None,
+) -> 'Evaluation':
+    """Evaluate one recording, write its papers on the way and after, and return what was found."""
+    from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli.result_text import progress_of
-    from ugv_acceptance.config.uncertain import sources_from
     from ugv_acceptance.evaluation.downsampling import StripRecorder
-    from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
-    from ugv_acceptance.offline.acknowledgements import add_acknowledgements
-    from ugv_acceptance.offline.evaluate import Terms, judge
-    from ugv_acceptance.offline.parquet import ParquetSink
+    from ugv_acceptance.offline.evaluate import Options, evaluate
+    from ugv_acceptance.offline.output import CsvSink, ParquetSink
 
-    settings, wanted = config.settings, config.topics
-    terms = Terms(
-        criteria_of(papers, settings),
-        sources_from(config),
-        detail=papers.csv is not None or papers.parquet is not None,
-    )
-    bag = open_bag(paths)
-    names = (wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
-    topics = choose_topics(bag, *names)
-    effort, recorder = EffortComparison(settings), StripRecorder(settings, bag.start_ns)
-    wishes = ((effort.add, compare_effort), (recorder.add, papers.paged))
-    sinks = [sink for sink, asked in wishes if asked]
+    recording, settings = open_recording(paths), config.settings
+    start, end = recording.start_ns, recording.bag.end_ns
+    recorder = StripRecorder(settings, start) if papers.paged else None
     with (
-        CsvSink(papers.csv, settings, bag.start_ns) as csv,
-        ParquetSink(papers.parquet, settings, bag.start_ns) as parquet,
-        progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress,
+        CsvSink(papers.csv, settings, start) as csv,
+        ParquetSink(papers.parquet, settings, start) as parquet,
+        progress_of(start, end, sys.stderr) as progress,
     ):
-        takers = [*sinks, *csv.sinks, *parquet.sinks]
-        judgement = judge(bag, topics, settings, takers, progress, terms)
-    result = judgement.result
+        takers = [*csv.sinks, *parquet.sinks]
+        detail = bool(takers)
+        takers += [recorder.add] if recorder else []
+        found = evaluate(
+            recording,
+            config=config,
+            criteria=papers.criteria,
+            identity=identity,
+            options=Options(tuple(takers), progress, detail, compare_effort),
+        )
     if papers.annotate is not None:
-        annotate(papers.annotate, bag, topics, judgement, config)
-    complete(result, bag, config)
-    add_acknowledgements(result, bag)
-    if compare_effort:
-        result['effort'] = effort.result(bag.start_ns)
-    return result, recorder if papers.paged else None
+        annotate(papers.annotate, found)
+    write_papers(papers, found.result, recorder, settings)
+    return found
 
 
-def annotate(
-    path: Path, bag: 'Bag', topics: 'Topics', judgement: 'Judgement', config: 'Config'
-) -> None:
+def annotate(path: Path, evaluation: 'Evaluation') -> None:
     """Write the recording with its judgement beside it, for viewers."""
     from ugv_acceptance.bag.annotated import write_annotated
     from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.offline.annotation import Annotation
 
-    robot = config.serial or config.name
-    told = Annotation(bag, topics, config.settings, judgement, robot)
+    told, bag = Annotation(evaluation), evaluation.recording.bag
     with progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress:
         write_annotated(path, bag, told.types, told.said(), progress)
-
-
-def criteria_of(papers: Papers, settings: 'Settings') -> 'CriteriaSet | None':
-    """Return the criteria of the file that was given; None: the limits of the configuration."""
-    from ugv_acceptance.config.criteria import load_criteria
-
-    return None if papers.criteria is None else load_criteria(papers.criteria, settings)
-
-
-def complete(result: Json, bag: 'Bag', config: 'Config') -> None:
-    """Add to a result what it was made with: robot, software, when it was recorded."""
-    import platform
-    from datetime import datetime, timezone
-
-    import numpy as np
-
-    result['robot'] = {
-        'name': config.name,
-        'serial': config.serial,
-        'config': str(config.path),
-        'urdf': str(config.urdf_path),
-        'sha256': config.sha256,
-        'warnings': list(config.warnings),
-    }
-    result['software'] = {
-        'version': __version__,
-        'numpy': np.__version__,
-        'python': platform.python_version(),
-    }
-    began = datetime.fromtimestamp(bag.start_ns // 10**9, timezone.utc)
-    result['recorded'] = began.strftime('%Y-%m-%d %H:%M:%S UTC') if bag.start_ns else None
 
 
 def write_papers(

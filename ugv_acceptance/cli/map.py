@@ -87,14 +87,11 @@ def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':
     import numpy as np
 
     from ugv_acceptance import BadBag
-    from ugv_acceptance.bag.reader import choose_topics, open_bag
-    from ugv_acceptance.offline.evaluate import judge
+    from ugv_acceptance.offline.evaluate import Options, evaluate
 
-    bag = open_bag(paths)
-    names = loaded.topics
-    topics = choose_topics(bag, names.joint_states.name, names.imu.name, names.payload.name)
     parts: list[Floats] = []
-    judge(bag, topics, loaded.settings, [lambda rows: parts.append(rows.q)])
+    take = Options(takers=(lambda rows: parts.append(rows.q),))
+    evaluate(paths, config=loaded, options=take)
     track = np.concatenate(parts)[:, [scene.grid.first, scene.grid.second]]
     track = track[np.isfinite(track).all(axis=1)]
     if not len(track):

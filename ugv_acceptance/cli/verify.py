@@ -1,12 +1,15 @@
 """`ugv-acceptance verify`: compute a result again from its recording, and compare everything."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.type_aliases import Json
+
+if TYPE_CHECKING:
+    from ugv_acceptance.model.robot import Payload
 
 # Relative difference of numbers that is rounding of another machine's arithmetic.
 ROUNDING = 1e-9
@@ -105,8 +108,8 @@ def again(
     """Return the result computed again, from the places it names, beside it, or as given."""
     import json
 
-    from ugv_acceptance.cli.evidence import Papers, judge_files
     from ugv_acceptance.config import load
+    from ugv_acceptance.offline.evaluate import Options, evaluate
 
     try:
         paths = bag or [_near(path, folder, '--bag') for path in told['bag']['path']]
@@ -118,15 +121,29 @@ def again(
     loaded = load(at, urdf=model)
     if criteria is None and named is not None:
         criteria = _near(named, folder, '--criteria')
-    papers = Papers(criteria=criteria)
-    result, _ = judge_files(paths, loaded, papers, compare_effort='effort' in told)
-    found: Json = json.loads(json.dumps(result, default=str))
+    options = Options(compare_effort='effort' in told)
+    carried = payload_of(told)
+    result = evaluate(paths, config=loaded, criteria=criteria, payload=carried, options=options)
+    found: Json = json.loads(result.to_json())
     if 'limits_hash' not in told:  # written before results said it
         found = {key: value for key, value in found.items() if key not in _LATER}
     return found
 
 
 _LATER = ('limits_hash', 'limits_relaxed')
+
+
+def payload_of(told: Json) -> 'Payload | None':
+    """Return the payload that a result says was declared when it was made, None: no other."""
+    from ugv_acceptance.model.robot import Payload
+
+    said = told.get('declared_payload')
+    try:
+        return None if said is None else Payload(float(said['mass_kg']), tuple(said['cog_m']))
+    except (KeyError, TypeError, ValueError) as error:
+        raise AcceptanceError(f'declared_payload: expected mass_kg and cog_m: {error}') from None
+
+
 # Where a file lies, what computed it and what a person entered may differ.
 _FREE: set[tuple[str, ...]] = {
     ('bag', 'path'),

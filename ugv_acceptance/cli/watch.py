@@ -108,9 +108,7 @@ def feed_of(
 
 def recording_feed(bag: Path, config: 'Config') -> 'RecordingFeed':
     """Return a recording, judged, as a feed."""
-    from ugv_acceptance.bag.reader import choose_topics, open_bag
-    from ugv_acceptance.console.recording import RecordingFeed, judge_for_console
+    from ugv_acceptance.bag.recording import open_recording
+    from ugv_acceptance.console.recording import RecordingFeed, shown_recording
 
-    opened, names = open_bag(bag), config.topics
-    topics = choose_topics(opened, names.joint_states.name, names.imu.name, names.payload.name)
-    return RecordingFeed(judge_for_console(opened, topics, config.settings))
+    return RecordingFeed(shown_recording(open_recording(bag), config))

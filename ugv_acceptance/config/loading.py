@@ -40,19 +40,30 @@ class Config:
     warnings: tuple[str, ...]
 
 
-def load(path: Path | None = None, *, urdf: Path | None = None) -> Config:
+def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> Config:
     """Return the configuration in a YAML file; `urdf` replaces the URDF that the file names.
 
-    A name without folder and ending, such as packbot (the default), is one that ships. Raises
-    BadConfig with file, line and field where something is missing, wrong or does not fit.
+    A name without folder and ending, such as packbot (the default), is one that ships.
+
+    Raises
+    ------
+    BadConfig
+        With file, line and field where something is missing, wrong or does not fit.
+
+    Examples
+    --------
+    >>> import ugv_acceptance as ugv
+    >>> config = ugv.load_config('packbot')
+    >>> config.settings.robot.joint_names[:2]
+    ('turret_joint', 'shoulder_joint')
     """
-    at = find(DEFAULT if path is None else path)
+    at = find(DEFAULT if path is None else Path(path))
     yaml_bytes = _read(at, 'configuration')
     document = read_document(_text(yaml_bytes, at), str(at))
     file = file_from(document)
     if urdf is None and file.urdf is None:
         raise BadConfig(f'{at}: urdf: expected the path of a URDF here or with --urdf, got none')
-    urdf_at = _beside(at, str(file.urdf)) if urdf is None else urdf
+    urdf_at = _beside(at, str(file.urdf)) if urdf is None else Path(urdf)
     urdf_bytes = _read(urdf_at, 'URDF (give its path with --urdf)')
     model = read_urdf(urdf_bytes, str(urdf_at))
     build = Build(document, file, model, list(model.warnings))

@@ -40,6 +40,11 @@ class Topics:
     imu: Topic
     payload: Topic
 
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """The names of the topics of joint states, IMU and payload."""
+        return self.joint_states.name, self.imu.name, self.payload.name
+
 
 def topics_from(build: Build) -> Topics:
     """Return the topics. Raises BadConfig where two share a name or a type is not the known one."""

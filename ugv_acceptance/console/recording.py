@@ -11,6 +11,8 @@ import numpy as np
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.bag.recording import Recording
+from ugv_acceptance.config import Config
 from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
@@ -21,7 +23,8 @@ from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.offline.evaluate import Judgement, judge
+from ugv_acceptance.offline.evaluate import Options, evaluate
+from ugv_acceptance.offline.evaluation import Evaluation
 from ugv_acceptance.type_aliases import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -64,21 +67,28 @@ INPUTS = ('joint_states', 'imu')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class ShownRecording:
     """A judged recording: `snapshot_at` any of its times. Times are log times, ns.
 
     `payloads` are those that count, and since when; `declared` (n,) when any message of one came.
     """
 
-    settings: Settings
-    bag: Bag
-    topics: Topics
-    judgement: Judgement
+    evaluation: Evaluation
     track: Track
     worst: TrackMaker
     alerts: tuple[Alert, ...]
     payloads: tuple[tuple[int, Payload], ...]
     declared: Times
+
+    @property
+    def settings(self) -> Settings:
+        """What it was judged by."""
+        return self.evaluation.judgement.settings
+
+    @property
+    def bag(self) -> Bag:
+        """Its files."""
+        return self.evaluation.recording.bag
 
     def snapshot_at(self, when: int) -> Snapshot:
         """Return what was known at `when`."""
@@ -126,20 +136,22 @@ class Recording:
             rule.level,
             'over' if over else 'active',
             describe(alert, self.settings),
-            self.judgement.result['alerts'][k]['advice'],
+            self.evaluation.alerts[k].advice,
             alert.start,
             alert.end if over else None,
         )
 
     def _silent(self, which: int, when: int) -> bool:
-        return any(a <= when < b for a, b in self.judgement.evaluator.gaps[which])
+        return any(a <= when < b for a, b in self.evaluation.judgement.evaluator.gaps[which])
 
     def _input(self, which: int, k: int, when: int) -> InputRow:
         heard = int(self.track.heard[k, which])
         silent = heard < 0 or self._silent(which, when)
-        topic = (self.topics.joint_states, self.topics.imu)[which] or ''
+        topics = self.evaluation.judgement.topics
+        topic = (topics.joint_states, topics.imu)[which] or ''
         bad = self._bad(INPUTS[which], when)
-        since = max((b for _, b in self.judgement.evaluator.gaps[which] if b <= when), default=0)
+        gaps = self.evaluation.judgement.evaluator.gaps[which]
+        since = max((b for _, b in gaps if b <= when), default=0)
         rate = rate_at(when, self.track.heard[:, which], self.track.taken[:, which], since)
         return InputRow(
             INPUTS[which],
@@ -157,11 +169,11 @@ class Recording:
         bad = self._bad('payload', when)
         return InputRow(
             'payload',
-            self.topics.payload or '',
+            self.evaluation.judgement.topics.payload or '',
             max([a.rule.level for a in bad], default=OK),
             rate_at(when, self.declared, np.arange(len(self.declared))),
             (when - int(self.declared[came - 1])) / 1e9 if came else math.nan,
-            ('the recording',) if self.topics.payload else (),
+            ('the recording',) if self.evaluation.judgement.topics.payload else (),
             '; '.join(describe(a, self.settings) for a in bad) or ('' if came else NO_PAYLOAD),
         )
 
@@ -178,7 +190,7 @@ class Recording:
         start = self.bag.start_ns
         return {
             'duration_s': self.bag.duration_s,
-            'verdict': self.judgement.result['verdict'],
+            'verdict': self.evaluation.verdict,
             'tilt_deg': [number(math.degrees(x)) for x in self.worst.tilt],
             'use': [number(x) for x in self.worst.use],
             'alerts': [
@@ -194,13 +206,13 @@ class Recording:
         }
 
 
-def judge_for_console(bag: Bag, topics: Topics, settings: Settings) -> Recording:
-    """Return a recording that can be shown: reads all of it once."""
-    maker = TrackMaker(settings, bag.start_ns, bag.end_ns)
-    judgement = judge(bag, topics, settings, [maker])
-    alerts = tuple(ordered(judgement.evaluator.watch.log))
-    track, (declared, payloads) = maker.track(), _payloads(bag, topics, settings)
-    return Recording(settings, bag, topics, judgement, track, maker, alerts, payloads, declared)
+def shown_recording(recording: Recording, config: Config) -> ShownRecording:
+    """Return a recording that can be shown: it is evaluated, all of it read once."""
+    maker = TrackMaker(config.settings, recording.bag.start_ns, recording.bag.end_ns)
+    found = evaluate(recording, config=config, options=Options(takers=(maker,)))
+    alerts = tuple(ordered(found.judgement.evaluator.watch.log))
+    declared, payloads = _payloads(recording.bag, found.judgement.topics, config.settings)
+    return ShownRecording(found, maker.track(), maker, alerts, payloads, declared)
 
 
 def _payloads(
@@ -227,7 +239,7 @@ def _numbers(row: np.ndarray[Any, Any]) -> tuple[float, ...]:
 class RecordingFeed:
     """Plays a recording; `now` reads a clock (s) that never goes back."""
 
-    recording: Recording
+    recording: ShownRecording
     now: Any = time.monotonic
     settings: Settings = field(init=False)
     head: Playhead = field(init=False)

@@ -1,7 +1,7 @@
 """What a recording came to: worst margins, time in violation, coverage and alerts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,24 @@ def rates_result(starts: Sequence[int], start: int, duration: int) -> dict[str, 
         'floods_s': [[(a - start) / 1e9, (b - start) / 1e9] for a, b in rates.floods],
         'manageable': rates.manageable,
     }
+
+
+@dataclass(frozen=True, slots=True)
+class AlertRecord:
+    """An alert of a run: its level is WARN, ERROR or STALE; times in s since the run began.
+
+    `end_s` is None where it was active to the end. `peak` is the worst value in the unit of the
+    alert (degrees, N m, ...), None where it has none. `advice` says what to do.
+    """
+
+    code: str
+    subject: str
+    level: str
+    start_s: float
+    end_s: float | None
+    peak: float | None
+    message: str
+    advice: str
 
 
 @dataclass(slots=True)
@@ -203,6 +221,14 @@ def alert_result(
         'advice': told or advice(rule.code),
         'advice_computed': told is not None,
     }
+
+
+def alert_record(
+    alert: Alert, settings: Settings, start: int, told: str | None = None
+) -> AlertRecord:
+    """Return one alert as a record; arguments as for `alert_result`."""
+    values = alert_result(alert, settings, start, told)
+    return AlertRecord(**{f.name: values[f.name] for f in fields(AlertRecord)})
 
 
 def _peak(alert: Alert) -> float | None:

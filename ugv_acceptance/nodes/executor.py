@@ -97,7 +97,7 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
 
 
 def choose_transport(environment: MutableMapping[str, str]) -> None:
-    """Leave Fast DDS's shared memory out, unless somebody chose: docs/decisions/0010-transport.md.
+    """Leave Fast DDS's shared memory out, unless somebody chose: docs/decisions/0005-transport.md.
 
     Its queues are locked between processes: one that stops or dies holds up whoever publishes.
     """

@@ -12,11 +12,10 @@ import numpy as np
 from ugv_acceptance.bag.annotated import Said
 from ugv_acceptance.bag.encode import JointStateBytes
 from ugv_acceptance.bag.encode_views import Diagnosis, diagnoses_cdr, diagnosis_cdr, markers_cdr
-from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.margin_table import MarginRows
-from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.stability import SIDES, Stability
@@ -30,7 +29,8 @@ from ugv_acceptance.monitoring.drawing import (
     shapes_of,
     skeleton_of,
 )
-from ugv_acceptance.offline.evaluate import Judgement
+from ugv_acceptance.offline.evaluation import Evaluation, Judgement
+from ugv_acceptance.offline.margins import margin_rows
 from ugv_acceptance.offline.replayed_session import Retold, moment_of
 
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
@@ -60,13 +60,9 @@ def topic_names(bag: Bag) -> dict[str, str]:
 
 @dataclass(slots=True)
 class Annotation:
-    """Retells one judged recording; `hardware_id` names the robot."""
+    """Retells one evaluated recording."""
 
-    bag: Bag
-    topics: Topics
-    settings: Settings
-    judgement: Judgement
-    hardware_id: str
+    evaluation: Evaluation
     names: dict[str, str] = field(init=False)
     _session: Retold = field(init=False)
     _figure: Figure = field(init=False)
@@ -79,8 +75,8 @@ class Annotation:
 
     def __post_init__(self) -> None:
         self.names = topic_names(self.bag)
-        log, results = ordered(self.judgement.evaluator.watch.log), self.judgement.result['alerts']
-        told = {moment_of(a): r['advice'] for a, r in zip(log, results, strict=True)}
+        log, results = ordered(self._judgement.evaluator.watch.log), self.evaluation.alerts
+        told = {moment_of(a): r.advice for a, r in zip(log, results, strict=True)}
         nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
         self._session = Retold(self.settings, *nothing, told=told)
         self._figure = figure_of(self.settings.robot)
@@ -93,20 +89,32 @@ class Annotation:
         self._due = [self.bag.start_ns, self.bag.start_ns]
 
     @property
+    def bag(self) -> Bag:
+        """The recording's files."""
+        return self.evaluation.recording.bag
+
+    @property
+    def settings(self) -> Settings:
+        """What the recording was judged by."""
+        return self._judgement.settings
+
+    @property
+    def _judgement(self) -> Judgement:
+        return self.evaluation.judgement
+
+    @property
     def types(self) -> dict[str, str]:
         """Return the types of the topics that are said."""
         return {self.names[word]: kind for word, kind in TYPES.items()}
 
     def said(self) -> Iterator[Said]:
         """Yield all that is said, in order of log time: the recording is read once more."""
-        evaluator = RecordedEvaluator(self.settings, detail=True)
-        evaluator.start(self.bag.start_ns)
-        for batch in self.bag.batches(self.topics):
-            yield from self._stretch(evaluator.batch(batch))
+        for rows in margin_rows(self.bag, self._judgement.topics, self.settings, detail=True):
+            yield from self._stretch(rows)
         yield from self._up_to(self.bag.end_ns + 1)
 
     def _stretch(self, rows: MarginRows) -> Iterator[Said]:
-        payloads, heard = self.judgement.examination.payloads, rows.pairs.joints.time
+        payloads, heard = self._judgement.examination.payloads, rows.pairs.joints.time
         of, until = rows.pairs.of_joints.tolist(), rows.until.tolist()
         felt = (rows.pairs.joints.qd, rows.pairs.joints.effort)
         measured = list(zip(*(map(tuple, table.tolist()) for table in felt), strict=True))
@@ -203,7 +211,9 @@ class Annotation:
             key: f'{value:.6g}' if isinstance(value, float) else str(value)
             for key, value in status.values.items()
         }
-        return Diagnosis(status.level, name, status.message, self.hardware_id, values)
+        config = self.evaluation.config
+        robot = config.serial or config.name
+        return Diagnosis(status.level, name, status.message, robot, values)
 
 
 def _margins(rows: MarginRows) -> Iterator[tuple[int, int, Margins | None]]:

@@ -1,23 +1,39 @@
-"""A recording judged: read once, stretch by stretch, into margins, alerts, a summary, a result."""
+"""Evaluate a recording: read once into margins, alerts and a verdict; the one way for everybody."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ugv_acceptance import BadConfig, __version__
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.bag.recording import Paths, Recording, open_recording
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.config.criteria import load_criteria
+from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, default_criteria
 from ugv_acceptance.evaluation.criteria.measurement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
+from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import limits_hash, relaxed
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.offline.acknowledgements import add_acknowledgements
+from ugv_acceptance.offline.evaluation import Evaluation, Judgement
+from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; changes where a reader of results must change.
 RESULT_VERSION = 1
@@ -25,58 +41,137 @@ RESULT_VERSION = 1
 # Messages judged at a time: what a kernel works on then stays in the processor's cache.
 STRETCH = 16384
 
-Sink = Callable[[MarginRows], None]
+
+Taker = Callable[[MarginRows], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
-    """What a run is judged by: criteria (None: the limits of the configuration), what is uncertain.
+class Options:
+    """How a recording is read, and who else takes its margins.
 
-    With `detail` the sinks get moments, energies and ZMP too. `readers` are the threads that read,
-    by default two where there is more than one core.
+    Each of `takers` gets every stretch of margins in order, with moments, energies and ZMP where
+    `detail` asks for them; `progress` gets the log time (ns) reached. With `compare_effort` the
+    result tells of measured efforts at rest. `readers` are the threads that read, by default two
+    where there is more than one core.
     """
 
-    criteria: CriteriaSet | None = None
-    sources: tuple[Source, ...] = ()
+    takers: tuple[Taker, ...] = ()
+    progress: Callable[[int], None] = lambda _: None
     detail: bool = False
+    compare_effort: bool = False
     readers: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """The result, ready for JSON, and what it was made from."""
+def evaluate(
+    recording: Recording | Paths,
+    *,
+    config: Config | Path | str | None = None,
+    criteria: CriteriaSet | Path | str | None = None,
+    payload: Payload | float | None = None,
+    identity: Mapping[str, str] | None = None,
+    options: Options = Options(),
+) -> Evaluation:
+    """Evaluate a recording: margins, alerts and a verdict with its reasons.
 
-    result: dict[str, Any]
-    evaluator: RecordedEvaluator
-    facts: Facts
-    examination: Examination
+    Parameters
+    ----------
+    recording
+        An opened recording, or its path: a rosbag2 folder, MCAP, SQLite or ROS 1 file; a list of
+        paths are the parts of one recording.
+    config
+        The robot: a configuration, its YAML file, or the name of one that ships (packbot, the
+        default).
+    criteria
+        What is demanded of the run: criteria or their YAML file; by default the limits of `config`.
+    payload
+        What the robot carries until a message says otherwise: kg at the origin of the payload link,
+        or a Payload; by default that of `config`.
+    identity
+        What a person enters for the report: operator, robot_serial, place, ...
+    options
+        How it is read, and who else takes its margins.
+
+    Raises
+    ------
+    BadBag, BadConfig
+        Where the recording, the configuration or the criteria cannot be used.
+
+    Examples
+    --------
+    >>> import ugv_acceptance as ugv
+    >>> result = ugv.evaluate('bags/packbot_fail')
+    >>> result.verdict
+    'FAIL'
+    >>> sorted({alert.code for alert in result.alerts if alert.level == 'ERROR'})
+    ['TIP_OVER', 'TORQUE_LIMIT']
+    >>> result.margins.sides
+    ('front', 'left', 'rear', 'right')
+    """
+    robot = config if isinstance(config, Config) else load(config)
+    settings = _carrying(robot, payload)
+    opened = recording if isinstance(recording, Recording) else open_recording(recording)
+    opened = replace(opened, names=robot.topics.names)
+    demanded = _criteria(criteria, settings)
+    effort = EffortComparison(settings)
+    if options.compare_effort:
+        options = replace(options, takers=(effort.add, *options.takers))
+    result, judgement = judge(opened, settings, demanded, sources_from(robot), options)
+    result |= _circumstances(opened, robot, identity)
+    if payload is not None:
+        carried = settings.robot.payload
+        result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
+    add_acknowledgements(result, opened.bag)
+    if options.compare_effort:
+        result['effort'] = effort.result(opened.start_ns)
+    return Evaluation(opened, robot, result, judgement)
+
+
+def _carrying(config: Config, payload: Payload | float | None) -> Settings:
+    """Return the settings of a robot that carries `payload` (kg), None: what they say."""
+    settings = config.settings
+    if payload is None:
+        return settings
+    carried = payload if isinstance(payload, Payload) else Payload(float(payload))
+    link = settings.robot.payload_link or ''
+    known = payload_from(settings.robot, carried.mass, carried.cog, link)
+    if known is None:
+        raise BadConfig(
+            f'payload: expected kg from 0 on, for a robot with a payload link, got {payload!r}'
+        )
+    return replace(settings, robot=replace(settings.robot, payload=known))
+
+
+def _criteria(criteria: CriteriaSet | Path | str | None, settings: Settings) -> CriteriaSet | None:
+    if criteria is None or isinstance(criteria, CriteriaSet):
+        return criteria
+    return load_criteria(Path(criteria), settings)
 
 
 def judge(
-    bag: Bag,
-    topics: Topics,
+    recording: Recording,
     settings: Settings,
-    sinks: Sequence[Sink] = (),
-    progress: Callable[[int], None] = lambda _: None,
-    terms: Terms = Terms(),
-) -> Judgement:
-    """Return the judgement of a recording.
+    criteria: CriteriaSet | None = None,
+    sources: tuple[Source, ...] = (),
+    options: Options = Options(),
+) -> tuple[Json, Judgement]:
+    """Read a recording once; return the part of its result that margins, alerts and data decide.
 
-    Each sink takes every stretch of margins in order; `progress` takes the log time (ns) reached.
+    `criteria` are what is demanded, None: the limits of `settings`; `sources` are uncertain
+    numbers. It comes ready for JSON, with what it was made from.
     """
+    bag, topics = recording.bag, recording.chosen()
     span = bag.start_ns, bag.end_ns
     limits = Examination(default_criteria(settings), settings, *span)
-    asked = Examination(terms.criteria, settings, *span) if terms.criteria else limits
-    evaluator, summary = (
-        RecordedEvaluator(settings, terms.detail or asked.detail),
-        Summary(settings),
-    )
+    asked = Examination(criteria, settings, *span) if criteria else limits
+    evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
+    summary, check = Summary(settings), ModelCheck(settings)
     examinations = [limits] if asked is limits else [limits, asked]
-    check = ModelCheck(settings)
     told = AlertAdvice(settings, evaluator.watch.log, limits.payloads.at)
-    takers = [summary.add, check.add, told.add, *(e.add for e in examinations), *sinks]
+    takers = [
+        summary.add, check.add, told.add, *(e.add for e in examinations), *options.takers
+    ]  # fmt: skip
     evaluator.start(bag.start_ns)
-    reading = bag.batches(topics, workers=terms.readers)
+    reading = bag.batches(topics, workers=options.readers)
     for batch in _stretches(reading):
         for examination in examinations:
             examination.payloads.take(batch.payload)
@@ -84,7 +179,7 @@ def judge(
         for take in takers:
             take(rows)
         if len(rows.time):
-            progress(int(rows.time[-1]))
+            options.progress(int(rows.time[-1]))
     evaluator.finish(bag.end_ns)
     for finish in (summary.finish, *(e.finish for e in examinations)):
         finish(bag.end_ns)
@@ -95,10 +190,35 @@ def judge(
         'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
         'model_check': check.result(),
     }
-    findings = Findings(asked, ordered(log), data, Bounds(settings, terms.sources))
+    findings = Findings(asked, ordered(log), data, Bounds(settings, sources))
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
-    return Judgement(result, evaluator, reading.facts, asked)
+    return result, Judgement(settings, topics, evaluator, reading.facts, asked)
+
+
+def _circumstances(
+    recording: Recording, config: Config, identity: Mapping[str, str] | None
+) -> Json:
+    """Return with what, by whom and when: robot, software, identity, when it was recorded."""
+    start = recording.start_ns
+    began = datetime.fromtimestamp(start // 10**9, timezone.utc)
+    return {
+        'identity': dict(identity or {}),
+        'robot': {
+            'name': config.name,
+            'serial': config.serial,
+            'config': str(config.path),
+            'urdf': str(config.urdf_path),
+            'sha256': config.sha256,
+            'warnings': list(config.warnings),
+        },
+        'software': {
+            'version': __version__,
+            'numpy': np.__version__,
+            'python': platform.python_version(),
+        },
+        'recorded': began.strftime('%Y-%m-%d %H:%M:%S UTC') if start else None,
+    }
 
 
 def _limits(settings: Settings) -> dict[str, Any]:

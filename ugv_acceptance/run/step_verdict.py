@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.evaluate import Options, evaluate
 from ugv_acceptance.plan.plan import Step, matches
 from ugv_acceptance.type_aliases import Floats
 
@@ -100,11 +99,9 @@ def seen_in(folder: Path, config: Config) -> Seen:
 
 def _judged(folder: Path, config: Config) -> tuple[int, dict[str, Any], Seen]:
     """Return a recording's first time (ns), its result and its margins."""
-    bag, wanted = open_bag(folder), config.topics
-    topics = choose_topics(bag, wanted.joint_states.name, wanted.imu.name, wanted.payload.name)
     seen = Seen(np.array(config.settings.limits.torque))
-    result = judge(bag, topics, config.settings, [seen.add]).result
-    return bag.start_ns, result, seen
+    found = evaluate(folder, config=config, options=Options(takers=(seen.add,)))
+    return found.recording.start_ns, found.result, seen
 
 
 def decide(

@@ -1,0 +1,144 @@
+"""The margins over time as files, part by part: CSV, and Parquet where PyArrow is installed."""
+
+import io
+from collections.abc import Callable
+from contextlib import ExitStack
+from math import isfinite
+from pathlib import Path
+from types import TracebackType
+from typing import Any, TextIO
+
+import numpy as np
+
+from ugv_acceptance import AcceptanceError, pip_install
+from ugv_acceptance.bag.atomic_files import unwritable, whole
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.offline.margins import (
+    NOT_IN_CSV,
+    arrow_table,
+    csv_columns,
+    named_columns,
+)
+
+
+class CsvSink:
+    """Takes margins and writes one line a message; without a path it does nothing.
+
+    Angles in degrees, all else in SI; unknown margins are empty fields.
+    """
+
+    def __init__(self, path: Path | None, settings: Settings, start: int) -> None:
+        self._path = path
+        self._settings = settings
+        self._start = start
+        self._file: TextIO | None = None
+        self._stack = ExitStack()
+
+    def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
+        """Open the file under a name that says it is not whole."""
+        if self._path is not None:
+            binary = self._stack.enter_context(whole(self._path))
+            self._file = io.TextIOWrapper(binary, encoding='utf-8', newline='\n')
+            self._file.write(','.join(csv_columns(self._settings)) + '\n')
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the file its name if it is whole."""
+        if self._file is not None and kind is None:
+            self._stack.callback(self._told, self._file.flush)
+        self._stack.__exit__(kind, error, trace)
+
+    @property
+    def sinks(self) -> list[Callable[[MarginRows], None]]:
+        """Return the sink, if there is a file to write."""
+        return [] if self._file is None else [self._write]
+
+    def _write(self, rows: MarginRows) -> None:
+        columns = named_columns(rows, self._settings, self._start)
+        texts = {name: columns.pop(name) for name in ('time_s', 'stamp_ns', 'state')}
+        numbers = np.column_stack([c for name, c in columns.items() if name not in NOT_IN_CSV])
+        lines = zip(*(c.tolist() for c in texts.values()), numbers.tolist(), strict=True)
+        file = self._file
+        if file is not None:
+            text = (
+                f'{time:.9f},{stamp},{state},{",".join(map(_cell, cells))}\n'
+                for time, stamp, state, cells in lines
+            )
+            self._told(lambda: file.writelines(text))
+
+    def _told(self, write: Callable[[], None]) -> None:
+        """Write; of a disk that is full say which file was to be written."""
+        try:
+            write()
+        except OSError as error:
+            raise unwritable(self._path or Path(), error.strerror) from None
+
+
+def _cell(number: Any) -> str:  # noqa: ANN401 - a float
+    return repr(number) if isfinite(number) else ''
+
+
+class ParquetSink:
+    """Takes margins and writes one row a message; without a path it does nothing.
+
+    The columns are those of the CSV and `log_time_ns`; unknown margins are nulls. Raises
+    AcceptanceError where PyArrow is absent.
+    """
+
+    def __init__(self, path: Path | None, settings: Settings, start: int) -> None:
+        self._path, self._settings, self._start = path, settings, start
+        self._writer: Any = None
+        self._arrow: Any = None
+        self._stack = ExitStack()
+        if path is not None:
+            try:
+                from pyarrow import parquet  # noqa: PLC0415 - an extra
+            except ImportError as error:
+                raise AcceptanceError(
+                    f'no Parquet: expected PyArrow ({pip_install("table")}), got: {error}'
+                ) from None
+            self._arrow, self._parquet = __import__('pyarrow'), parquet
+
+    def __enter__(self) -> 'ParquetSink':  # noqa: PYI034 - Self is Python 3.11
+        """Open nothing yet: the first stretch tells the columns."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the file its name if it is whole."""
+        if self._writer is not None:
+            self._stack.callback(self._told, self._writer.close)
+        self._stack.__exit__(kind, error, trace)
+
+    @property
+    def sinks(self) -> list[Callable[[MarginRows], None]]:
+        """Return the sink, if there is a file to write."""
+        return [] if self._path is None else [self._write]
+
+    def _write(self, rows: MarginRows) -> None:
+        # The first stretch, though it be empty, makes the file: no older one must stay.
+        if not len(rows.time) and self._writer is not None:
+            return
+        columns = named_columns(rows, self._settings, self._start)
+        table = arrow_table(self._arrow, columns)
+        if self._writer is None:
+            file = self._stack.enter_context(whole(self._path or Path()))
+            self._writer = self._parquet.ParquetWriter(file, table.schema)
+        self._told(lambda: self._writer.write_table(table))
+
+    def _told(self, write: Callable[[], None]) -> None:
+        """Write; of a disk that is full say which file was to be written."""
+        try:
+            write()
+        except OSError as error:
+            raise unwritable(self._path or Path(), error.strerror) from None
