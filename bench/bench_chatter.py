@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert, Rule, Signal
 from ugv_acceptance.evaluation.settings import Settings
 
@@ -40,7 +40,7 @@ def activations(rule: Rule, values: np.ndarray) -> int:
 
 def rules(settings: Settings) -> dict[str, Rule]:
     """Return the bare threshold and what is added to it, step by step, up to our own rule."""
-    ours = Watch(settings).tip[0][0].rule
+    ours = RuleSet(settings).tip[0][0].rule
     bare = replace(ours, off=ours.on, on_delay=0, off_delay=0)
     deadband = replace(ours, on_delay=0, off_delay=0)
     return {

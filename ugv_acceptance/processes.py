@@ -1,4 +1,4 @@
-"""Processes that work for this one: they end at once with what gave them work, and silently.
+"""Worker processes that end at once with the process that gave them work.
 
 A Ctrl-C on a terminal reaches every process there. Workers are deaf to it, so that none of them
 prints how it was broken off: this process hears it, and ends them.

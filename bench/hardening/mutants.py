@@ -63,7 +63,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/criteria/verdict.py', '_measured',
      "distance > 0.0 >= bound['excess'] -> distance >= 0.0 >= bound['excess']"):
         'a distance of 0 is false before that',
-    ('evaluation/inputs/timeouts.py', 'Freshness', '0 -> 1'): 'the first message sets both',
+    ('evaluation/inputs/timeouts.py', 'InputTimeout', '0 -> 1'): 'the first message sets both',
     ('evaluation/inputs/imu.py', 'ImuTracker', '0.0 -> 1.0'): 'the first message sets it',
     ('evaluation/inputs/imu.py', 'ImuTracker', 'False -> True'):
         'what is quiet is judged quiet, a call is saved',
@@ -106,7 +106,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'the same',
     ('evaluation/alerts/prediction.py', '_ahead', 'len(time) > OVER -> len(time) >= OVER'):
         'of so few looks there is no rate: empty arrays',
-    ('evaluation/alerts/prediction.py', 'Foresight._judge', '0.0 -> 1.0'):
+    ('evaluation/alerts/prediction.py', 'Prediction._judge', '0.0 -> 1.0'):
         'where there is no limit a warning begins at infinity',
     ('evaluation/effort/plateaus.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
         'only efforts above ten are held to the largest of the run',

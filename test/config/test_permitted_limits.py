@@ -20,7 +20,7 @@ from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.cli.verify import again, compare
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.inputs.timeouts import WINDOW, Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import WINDOW, InputTimeout
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted, limits_hash, relaxed
 from ugv_acceptance.evaluation.settings import Delays
@@ -116,7 +116,7 @@ def test_silence_above_two_seconds_is_always_stale(
     period: int, after: float, periods: float
 ) -> None:
     """Whatever the input's own period (ms), live and of columns."""
-    one, many = (Freshness(Delays(stale_after=after, stale_periods=periods)) for _ in range(2))
+    one, many = (InputTimeout(Delays(stale_after=after, stale_periods=periods)) for _ in range(2))
     times = T0 + np.arange(2 * WINDOW) * period * MS
     for now in times.tolist():
         one.message(now)
@@ -127,7 +127,7 @@ def test_silence_above_two_seconds_is_always_stale(
 
 def test_other_delays_count_at_once() -> None:
     """What was learnt of the period is judged by them without waiting for more messages."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     for k in range(WINDOW + 1):
         fresh.message(T0 + k * 100 * MS)
     assert fresh.limit == 300 * MS
@@ -255,7 +255,7 @@ def test_a_deadband_never_keeps_an_alert_for_ever() -> None:
     settings = load().settings
     limits = replace(settings.limits, torque_deadband=1000.0)
     watch = LiveEvaluator(replace(settings, limits=limits)).watch
-    signals = [s for pair in watch.torque for s in pair] + watch.foresight.effort
+    signals = [s for pair in watch.torque for s in pair] + watch.prediction.effort
     rules = [s.rule for s in signals if math.isfinite(s.rule.on)]
     assert rules
     assert all(rule.off == rule.on / 2.0 for rule in rules)

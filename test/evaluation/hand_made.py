@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Rule
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, Criterion, Demand, Window
-from ugv_acceptance.evaluation.criteria.measurement import Examination
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings
 from ugv_acceptance.evaluation.inputs.imu import ImuRows
@@ -88,12 +88,12 @@ def findings(
         'set', 1, (criterion,), '', 'a.yaml', coverage, other.get('method', 'rss')
     )
     finish = BEGIN + round(end * S)
-    examination = Examination(criteria, settings, BEGIN, finish)
+    measurement = CriteriaMeasurement(criteria, settings, BEGIN, finish)
     for part in parts:
-        examination.add(part)
-    examination.finish(finish)
+        measurement.add(part)
+    measurement.finish(finish)
     bounds = Bounds(settings, tuple(other.get('sources', ())))
-    return criterion, Findings(examination, alerts, other.get('data', {}), bounds)
+    return criterion, Findings(measurement, alerts, other.get('data', {}), bounds)
 
 
 def seconds(*times: float) -> list[int]:

@@ -98,7 +98,7 @@ def _one(name: str, count: int, seed: int, warm: int) -> Outcome:
         if k % 64 == 0:  # margins are evaluated, not only messages decoded
             others[0](SEEDS['imu'][0])
             others[1](SEEDS['joint_states'][0])
-            watched.follower.take()
+            watched.alarm_tracker.take()
             watched.tick()
     growth, refused = memory() - before, watched.counts[name].malformed
     text = f'{count} {name}: {refused} refused, {len(faults)} faults, {growth:+.1f} MB'

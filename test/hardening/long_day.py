@@ -11,7 +11,7 @@ from hardening.outcome import Outcome, memory
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
-from ugv_acceptance.monitoring.alarm_tracker import Follower
+from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
 
 HZ = 50
 STEP = S // HZ
@@ -59,7 +59,7 @@ def trial(seconds: int, seed: int = 0) -> Outcome:
     """Evaluate `seconds` of both inputs at 50 Hz as the monitor does, and judge its alerts."""
     evaluator, planned = LiveEvaluator(settings()), events(seconds, seed)
     evaluator.start(T0)
-    follower = Follower(evaluator.watch.log)
+    alarm_tracker = AlarmTracker(evaluator.watch.log)
     starts, raised = [start for start, _, _ in planned], dict[int, Alert]()
     begun = memory()
     for k in range(seconds * HZ):
@@ -70,8 +70,12 @@ def trial(seconds: int, seed: int = 0) -> Outcome:
             give(evaluator, message)
         if k % 5 == 0:
             evaluator.tick(now + STEP // 2)
-            raised |= {id(a): a for a in follower.log if critical(a)} if follower.changed() else {}
-            follower.take()
+            raised |= (
+                {id(a): a for a in alarm_tracker.log if critical(a)}
+                if alarm_tracker.changed()
+                else {}
+            )
+            alarm_tracker.take()
         if k == seconds * HZ // 10:
             begun = memory()
     return judged(planned, list(raised.values()), memory() - begun, seconds)

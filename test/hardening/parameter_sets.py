@@ -35,21 +35,25 @@ def trial(count: int, seed: int = 0) -> Outcome:
     rng, taken, bad, seen = Random(seed), 0, list[str](), list[Margins]()
     with ros_context(), live_nodes() as live:
         monitor, driver = live.running()
-        knobs = monitor.knobs
+        tunables = monitor.tunables
         session_of(monitor).on_margins = lambda _stamp, margins: seen.append(margins)
         for k in range(count):
             names = rng.sample(sorted(VALUES), 1 + rng.randrange(4))
             values = {name: rng.choice(VALUES[name]) for name in names}
-            before = {knob.name: monitor.get_parameter(knob.name).value for knob in knobs}
+            before = {
+                tunable.name: monitor.get_parameter(tunable.name).value for tunable in tunables
+            }
             put = [parameter(name, value) for name, value in values.items()]
             answer = monitor.set_parameters_atomically(put)
             taken += answer.successful
-            after = {knob.name: monitor.get_parameter(knob.name).value for knob in knobs}
+            after = {
+                tunable.name: monitor.get_parameter(tunable.name).value for tunable in tunables
+            }
             wanted = before | values if answer.successful else before
             used = session_of(monitor).settings
             if any(not same(after[n], wanted[n]) for n in after):
                 bad.append(f'{values}: told otherwise')
-            if any(not same(knob.get(used), after[knob.name]) for knob in knobs):
+            if any(not same(tunable.get(used), after[tunable.name]) for tunable in tunables):
                 bad.append(f'{values}: judged otherwise')
             if not answer.successful and not answer.reason:
                 bad.append(f'{values}: refused without a reason')

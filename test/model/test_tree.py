@@ -7,7 +7,6 @@ import pytest
 from robots import paper_arm, tracked
 from scipy.spatial.transform import Rotation
 
-from ugv_acceptance.model.levers import in_base, steps_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of, posture_once
 from ugv_acceptance.model.robot import IDENTITY, Joint, Link, Payload, Robot
 from ugv_acceptance.model.statics import (
@@ -16,6 +15,7 @@ from ugv_acceptance.model.statics import (
     payload_capacity,
     static_torque,
 )
+from ugv_acceptance.model.torque_gradients import in_base, steps_of
 from ugv_acceptance.model.tree import pose_of, rotation_about, tree_of
 
 UP = (0.0, 0.0, 1.0)
@@ -102,7 +102,7 @@ def test_a_posture_asked_for_once_is_the_compiled_one() -> None:
     once = posture_once(robot, q, 3.0, (0.1, 0.0, 0.2))
     compiled = posture_of(mechanics_of(robot), q, 3.0, (0.1, 0.0, 0.2))
     assert once.mass == pytest.approx(compiled.mass)
-    for name in ('levers', 'cog', 'contacts'):
+    for name in ('torque_gradients', 'cog', 'contacts'):
         assert np.array(getattr(once, name)) == pytest.approx(np.array(getattr(compiled, name)))
 
 

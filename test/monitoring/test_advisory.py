@@ -68,9 +68,9 @@ def test_advice_comes_without_holding_up_a_message() -> None:
     """First the general advice, then the computed one, which a thread has worked out."""
     session = session_with()
     wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
-    session.follower.take()
+    session.alarm_tracker.take()
     assert 'raise the elbow' not in verdict_of(session).message
-    wait_until(session.counsel.arrived, lambda: give(session, STRETCHED))
+    wait_until(session.advisory.arrived, lambda: give(session, STRETCHED))
     wait_until(
         lambda: 'raise the elbow by' in verdict_of(session).message,
         lambda: give(session, STRETCHED),
@@ -134,13 +134,13 @@ def test_a_load_that_the_motors_feel_is_offered() -> None:
     told = []
     for _ in range(4):
         session.feel()
-        told.append(session.counsel.estimate is not None)
+        told.append(session.advisory.estimate is not None)
     assert told == [False, False, True, True]
     alert = next(a for a in session.active if a.rule.code == 'PAYLOAD_DIFFERS')
     assert alert.peak == pytest.approx(2.0, abs=0.01)
     words = session.faults.sentence(alert, session.settings)
     assert words == 'the motors work as if 6.0 kg were in the hand, 4.0 kg are declared'
-    assert 'declare the load' in session.counsel.do(alert)
+    assert 'declare the load' in session.advisory.do(alert)
     assert verdict_of(session).values['payload_estimate_kg'] == pytest.approx(6.0, abs=0.01)
 
 
@@ -156,11 +156,11 @@ def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared(
     )
     session.take_joint_state(moving)
     session.feel()
-    assert session.counsel.estimate is not None
+    assert session.advisory.estimate is not None
     session.evaluator.payload = Payload(6.0)
     give(session, q, 0.0, effort)
     session.feel()
-    assert session.counsel.estimate is None
+    assert session.advisory.estimate is None
 
 
 def test_a_tilt_that_grows_fast_is_urgent() -> None:
@@ -170,7 +170,7 @@ def test_a_tilt_that_grows_fast_is_urgent() -> None:
     def lean() -> None:
         give(session, FOLDED, 0.3 * (time.monotonic() - begin))
 
-    wait_until(lambda: session.counsel.urgent(session.clock.now()), lean)
+    wait_until(lambda: session.advisory.urgent(session.clock.now()), lean)
     verdict = verdict_of(session)
     assert verdict.values['tip_of'] == 'front'
     assert 'it tips to the front in' in verdict.message
@@ -242,9 +242,9 @@ def test_one_alarm_can_be_acknowledged_by_its_code() -> None:
         lambda: raised(session, 'TIP_OVER', 'front', ERROR) and len(session.active) > 3,
         lambda: give(session, STRETCHED),
     )
-    session.follower.take()
+    session.alarm_tracker.take()
     asked = message('acknowledge', code='TIP_OVER', subject='front', level='ERROR')
     (change,) = operate(session, asked)
     assert (change.who, change.note) == ('Ada', 'seen')
-    states = [alarm.state for alarm in session.follower.alarms.table.values()]
+    states = [alarm.state for alarm in session.alarm_tracker.alarms.table.values()]
     assert states.count(State.ACTIVE_ACKNOWLEDGED) == 1

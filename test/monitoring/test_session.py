@@ -15,7 +15,7 @@ from nodes.live_case import FOLDED, NAMES, imu, joints
 from ugv_acceptance.bag.encode import JointStateBytes, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
-from ugv_acceptance.monitoring.alarm_tracker import KEPT, Follower
+from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker
 from ugv_acceptance.monitoring.diagnostics import guarded
 from ugv_acceptance.monitoring.faults import WORDS
 from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock
@@ -158,39 +158,39 @@ def alert(k: int, code: str = 'TIP_OVER') -> Alert:
 def test_the_follower_tells_each_change_once() -> None:
     """An alert is raised once and cleared once."""
     log: list[Alert] = []
-    follower = Follower(log)
-    assert not follower.changed()
+    alarm_tracker = AlarmTracker(log)
+    assert not alarm_tracker.changed()
     log.append(alert(1))
-    assert follower.changed()
-    assert [change.how for change in follower.take()] == ['raised']
-    assert not follower.changed()
+    assert alarm_tracker.changed()
+    assert [change.how for change in alarm_tracker.take()] == ['raised']
+    assert not alarm_tracker.changed()
     log[0].end = 2
-    assert [change.how for change in follower.take()] == ['cleared']
-    assert follower.take() == []
+    assert [change.how for change in alarm_tracker.take()] == ['cleared']
+    assert alarm_tracker.take() == []
 
 
 def test_an_alert_shorter_than_a_look_is_told() -> None:
     """What was raised and cleared between two looks is both, in that order."""
     short = alert(1)
     short.end = 2
-    follower = Follower([short])
-    assert [change.how for change in follower.take()] == ['raised', 'cleared']
+    alarm_tracker = AlarmTracker([short])
+    assert [change.how for change in alarm_tracker.take()] == ['raised', 'cleared']
 
 
 @given(st.lists(st.integers(0, 400), max_size=30))
 def test_memory_stays_bounded(bursts: list[int]) -> None:
     """Of cleared alerts no more than a fixed number is kept; active ones are never forgotten."""
     log: list[Alert] = [alert(0, 'NO_SUPPORT')]
-    follower = Follower(log)
+    alarm_tracker = AlarmTracker(log)
     active = log[0]
     told = 0
     for burst in bursts:
         for k in range(burst):
             log.append(alert(k))
             log[-1].end = k + 1
-        told += len(follower.take())
+        told += len(alarm_tracker.take())
         assert len(log) <= 2 * KEPT + 1
-        assert len(follower.alarms.table) <= 2
+        assert len(alarm_tracker.alarms.table) <= 2
     assert any(found is active for found in log) or not bursts
     assert told == 2 * sum(bursts) + bool(bursts)
 
@@ -198,40 +198,40 @@ def test_memory_stays_bounded(bursts: list[int]) -> None:
 def test_what_is_over_and_seen_waits_for_nobody_but_a_tip_over() -> None:
     """Of failures that were acknowledged only a tip-over stays, until it is reset."""
     log = [alert(1), alert(2, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
-    follower = Follower(log)
-    follower.take()
-    assert len(follower.alarms.acknowledge(2, 'Ada')) == 3
+    alarm_tracker = AlarmTracker(log)
+    alarm_tracker.take()
+    assert len(alarm_tracker.alarms.acknowledge(2, 'Ada')) == 3
     for one in log:
         one.end = 3
-    follower.take()
-    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
-    follower.alarms.reset(4, 'Ada')
-    assert follower.waiting == []
+    alarm_tracker.take()
+    assert [alarm.alert for alarm in alarm_tracker.waiting] == [log[0]]
+    alarm_tracker.alarms.reset(4, 'Ada')
+    assert alarm_tracker.waiting == []
 
 
 def test_failures_nobody_saw_wait_and_faults_of_inputs_do_not() -> None:
     """Only failures of the robot wait for somebody to have seen them."""
     log = [alert(1, 'TORQUE_LIMIT'), alert(2, 'INPUT_STALE')]
-    follower = Follower(log)
-    follower.take()
+    alarm_tracker = AlarmTracker(log)
+    alarm_tracker.take()
     for one in log:
         one.end = 3
-    follower.take()
-    assert [alarm.alert for alarm in follower.waiting] == [log[0]]
-    follower.alarms.acknowledge(4, 'Ada')
-    assert follower.waiting == []
+    alarm_tracker.take()
+    assert [alarm.alert for alarm in alarm_tracker.waiting] == [log[0]]
+    alarm_tracker.alarms.acknowledge(4, 'Ada')
+    assert alarm_tracker.waiting == []
 
 
-@pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)
-def test_a_parameter_reads_what_was_put(knob: Any) -> None:
+@pytest.mark.parametrize('tunable', knobs_of(CONFIG.settings), ids=lambda tunable: tunable.name)
+def test_a_parameter_reads_what_was_put(tunable: Any) -> None:
     """Putting what was got changes nothing; putting another value is read back."""
     settings = CONFIG.settings
-    value = knob.get(settings)
-    assert knob.get(knob.put(settings, value)) == pytest.approx(value)
-    if knob.lower is not None:
-        other = knob.lower + 0.25 * (min(knob.upper, 100.0) - knob.lower)
-        assert knob.get(knob.put(settings, other)) == pytest.approx(other)
-        assert knob.lower <= value <= knob.upper
+    value = tunable.get(settings)
+    assert tunable.get(tunable.put(settings, value)) == pytest.approx(value)
+    if tunable.lower is not None:
+        other = tunable.lower + 0.25 * (min(tunable.upper, 100.0) - tunable.lower)
+        assert tunable.get(tunable.put(settings, other)) == pytest.approx(other)
+        assert tunable.lower <= value <= tunable.upper
 
 
 def test_a_misspelt_parameter_is_said() -> None:
@@ -261,10 +261,10 @@ def test_a_big_endian_message_is_read_too() -> None:
     assert watched.evaluator.margins is not None
 
 
-@pytest.mark.parametrize('knob', knobs_of(CONFIG.settings), ids=lambda knob: knob.name)
-def test_every_parameter_is_documented(repository: Path, knob: Any) -> None:
+@pytest.mark.parametrize('tunable', knobs_of(CONFIG.settings), ids=lambda tunable: tunable.name)
+def test_every_parameter_is_documented(repository: Path, tunable: Any) -> None:
     """docs/ros_interface.md names every parameter."""
-    name = knob.name if '.limit_' not in knob.name else 'joints.JOINT.limit_nm'
+    name = tunable.name if '.limit_' not in tunable.name else 'joints.JOINT.limit_nm'
     assert f'`{name}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')
 
 

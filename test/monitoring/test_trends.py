@@ -17,7 +17,7 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import Stability
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.monitoring.trends import Outlook
+from ugv_acceptance.monitoring.trends import Trends
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
 PACKBOT = load().settings
@@ -36,21 +36,21 @@ def sample(time: int, front: float, shoulder: float = 10.0) -> Margins:
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-60.0, 60.0)), min_size=1))
 def test_near_misses_are_the_least_of_all_samples(values: list[tuple[float, float]]) -> None:
     """The smallest tilt and the smallest torque margin, whatever their order."""
-    outlook = Outlook(PACKBOT)
+    trends = Trends(PACKBOT)
     for k, (front, shoulder) in enumerate(values):
-        outlook.see(sample(k, front, shoulder))
-    tilt, torque = outlook.near_misses()
+        trends.see(sample(k, front, shoulder))
+    tilt, torque = trends.near_misses()
     assert tilt.left == min(1.0, *(front for front, _ in values))
     assert torque.left == min(45.0, *(50.0 - abs(tau) for _, tau in values))
 
 
 def test_a_margin_that_shrinks_evenly_is_told_with_its_time() -> None:
     """Ten degrees left and five a second: two seconds; it does not matter that it is noisy."""
-    outlook, noise = Outlook(PACKBOT), np.random.default_rng(3).normal(0.0, 0.002, 200)
+    trends, noise = Trends(PACKBOT), np.random.default_rng(3).normal(0.0, 0.002, 200)
     for k in range(200):
         left = math.radians(20.0 - 5.0 * k / 100) + float(noise[k])
-        outlook.see(sample(k * SECOND // 100, left))
-    (front,) = outlook.ahead(2 * SECOND)
+        trends.see(sample(k * SECOND // 100, left))
+    (front,) = trends.ahead(2 * SECOND)
     assert front.subject == 'front'
     assert front.seconds == pytest.approx(2.0, abs=0.2)
     assert front.rate == pytest.approx(math.radians(-5.0), rel=0.1)
@@ -58,10 +58,10 @@ def test_a_margin_that_shrinks_evenly_is_told_with_its_time() -> None:
 
 def test_a_load_that_grows_is_told_with_its_time() -> None:
     """From 30 N m at 10 N m a second it takes two seconds to 50 N m."""
-    outlook = Outlook(PACKBOT)
+    trends = Trends(PACKBOT)
     for k in range(100):
-        outlook.see(sample(k * SECOND // 100, 0.8, -20.0 - k / 10))
-    (shoulder,) = outlook.ahead(SECOND)
+        trends.see(sample(k * SECOND // 100, 0.8, -20.0 - k / 10))
+    (shoulder,) = trends.ahead(SECOND)
     assert shoulder.subject == 'shoulder_joint'
     assert shoulder.seconds == pytest.approx(2.0, abs=0.05)
 
@@ -69,11 +69,11 @@ def test_a_load_that_grows_is_told_with_its_time() -> None:
 @pytest.mark.parametrize('later', [0, 3 * SECOND])
 def test_a_robot_that_rests_or_is_not_heard_has_nothing_ahead(later: int) -> None:
     """No rate, or no sample of the last second: nothing is said."""
-    outlook = Outlook(PACKBOT)
+    trends = Trends(PACKBOT)
     for k in range(100):
         left = 0.1 - 0.05 * k / 100 if later else 0.1
-        outlook.see(sample(k * SECOND // 100, left))
-    assert outlook.ahead(SECOND + later) == ()
+        trends.see(sample(k * SECOND // 100, left))
+    assert trends.ahead(SECOND + later) == ()
 
 
 MS = 1_000_000
@@ -83,13 +83,13 @@ TWO = settings(limits=Limits((100.0, 10.0)))
 def seen(
     values: Sequence[tuple[tuple[float, ...], tuple[float, float]]], spacing: int = 50 * MS,
     told: Settings = TWO,
-) -> Outlook:  # fmt: skip
+) -> Trends:  # fmt: skip
     """Return an outlook that saw (tilts left, torques) from time 0 on."""
-    outlook, nothing = Outlook(told), (1.0,) * 4
+    trends, nothing = Trends(told), (1.0,) * 4
     for k, (angle, torque) in enumerate(values):
         stability = Stability(angle, nothing, nothing, 0.1, 0)
-        outlook.see(Margins(k * spacing, 0, (0.0, 0.0), LEVEL, torque, stability))
-    return outlook
+        trends.see(Margins(k * spacing, 0, (0.0, 0.0), LEVEL, torque, stability))
+    return trends
 
 
 FINE = (1.0, 1.0, 1.0, 1.0)
@@ -98,8 +98,8 @@ FINE = (1.0, 1.0, 1.0, 1.0)
 def test_a_near_miss_is_dated_to_the_first_of_equals() -> None:
     """Tilt in rad; of torques the one that was the largest share of its limit, in its unit."""
     least = ((1.0, 0.2, 1.0, 0.5), (-90.0, 8.0))
-    outlook = seen([(FINE, (1.0, 1.0)), least, least, (FINE, (80.0, -7.0))])
-    tilt, torque = outlook.near_misses()
+    trends = seen([(FINE, (1.0, 1.0)), least, least, (FINE, (80.0, -7.0))])
+    tilt, torque = trends.near_misses()
     assert (tilt.time, tilt.subject, tilt.left) == (50 * MS, 'left', 0.2)
     assert (torque.time, torque.subject, torque.left) == (50 * MS, 'lift', 10.0)
 
@@ -114,7 +114,7 @@ def test_what_has_no_limit_or_was_never_seen_is_no_near_miss() -> None:
     assert seen([]).ahead(0) == ()
 
 
-def falling(count: int, spacing: int = 50 * MS, tilt: float = 0.2, load: float = 0.0) -> Outlook:
+def falling(count: int, spacing: int = 50 * MS, tilt: float = 0.2, load: float = 0.0) -> Trends:
     """Return an outlook on a front tilt of 0.5 rad and a lift's load of 85 N m, at these rates."""
     at = [k * spacing / SECOND for k in range(count)]
     return seen([((0.5 - tilt * t, 1.0, 1.0, 1.0), (85.0 + load * t, 0.0)) for t in at], spacing)

@@ -86,7 +86,9 @@ def test_a_publisher_that_stops_makes_the_verdict_stale(live: Live, end: signal.
         counts = session_of(monitor).counts
         live.until(lambda: min(counts['imu'].taken, counts['joint_states'].taken) > 100)
         live.until(lambda: session_of(monitor).evaluator.margins is not None)
-        live.until(lambda: not session_of(monitor).follower.open)  # what the start was STALE for
+        live.until(
+            lambda: not session_of(monitor).alarm_tracker.open
+        )  # what the start was STALE for
         process.send_signal(end)
         live.until(lambda: stale(session_of(monitor)).keys() == {'joint_states', 'imu'})
     finally:

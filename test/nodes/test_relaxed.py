@@ -16,7 +16,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
 from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted
 from ugv_acceptance.nodes.monitor.parameters import knobs_of
 from ugv_acceptance.offline.evaluate import evaluate
@@ -151,9 +151,9 @@ def test_a_stopped_driver_is_stale_within_two_seconds_whatever_was_tried(live: L
 def test_a_slow_input_that_stops_is_stale_within_two_seconds() -> None:
     """Also with a reason: stale_periods alone never makes silence longer than 2 s."""
     settings = load().settings
-    (knob,) = (k for k in knobs_of(settings) if k.name == 'delays.stale_periods')
-    wide = knob.put(settings, 1000.0)
-    fresh = Freshness(wide.delays)
+    (tunable,) = (k for k in knobs_of(settings) if k.name == 'delays.stale_periods')
+    wide = tunable.put(settings, 1000.0)
+    fresh = InputTimeout(wide.delays)
     for k in range(40):
         fresh.message(k * S)
     assert fresh.limit == 2 * S

@@ -14,13 +14,13 @@ from ugv_acceptance.evaluation.alerts.messages import WORDS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.plan.arm_paths import Routes, safe_path
 from ugv_acceptance.plan.card import MEANINGS, card_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
 from ugv_acceptance.plan.sketch import sketch
-from ugv_acceptance.plan.ways import Routes, safe_way
 from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
@@ -46,7 +46,7 @@ def vector(posture: dict[str, float]) -> np.ndarray:
     return np.array(vector_of(CONFIG.settings.robot, PLAN.home_deg, posture))
 
 
-def ways() -> Iterator[tuple[Step, np.ndarray]]:
+def paths() -> Iterator[tuple[Step, np.ndarray]]:
     """Yield the postures (n, j) that each robot's step passes, from the step before or home."""
     before, setup = PLAN.home_deg, None
     for step in PLAN.steps:
@@ -58,7 +58,7 @@ def ways() -> Iterator[tuple[Step, np.ndarray]]:
         before, setup = step.posture_deg, (step.ground, step.payload_kg)
 
 
-@pytest.mark.parametrize(('step', 'path'), list(ways()), ids=lambda x: getattr(x, 'id', ''))
+@pytest.mark.parametrize(('step', 'path'), list(paths()), ids=lambda x: getattr(x, 'id', ''))
 def test_no_way_of_the_robot_passes_a_limit(step: Step, path: np.ndarray) -> None:
     """From the posture before, by the postures between, every margin is kept."""
     use, left = margins_of(step, path)
@@ -121,13 +121,13 @@ def test_a_posture_behind_a_limit_is_reached_around_it() -> None:
     """Where the straight way passes a limit, the search finds postures between that do not."""
     arm = Arm(CONFIG.settings, roles_of(CONFIG.settings))
     home = vector(PLAN.home_deg)
-    ways = Routes(arm, home).ways(('level', 0.0), 4.0)
-    behind = [q for q in ways.q[ways.reachable] if not safe_way(arm, (home, q), *LEVEL)]
+    paths = Routes(arm, home).paths(('level', 0.0), 4.0)
+    behind = [q for q in paths.q[paths.reachable] if not safe_path(arm, (home, q), *LEVEL)]
     assert behind
     for q in behind[::100]:
-        middle = ways.to(q)
+        middle = paths.to(q)
         assert middle
-        assert safe_way(arm, (home, *middle, q), *LEVEL)
+        assert safe_path(arm, (home, *middle, q), *LEVEL)
 
 
 def test_nothing_that_fails_is_run_on_the_robot() -> None:

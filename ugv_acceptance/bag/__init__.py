@@ -1,1 +1,1 @@
-"""MCAP to columns of numbers, salvage, and a writer with checksums."""
+"""Recordings to columns of numbers and back: readers, salvage of damaged files, writers."""

@@ -1,4 +1,4 @@
-"""A recording written anew, every message as it is, with further topics beside it: one MCAP file.
+"""Copies a recording message by message into one MCAP, with further topics beside them.
 
 Messages of both are merged in order of log time, so what is held in memory is a chunk or two.
 """

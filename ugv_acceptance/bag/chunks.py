@@ -1,4 +1,4 @@
-"""Records of an MCAP: the head of a chunk, decompression into a reused buffer, the record walk."""
+"""Chunks of an MCAP: their header, decompression into a reused buffer, the walk over records."""
 
 import importlib
 import struct

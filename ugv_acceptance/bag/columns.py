@@ -1,4 +1,4 @@
-"""Messages of one channel to columns: whole stretches at a time where their layout is regular.
+"""Decodes the messages of one channel into columns, many at once where their layout is alike.
 
 Every byte that must not vary is compared with the layout learnt from an earlier message; messages
 that differ are tried with the other layouts known and in the end decoded one by one. Either way

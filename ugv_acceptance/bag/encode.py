@@ -1,4 +1,4 @@
-"""Numbers to CDR (little endian): the bytes of the three messages that bags hold for us."""
+"""Encodes joint states, IMU and payload messages as CDR."""
 
 import struct
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""To CDR what viewers show: diagnoses and markers. Written by hand: no ROS is needed for a file."""
+"""Encodes diagnostics and markers as CDR, for viewers; no ROS is needed."""
 
 import struct
 from collections.abc import Mapping, Sequence

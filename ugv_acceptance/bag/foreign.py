@@ -1,4 +1,4 @@
-"""SQLite bags (rosbag2's older storage) and ROS 1 bags: messages one by one to the same columns.
+"""Reads SQLite bags (rosbag2) and ROS 1 bags into the same columns, message by message.
 
 SQLite is read with Python's own module, since it needs nothing but four columns of two tables and
 so works without metadata.yaml; ROS 1 bags are read by rosbags.

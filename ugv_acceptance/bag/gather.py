@@ -1,4 +1,4 @@
-"""Message records of one layout out of a chunk: a few gathers, every constant byte compared.
+"""Gathers the messages of one layout from a chunk at once, every constant byte compared.
 
 A gather copies the same stretch of every record, one small memcpy each, so what comes out is
 contiguous; records themselves lie anywhere. Constants are compared a word at a time with bits

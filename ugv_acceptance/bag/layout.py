@@ -1,4 +1,4 @@
-"""How a serialised message is laid out, learnt by walking it: CDR and ROS 1's packing.
+"""Learns how a serialised message is laid out by walking it once: CDR and ROS 1.
 
 Every length and text in a message is part of its layout; what is left are a stamp and blocks of
 float64. Any bytes give a layout or BadSample, nothing else.

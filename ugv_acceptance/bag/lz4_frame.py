@@ -1,4 +1,4 @@
-"""LZ4 frames into a buffer that is already there, by liblz4 as the lz4 package carries it.
+"""Decompresses LZ4 frames into a buffer that is already there, by liblz4.
 
 `lz4.frame` itself takes new memory for every chunk, which costs five times as much as LZ4 does. A
 frame's own checksums are looked at where it has any.

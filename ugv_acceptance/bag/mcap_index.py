@@ -1,4 +1,4 @@
-"""What an MCAP file holds and where: from its summary, or by scanning it where that fails."""
+"""The index of an MCAP file: what it holds and where, from its summary or by scanning."""
 
 import os
 import struct

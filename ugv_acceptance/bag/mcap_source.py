@@ -1,4 +1,4 @@
-"""The pieces of one MCAP file, each decoded on its own, by its index where that holds."""
+"""Reads the chunks of one MCAP file, each decoded on its own."""
 
 import os
 from collections.abc import Callable

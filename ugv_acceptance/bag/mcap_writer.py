@@ -1,4 +1,4 @@
-"""An MCAP file as it is written: chunks that end when told to, each with a checksum and an index.
+"""Writes an MCAP file: chunks with checksums and an index.
 
 The writer of the mcap package ends a chunk only when it is full, so a process that is killed may
 lose minutes of a slow recording. The records themselves are those of that package.

@@ -1,4 +1,4 @@
-"""What a rosbag2 folder's metadata.yaml says, of any version, and the files of a recording."""
+"""Reads the metadata.yaml of a rosbag2 folder, any version, and finds its files."""
 
 import os
 import posixpath

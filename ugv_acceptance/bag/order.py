@@ -1,4 +1,4 @@
-"""Columns into batches that follow each other in log time."""
+"""Sorts columns into batches that follow each other in log time."""
 
 from collections.abc import Iterable
 

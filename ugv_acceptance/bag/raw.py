@@ -1,4 +1,4 @@
-"""Any recording message by message, as serialised, in the order it was logged: for replay."""
+"""Reads a recording message by message, serialised as it was logged, for replay."""
 
 import heapq
 import os

@@ -1,4 +1,4 @@
-"""A recording opened: what it holds and how it is protected, and its messages as batches."""
+"""Opens a recording: files, topics, checksums, damage; its messages come as batches."""
 
 import hashlib
 import tempfile

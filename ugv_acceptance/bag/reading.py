@@ -1,4 +1,4 @@
-"""One pass over a recording: pieces decoded by a few threads, handed out in log time order."""
+"""Reads through a recording once: chunks decoded by a few threads, in order of log time."""
 
 import os
 from collections import deque

@@ -1,4 +1,4 @@
-"""The index of an MCAP file whose summary is missing or wrong: every record is looked at once."""
+"""Rebuilds the index of an MCAP file whose summary is missing or wrong, from its records."""
 
 import os
 from typing import BinaryIO

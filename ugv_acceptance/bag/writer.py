@@ -1,4 +1,4 @@
-"""A rosbag2 folder as it is recorded: an MCAP with checksums, and metadata.yaml when closed."""
+"""Writes a rosbag2 folder: an MCAP with checksums, and metadata.yaml when it is closed."""
 
 from dataclasses import dataclass
 from functools import cache

@@ -1,1 +1,1 @@
-"""Many recorded runs to one statement of reliability."""
+"""Many recorded runs judged together: a statement of reliability."""

@@ -1,4 +1,4 @@
-"""A campaign carried out: every run judged or found judged, then the failures and the statement."""
+"""Carries a campaign out: judges every run not judged before, gathers runs and failures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

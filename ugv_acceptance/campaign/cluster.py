@@ -1,4 +1,4 @@
-"""Runs given to the workers of a dask.distributed scheduler, any of which may die or go away.
+"""Runs on a dask.distributed cluster, whose workers and scheduler may die or go away.
 
 Every batch is given to one worker by its address, a few ahead: so it is known what was lost with a
 worker. Of several runs that were, each is tried once more by itself, after all others: a run that

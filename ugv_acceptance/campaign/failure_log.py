@@ -1,4 +1,4 @@
-"""The failure log a person writes beside a campaign: YAML or CSV, one entry a failure.
+"""Reads the failure log that people write beside a campaign: YAML or CSV.
 
 Every entry names its run. Fields: run, what, class, impact, repairability, repair_h, at_s, alert,
 chargeable; all but run may be left out.

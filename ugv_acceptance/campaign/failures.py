@@ -1,4 +1,4 @@
-"""Failures of a campaign: from the alerts of its runs, and from a log that a person writes.
+"""The failures of a campaign: from alerts of its runs and from the failure log.
 
 Class, impact and repairability are those of Carlson and Murphy's taxonomy. An alert shows an
 effect, so what it says of the class is a suspicion; an entry of the log replaces it.

@@ -1,4 +1,4 @@
-"""Two groups of a campaign's runs - two robots, two firmware versions - beside each other."""
+"""Compares two groups of runs, such as two robots or two versions of firmware."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What keeps a run from being judged, told apart from a recording that is itself unreadable.
+"""Tells a run that could not be judged from a recording that cannot be read.
 
 No memory, no room, no network, no right to read: that is no fault of the run, and says nothing
 about it. A file that is not there, or holds something else, is.

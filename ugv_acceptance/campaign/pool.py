@@ -1,4 +1,4 @@
-"""Runs given to workers: processes of this machine, or those of a dask.distributed scheduler.
+"""Spreads the runs over workers: processes here, or a dask.distributed cluster.
 
 Results come as they are ready. A worker that dies (no memory, a crash in a library) takes only the
 run down that killed it; that run is not judged, which says nothing about it.

@@ -1,4 +1,4 @@
-"""The runs of a campaign in a line each: verdict, hours, failures; in the order of their time."""
+"""One line a run: verdict, hours, failures; in the order of time."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

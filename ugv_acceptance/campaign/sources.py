@@ -1,4 +1,4 @@
-"""Where the runs of a campaign are: folders, files and URLs, sorted into recordings.
+"""Finds the runs of a campaign: folders, files and URLs, sorted into recordings.
 
 A rosbag2 folder is one recording; elsewhere files of one folder that differ only in their number
 are. URLs are those fsspec knows (file, s3, gs, sftp, http, ...): it is imported for them only.

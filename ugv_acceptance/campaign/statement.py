@@ -1,4 +1,4 @@
-"""The statement of a campaign: what its hours and failures show, ready for JSON.
+"""The statement of a campaign for JSON: hours, failures, MTBF, success, trend.
 
 The same runs give the same statement whoever computed them in which order. Hours are those that
 could be judged; runs that are INCONCLUSIVE or BROKEN are counted, as no success. While a run is

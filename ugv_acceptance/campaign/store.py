@@ -1,4 +1,4 @@
-"""The folder of a campaign: results of runs by the hash of all they depend on, for resuming."""
+"""Keeps the result of each run under a hash of all it depends on, so that work is resumed."""
 
 import json
 from pathlib import Path

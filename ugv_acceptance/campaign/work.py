@@ -1,4 +1,4 @@
-"""One run of a campaign judged, wherever the work is done: in this process, another, a cluster."""
+"""Judges one run, in this process, another, or on a cluster."""
 
 import hashlib
 import time

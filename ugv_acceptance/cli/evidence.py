@@ -1,4 +1,4 @@
-"""What an evaluation leaves behind: a report, PDF, JUnit XML, tables, proposed criteria."""
+"""Writes the files `evaluate` is asked for: report, PDF, JUnit XML, tables, criteria."""
 
 import sys
 from dataclasses import dataclass

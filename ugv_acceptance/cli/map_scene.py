@@ -1,4 +1,4 @@
-"""What the options of the verb map mean: axes, posture, gravity, limits, levels."""
+"""What the options of `map` mean: axes, posture, gravity, limits, levels."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""What stands behind --ros-args is handed to ROS: remaps, parameters, log levels."""
+"""Options that several verbs share, and what stands behind --ros-args."""
 
 import typer
 

@@ -1,4 +1,4 @@
-"""What the verbs write: each kind of file with its endings, and by what one of ours is known."""
+"""The kinds of files the verbs write: endings, and how one of ours is recognised."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The door that everything a verb writes goes through: nothing is lost that somebody may need.
+"""Guards every output: no input, no other output and no file of others is replaced.
 
 An output is never an input of the same command, nor another output of it, by whatever name or
 link. What is there already stays, unless it is a file of the same kind that this program wrote, or

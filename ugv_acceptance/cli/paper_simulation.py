@@ -1,4 +1,4 @@
-"""What the paper used ADAMS for: the arm's sweep and the tipping robot, by MuJoCo."""
+"""The simulations of `paper` in MuJoCo: the arm's sweep, and robots that tip or not."""
 
 import math
 

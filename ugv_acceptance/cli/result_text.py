@@ -1,4 +1,4 @@
-"""A result as a person reads it in ten seconds: the verdict, why, and the worst of each margin."""
+"""A result as text in a terminal: the verdict, why, and the worst of each margin."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""What the options of the verb risk mean: what varies and how, a phase at a time."""
+"""What the options of `risk` mean: what varies and how; its results as text and document."""
 
 import json
 import math

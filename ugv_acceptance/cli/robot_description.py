@@ -1,4 +1,4 @@
-"""A robot and one of its postures as plain values: what `ugv-acceptance model` shows.
+"""A robot in one posture as plain values: what `ugv-acceptance model` shows.
 
 Keys end in their unit; an infinite number (no limit, no edge on that side) and NaN are None.
 """

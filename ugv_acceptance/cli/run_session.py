@@ -1,4 +1,4 @@
-"""The parts of `run`: a robot, a monitor, the runner between them, and the folder of the run."""
+"""Sets `run` up: robot, monitor, runner, the folder of the run, and what is said meanwhile."""
 
 import fcntl
 import math

@@ -1,4 +1,4 @@
-"""How a verb ends when it is told to, by Ctrl-C (SIGINT) or SIGTERM.
+"""How a verb ends on Ctrl-C (SIGINT) or SIGTERM, and with which exit code.
 
 What runs until then ends in order, with 0. What was to bring a result and has none ends at once,
 with 128 and the signal's number, as a shell tells of it: neither a pass nor a fail.

@@ -1,4 +1,4 @@
-"""A checked file and a URDF to the settings of an evaluation; names and kinds are compared here."""
+"""Turns a checked YAML file and a URDF into the settings of an evaluation."""
 
 import math
 from collections.abc import Iterable, Sequence

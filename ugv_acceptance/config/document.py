@@ -1,4 +1,4 @@
-"""YAML text to plain values and the line of every key, so that an error names file and line."""
+"""Reads YAML with the line of every key, so that an error names file and line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

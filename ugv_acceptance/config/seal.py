@@ -1,4 +1,4 @@
-"""The last line of a file that is made to be edited: it tells whether somebody has edited it."""
+"""A last line with a hash, which tells whether somebody edited a plan or criteria."""
 
 import hashlib
 

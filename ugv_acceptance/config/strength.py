@@ -1,4 +1,4 @@
-"""The worst posture of each joint, to ask whether its limit holds the weight.
+"""The worst posture of each joint, in which its limit has to hold the arm's own weight.
 
 A search, so the torque found is a lower bound on the worst one; for an arm whose pitch axes are
 parallel it is exact, because all right angles are among the postures tried.

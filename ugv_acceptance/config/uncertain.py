@@ -1,4 +1,4 @@
-"""The keys of `uncertainty:` in a robot's file, such as arm_link_1.mass_kg, to what they move."""
+"""Reads the section `uncertainty:` of a robot file: which number is off by how much."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches

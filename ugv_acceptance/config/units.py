@@ -1,4 +1,4 @@
-"""Quantities people write: keys that end in a unit, texts with a unit; SI out."""
+"""Reads quantities with units, such as "30 deg" or a key that ends in _kg, into SI."""
 
 import math
 import re

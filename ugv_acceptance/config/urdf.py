@@ -1,4 +1,4 @@
-"""A minimal URDF reader: links, masses, joints and limits of any tree; pictures are ignored.
+"""Reads a URDF: links, masses, joints and limits of any tree; visuals are ignored.
 
 Read over defusedxml: no entities, no external files.
 """

@@ -1,4 +1,4 @@
-"""The monitor's alerts as a console hears them: changes in, what is active or unseen out.
+"""The alerts a console has heard of: which are active, which nobody has seen yet.
 
 Who joins late misses what was said before: `also` adds what a console itself sees to be active.
 """

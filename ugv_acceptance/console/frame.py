@@ -1,4 +1,4 @@
-"""A snapshot as a frame of plain JSON: the same for the live robot and for a recording.
+"""A snapshot as one frame of JSON for the page and the terminal, live or recorded.
 
 Degrees at this edge, in names ending `_deg`. What is not a finite number is null: a page must say
 that it does not know. `describe_robot` is what does not change from frame to frame.

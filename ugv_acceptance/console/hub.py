@@ -1,4 +1,4 @@
-"""One feed, many clients: a frame is made once; who is slow gets the newest that he can take."""
+"""Sends one feed to many clients: each frame is made once, slow clients skip some."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""What a console makes of what it hears: the newest of many messages, silence, the monitor's hints.
+"""The newest message of each input, and whether the monitor is silent.
 
 A picture needs no more than the newest message of each kind before it; the others are the monitor's
 business, which judges every one.

@@ -1,4 +1,4 @@
-"""The console where there is no terminal, such as in a log: a line where something changes."""
+"""The console as plain lines where there is no terminal: one where something changes."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A recording as a console's feed: judged once, then played, paused and searched."""
+"""A recording as a feed of the console: judged once, then played, paused and searched."""
 
 import math
 import time

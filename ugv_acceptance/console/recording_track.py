@@ -1,4 +1,4 @@
-"""A recording's margins at the rate of a picture: a row each 50 ms, and its worst by stretches."""
+"""A recording's margins thinned for pictures: a row each 50 ms, and the worst of each part."""
 
 import math
 from dataclasses import dataclass, field

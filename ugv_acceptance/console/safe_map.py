@@ -1,4 +1,4 @@
-"""The safe map of two joints: where the robot could bring them, all else as it is now."""
+"""The map of two joints: where the arm may go, all else as it is now."""
 
 import math
 from dataclasses import dataclass

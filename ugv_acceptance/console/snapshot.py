@@ -1,4 +1,4 @@
-"""What a console shows of one moment, whoever knows it: the live robot or a recording."""
+"""What a console knows of one moment, and what every source of snapshots offers."""
 
 import math
 from dataclasses import dataclass

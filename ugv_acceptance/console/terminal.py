@@ -1,4 +1,4 @@
-"""The console in a terminal, over SSH: the same frames in the same words, drawn by Textual."""
+"""The console in a terminal, drawn by Textual from the same frames as the page."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar

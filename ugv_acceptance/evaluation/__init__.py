@@ -1,1 +1,1 @@
-"""From samples to margins, alerts and a verdict; time comes in with the sample."""
+"""From messages to margins, alerts and a verdict, live and recorded by the same rules."""

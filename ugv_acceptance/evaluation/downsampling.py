@@ -1,4 +1,4 @@
-"""Samples of a run at even times, never more than memory has room for, however long the run is."""
+"""Thins a run to a bounded number of samples or columns, however long it is."""
 
 from dataclasses import dataclass, field
 

@@ -1,17 +1,17 @@
-"""The evaluation of a live robot: each message gives the margins of the newest pair at once."""
+"""Evaluates a running robot: each message gives the margins of the newest pair at once."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ugv_acceptance.evaluation.alerts.rules import InputSignals, Watch
+from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
@@ -43,27 +43,27 @@ class LiveEvaluator:
     """
 
     settings: Settings
-    watch: Watch = field(init=False)
+    watch: RuleSet = field(init=False)
     payload: Payload = field(init=False)
     margins: Margins | None = None
     evaluated: int = 0
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
-    _fresh: tuple[Freshness, Freshness] = field(init=False)
+    _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
     _stance: Stance | None = None
     _gravity: Vector = NOWHERE
     _began: int | None = None
 
     def __post_init__(self) -> None:
-        self.watch = Watch(self.settings)
+        self.watch = RuleSet(self.settings)
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
-        self._joints = JointMerger(self.settings, self.watch.leaps)
+        self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
         delays = self.settings.delays
-        self._fresh = (Freshness(delays), Freshness(delays))
+        self._fresh = (InputTimeout(delays), InputTimeout(delays))
 
     def start(self, now: int) -> None:
         """Say when listening began: an input that never comes is stale from then on."""
@@ -145,7 +145,7 @@ class LiveEvaluator:
         if settings.robot.payload != self.settings.robot.payload:
             self.payload = settings.robot.payload
         self.settings = self.watch.settings = self._imu.settings = settings
-        for signal, other in zip(self.watch.signals(), Watch(settings).signals(), strict=True):
+        for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
         for fresh in self._fresh:
             fresh.judge_by(settings.delays)
@@ -158,7 +158,7 @@ class LiveEvaluator:
                 signals.stale.set(due, 1.0)
         self.watch.relax(now if self._began is None else self._began)
         self._began = None
-        self.watch.foresee()
+        self.watch.predict()
         for signal in self.watch.signals():
             signal.advance(now)
         if not self._alive(now):
@@ -213,9 +213,9 @@ class LiveEvaluator:
         q = tuple(self._joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)
         self.evaluated += 1
-        foresight = self.watch.foresight
-        if now >= foresight.due:
-            foresight.keep(now, stability.angle, torque, self._joints.effort, q)
+        prediction = self.watch.prediction
+        if now >= prediction.due:
+            prediction.keep(now, stability.angle, torque, self._joints.effort, q)
         return self.margins
 
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:

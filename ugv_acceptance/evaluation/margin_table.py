@@ -1,4 +1,4 @@
-"""Margins of a stretch of a recording: what every sink, a summary, a file or a criterion, takes."""
+"""The margins of a part of a recording as columns: what everyone who goes on takes."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What limits, delays and thresholds may be, and which of them are wider: one table for all.
+"""The ranges of limits, delays and thresholds, and which of them are relaxed.
 
 A value outside its range would disarm a rule: it is refused, in a file and as a parameter alike,
 unless a reason is given (`unsafe_limits`). Then it is taken, and told as long as it is in force.

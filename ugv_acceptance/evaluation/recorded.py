@@ -1,4 +1,4 @@
-"""The evaluation of a recording: batches of columns in, margins out, by the same rules as live."""
+"""Evaluates a recording: batches of columns in, margins out, by the same rules as live."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts.rules import InputSignals, Watch
+from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import feed
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -56,22 +56,22 @@ class RecordedEvaluator:
 
     settings: Settings
     detail: bool = False
-    watch: Watch = field(init=False)
+    watch: RuleSet = field(init=False)
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
-    fresh: tuple[Freshness, Freshness] = field(init=False)
+    fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
     gaps: tuple[list[Gap], list[Gap]] = field(default_factory=lambda: ([], []))
 
     def __post_init__(self) -> None:
-        self.watch = Watch(self.settings)
+        self.watch = RuleSet(self.settings)
         robot = self.settings.robot
         self._mechanics = mechanics_of(robot)
-        self._joints = JointMerger(self.settings, self.watch.leaps)
+        self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self.fresh = (Freshness(self.settings.delays), Freshness(self.settings.delays))
+        self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
@@ -204,8 +204,8 @@ class RecordedEvaluator:
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
         gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
         with np.errstate(over='ignore', invalid='ignore'):
-            for line, lever in zip(table, posture.levers, strict=False):
-                line[rows] = _product(lever, j, gravity)
+            for line, torque_gradient in zip(table, posture.torque_gradients, strict=False):
+                line[rows] = _product(torque_gradient, j, gravity)
         for some, stance in self._stances(posture, len(q), j):
             found = self._stability(stance, pick(gravity, some))
             place = some if isinstance(rows, slice) else rows[some]
@@ -255,12 +255,12 @@ class RecordedEvaluator:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
             feed(self.watch.slide, time, slides_first(tuple(gravity.T), least, friction))
-        self.watch.foresee_rows(rows)
+        self.watch.predict_rows(rows)
 
 
-def _product(lever: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401
+def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401
     """Return lever . gravity where the lever's numbers are floats or arrays of joint rows."""
-    x, y, z = pick(lever, rows)
+    x, y, z = pick(torque_gradient, rows)
     product: Floats = x * gravity[0] + y * gravity[1] + z * gravity[2]
     return product
 

@@ -1,4 +1,4 @@
-"""What both roads, DDS and bag, turn messages into: columns of numbers, no message objects.
+"""Columns of messages: what both DDS and recordings are decoded into.
 
 All arrays have one row a message, in the order in which the messages were received.
 `log_time` is when the message was received (live: the node's clock; bag: the recorded log time),

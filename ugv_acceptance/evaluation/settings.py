@@ -1,4 +1,4 @@
-"""What an evaluation is told: how messages map to the robot, limits, and alert delays.
+"""Settings of an evaluation: joints in messages, IMU, limits, delays of alerts.
 
 Joint order is `robot.joint_names`. SI and radians; times in seconds. `config` makes these from a
 YAML file and checks them; nothing here checks again.

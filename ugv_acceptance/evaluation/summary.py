@@ -1,4 +1,4 @@
-"""What a recording came to: worst margins, time in violation, coverage and alerts."""
+"""Summary of a recording: worst margins, time in violation, coverage, alerts and their rate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields

@@ -1,1 +1,1 @@
-"""The physics: functions of arrays and one frozen Robot; SI, radians; no clock, file or logger."""
+"""The physics: functions of arrays and one frozen Robot; SI and radians, no I/O."""

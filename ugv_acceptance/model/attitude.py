@@ -1,4 +1,4 @@
-"""Where up is: from an orientation or from an accelerometer; on components, floats or arrays.
+"""The direction of gravity from an orientation or from an accelerometer.
 
 `mounting` turns sensor axes into `base_link`. `up` is the unit vector against gravity in
 `base_link`; level ground gives (0, 0, 1) (REP-103, REP-145). Where nothing can be said, a vector of

@@ -1,4 +1,4 @@
-"""Run a function of columns over the leading axes of arrays, in cache-sized blocks."""
+"""Runs a function of columns over arrays in blocks that fit the processor cache."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""Scalars that are numbers or symbols, and small vectors of them: what formulas are written on.
+"""Scalars and small vectors that are numbers or symbols, on which formulas are written.
 
 A formula is an ordinary function of scalars (`x * y + sin(z)`). Run with floats it gives floats;
 run with symbols it records itself, and `kernels.compile_kernel` turns the record into code. On the

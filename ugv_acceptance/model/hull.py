@@ -1,4 +1,4 @@
-"""Convex hulls of a few points: seen from above, and from below the face under a place.
+"""Convex hulls of a few points, in the plane and in space.
 
 Samples of a recording are many, the ways in which their points form hulls few: what is found for
 one sample is taken by all others it fits.

@@ -1,4 +1,4 @@
-"""Formulas specialised to one robot and compiled: the same code for floats and for arrays.
+"""Compiles formulas for one robot: the same code for floats and for arrays.
 
 `compile_kernel` runs a formula once with symbols, shares what is computed twice and emits
 straight-line code. It runs on Python floats for a live sample and on cache-sized blocks of arrays

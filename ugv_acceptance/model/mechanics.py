@@ -1,4 +1,4 @@
-"""One robot's formulas, compiled: posture (what depends on joints and payload) and joint forces.
+"""One robot's compiled formulas: what a posture determines, and the joint forces.
 
 Static torque is linear in gravity, so a posture holds each joint's lever: a sample that only brings
 a new attitude costs three products a joint.
@@ -13,8 +13,8 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
 from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
-from ugv_acceptance.model.levers import PointLoad, carried_by, in_base, steps_of
 from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.torque_gradients import PointLoad, carried_by, in_base, steps_of
 from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
 
 Triple = tuple[Number, Number, Number]
@@ -29,7 +29,7 @@ class Posture:
     contact points (m, `base_link`).
     """
 
-    levers: tuple[Triple, ...]
+    torque_gradients: tuple[Triple, ...]
     mass: Number
     cog: Triple
     contacts: tuple[Triple, ...]
@@ -88,10 +88,17 @@ def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]
             body, point = in_body(tree, robot.payload_link, (at[0], at[1], at[2]))
             loads = [PointLoad(body, mass, point)]
         carried = carried_by(tree, steps, loads)
-        levers = tuple(carried.levers[order.index(j)] for j in range(len(order)))
+        torque_gradients = tuple(
+            carried.torque_gradients[order.index(j)] for j in range(len(order))
+        )
         cog = scale(carried.moment, 1.0 / carried.mass)
         feet = [in_body(tree, c.link, c.position) for c in robot.contacts]
-        return levers, carried.mass, cog, tuple(in_base(tree, steps, *foot) for foot in feet)
+        return (
+            torque_gradients,
+            carried.mass,
+            cog,
+            tuple(in_base(tree, steps, *foot) for foot in feet),
+        )
 
     return formula
 
@@ -100,9 +107,9 @@ def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]
     posture = _posture_formula(robot, tree)
 
     def formula(*inputs: Scalar) -> tuple[Any, ...]:
-        levers, *rest = posture(*inputs[:-3])
+        torque_gradients, *rest = posture(*inputs[:-3])
         gravity: Vec = (inputs[-3], inputs[-2], inputs[-1])
-        return tuple(dot(gravity, lever) for lever in levers), *rest
+        return tuple(dot(gravity, torque_gradient) for torque_gradient in torque_gradients), *rest
 
     return formula
 

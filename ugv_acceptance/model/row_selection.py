@@ -1,4 +1,4 @@
-"""Rows of columns: samples that go together are picked, worked on and put back."""
+"""Picks rows of columns that go together, works on them and puts them back."""
 
 from collections.abc import Iterator
 from typing import Any, TypeAlias

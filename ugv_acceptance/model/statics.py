@@ -18,7 +18,7 @@ from ugv_acceptance.type_aliases import Floats
 def torque_of(posture: Posture, gravity: tuple[Number, Number, Number]) -> tuple[Number, ...]:
     """Return each joint's static torque (N m; N where prismatic) under `gravity` (m/s2)."""
     gx, gy, gz = gravity
-    return tuple([x * gx + y * gy + z * gz for x, y, z in posture.levers])
+    return tuple([x * gx + y * gy + z * gz for x, y, z in posture.torque_gradients])
 
 
 def static_torque(

@@ -1,4 +1,4 @@
-"""The moving bodies of a robot, and their positions, motions and joint forces: one recursion.
+"""The moving bodies of a robot: their poses, motions and joint forces by one recursion.
 
 Fixed and held joints are lumped. Every body's axes are parallel to `base_link` when all joints are
 at zero, so a constant rotation between joints never appears. Forces come from the recursive

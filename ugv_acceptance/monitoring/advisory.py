@@ -1,4 +1,4 @@
-"""What to do and what comes next, worked out for the verdict: never on the way of a message.
+"""Works out advice and predictions beside the messages, for the next verdict.
 
 Advice takes some hundredths of a second, so a thread works it out while messages are taken.
 """
@@ -15,7 +15,7 @@ from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.faults import what_to_do
-from ugv_acceptance.monitoring.trends import Ahead, Outlook
+from ugv_acceptance.monitoring.trends import Ahead, Trends
 
 # How old (ns) computed advice may be.
 FRESH = 250_000_000
@@ -26,11 +26,11 @@ URGENT, AGAIN = 2.0, 1_000_000_000
 
 
 @dataclass(slots=True)
-class Counsel:
+class Advisory:
     """The advice of one session; `advice` is the newest, best first; `on_problem` for the log."""
 
     evaluator: LiveEvaluator
-    outlook: Outlook
+    trends: Trends
     on_problem: Callable[[str], None]
     advice: tuple[Advice, ...] = ()
     estimate: PayloadEstimate | None = None
@@ -94,7 +94,7 @@ class Counsel:
 
     def ahead(self, now: int) -> tuple[Ahead, ...]:
         """Return the margins that are used up soon."""
-        return self.outlook.ahead(now) if self.evaluator.margins is not None else ()
+        return self.trends.ahead(now) if self.evaluator.margins is not None else ()
 
     def urgent(self, now: int) -> bool:
         """Return whether a margin is used up so soon that it must be said before the next second.
@@ -115,7 +115,7 @@ class Counsel:
         for ahead in reversed(self.ahead(now)):
             kind = 'tip' if ahead.subject in SIDES else 'saturation'
             values |= {f'{kind}_in_s': round(ahead.seconds, 2), f'{kind}_of': ahead.subject}
-        for miss in self.outlook.near_misses():
+        for miss in self.trends.near_misses():
             tilt = miss.subject in SIDES
             left = math.degrees(miss.left) if tilt else miss.left
             name = 'near_miss_tilt_deg' if tilt else 'near_miss_torque'

@@ -1,4 +1,4 @@
-"""Which alerts were raised or cleared since the last look, at the cost of two comparisons."""
+"""Changes of alerts since the last poll: raised, cleared, acknowledged."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ KEPT = 1000
 
 
 @dataclass(slots=True)
-class Follower:
+class AlarmTracker:
     """Reads a log that grows at its end and whose alerts are closed in place; keeps it short.
 
     `open` are the alerts seen and not closed yet, `alarms` what people have seen of them.

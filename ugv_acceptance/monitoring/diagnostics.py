@@ -1,4 +1,4 @@
-"""What the monitor says: verdict and diagnostics as plain values, ready to be published."""
+"""Verdict and diagnostics of the monitor as plain values, ready to be published."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -51,26 +51,26 @@ def what_is_left(margins: Margins, settings: Settings) -> str:
 
 def verdict_of(session: Session) -> Status:
     """Return the one line an operator reads: the most severe cause, what is left, what to do."""
-    follower, now = session.follower, session.clock.now()
+    alarm_tracker, now = session.alarm_tracker, session.clock.now()
     margins, active = session.evaluator.margins, session.active
-    session.counsel.renew(now, active)
+    session.advisory.renew(now, active)
     left = what_is_left(margins, session.settings) if margins else 'margins not known'
-    unseen = sum(alarm.state.unseen for alarm in follower.alarms.table.values())
+    unseen = sum(alarm.state.unseen for alarm in alarm_tracker.alarms.table.values())
     values: dict[str, object] = {
         'left': left,
         'alerts_active': len(active),
         'alerts_unacknowledged': unseen,
         **_limits(session),
     }
-    known = session.counsel.values(now)
-    left = '; '.join([left, *session.counsel.hints(now)])
+    known = session.advisory.values(now)
+    left = '; '.join([left, *session.advisory.hints(now)])
     if active:
         return _worst(session, active, left, values | known)
     if margins is None:
         text = 'waiting for joint_states and imu: no margins yet'
         return Status(STALE, '', text, values | known)
-    if follower.waiting:
-        return _over(session, follower.waiting[-1], left, values | known)
+    if alarm_tracker.waiting:
+        return _over(session, alarm_tracker.waiting[-1], left, values | known)
     return Status(OK, '', f'all margins kept: {left}', values | known)
 
 
@@ -78,18 +78,18 @@ def _worst(
     session: Session, active: Sequence[Alert], left: str, values: dict[str, object]
 ) -> Status:
     """Return the verdict while alerts are active: the most severe one speaks."""
-    follower, counsel = session.follower, session.counsel
-    first = max(active, key=lambda a: (*_severity(a), not follower.acknowledged(a)))
+    alarm_tracker, advisory = session.alarm_tracker, session.advisory
+    first = max(active, key=lambda a: (*_severity(a), not alarm_tracker.acknowledged(a)))
     words = relaxed_words(session.settings)
     if words and first.rule.code != 'LIMITS_RELAXED':  # else it says so itself
         left = f'{left}; {words}'
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
-    do = counsel.do(first)
+    do = advisory.do(first)
     text = f'{session.faults.sentence(_now(first, session), session.settings)}{more}; {left}; {do}'
     own = {
         **_named(first),
         'do': do,
-        'acknowledged': all(map(follower.acknowledged, active)),
+        'acknowledged': all(map(alarm_tracker.acknowledged, active)),
     }
     return Status(session.level, '', text, own | values)
 
@@ -140,7 +140,7 @@ def _severity(alert: Alert) -> tuple[int, bool]:
 def alert_status(change: Change, session: Session) -> Status:
     """Return a change of an alert, ready to be published."""
     alert, rule = change.alert, change.alert.rule
-    shelved = session.follower.alarms.shelved(key_of(rule))
+    shelved = session.alarm_tracker.alarms.shelved(key_of(rule))
     values: dict[str, object] = {
         'state': change.how,
         'code': rule.code,
@@ -149,7 +149,7 @@ def alert_status(change: Change, session: Session) -> Status:
         'start_ns': alert.start,
         'end_ns': '' if alert.end is None else alert.end,
         'peak': float(alert.peak),
-        'do': session.counsel.do(alert),
+        'do': session.advisory.do(alert),
         'class': suspect_of(rule.code),
         'alarm': change.state.value,
         'offers': ','.join(_offers(change, shelved=shelved)),

@@ -1,4 +1,4 @@
-"""A robot in its posture as points to draw: limbs, body, support polygon, centre of gravity."""
+"""The robot as points and shapes to draw: limbs, support polygon, centre of gravity."""
 
 import math
 from collections.abc import Sequence

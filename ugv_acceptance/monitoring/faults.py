@@ -1,4 +1,4 @@
-"""Faults that only the live node can see: foreign publishers, QoS, messages that cannot be decoded.
+"""Faults only a live node sees: foreign publishers, QoS, messages that cannot be decoded.
 
 They are alerts like those of the evaluation and are written to the same log.
 """

@@ -1,4 +1,4 @@
-"""Who really speaks on an input: a driver that came back, or two at once under one name.
+"""Tells a driver that was restarted from two drivers under one name.
 
 DDS keeps a process that was killed, with its publishers, for 20 s, so a driver that was started
 again is known twice. Each publisher numbers its messages: a voice that speaks again after another

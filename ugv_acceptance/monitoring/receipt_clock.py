@@ -1,4 +1,4 @@
-"""When a message was received: a clock that never jumps, so that staleness is not disturbed.
+"""The monotonic clock that dates the receipt of messages; setting the time moves it not.
 
 The steady clock is set by the wall clock once, at activation (and on reset). A wall clock that is
 set later, a `/clock` that freezes or runs at another speed: none of them ages an input. Header

@@ -1,4 +1,4 @@
-"""What lives from activation to deactivation: raw messages in, margins and alerts out. No ROS here.
+"""One monitoring session: serialised messages in, margins and alerts out, no ROS.
 
 The three `take_*` are the hot path. Bytes are decoded by the decoder that reads bags, so no message
 object is made; whatever they hold, the worst that happens is that they are counted as malformed.
@@ -17,11 +17,11 @@ from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import limits_hash
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.monitoring.advisory import Counsel
-from ugv_acceptance.monitoring.alarm_tracker import Follower
+from ugv_acceptance.monitoring.advisory import Advisory
+from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
 from ugv_acceptance.monitoring.faults import Faults
 from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
-from ugv_acceptance.monitoring.trends import Outlook
+from ugv_acceptance.monitoring.trends import Trends
 
 # What the evaluator takes of a sample behind its time and stamp.
 JOINT_FIELDS = attrgetter('names', 'position', 'velocity', 'effort')
@@ -81,13 +81,13 @@ class Session:
     clock: ReceiptClock = field(default_factory=ReceiptClock)
     evaluator: LiveEvaluator = field(init=False)
     faults: Faults = field(init=False)
-    follower: Follower = field(init=False)
+    alarm_tracker: AlarmTracker = field(init=False)
     counts: dict[str, InputCount] = field(init=False)
     take_joint_state: Callable[[bytes], None] = field(init=False)
     take_imu: Callable[[bytes], None] = field(init=False)
     take_payload: Callable[[bytes], None] = field(init=False)
-    outlook: Outlook = field(init=False)
-    counsel: Counsel = field(init=False)
+    trends: Trends = field(init=False)
+    advisory: Advisory = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
     limits_hash: str = field(init=False)
     _known: bool = False
@@ -96,9 +96,9 @@ class Session:
         self.evaluator = LiveEvaluator(self.settings)
         self.limits_hash = limits_hash(self.settings)
         log = self.evaluator.watch.log
-        self.faults, self.follower = Faults(log), Follower(log)
-        self.outlook = Outlook(self.settings)
-        self.counsel = Counsel(self.evaluator, self.outlook, self.on_problem)
+        self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
+        self.trends = Trends(self.settings)
+        self.advisory = Advisory(self.evaluator, self.trends, self.on_problem)
         self.counts = {name: InputCount() for name in INPUTS}
         self.evaluator.start(self.clock.now())
         decode, evaluator = joint_state_decoder().one, self.evaluator
@@ -127,8 +127,8 @@ class Session:
 
     def feel(self) -> None:
         """Look whether the motors feel the declared load; to be called once a second."""
-        self.counsel.feel()
-        now, found = self.clock.now(), self.counsel.estimate
+        self.advisory.feel()
+        now, found = self.clock.now(), self.advisory.estimate
         if found is None:
             self.faults.clear(now, 'PAYLOAD_DIFFERS', 'payload')
         else:
@@ -143,14 +143,14 @@ class Session:
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; what was learnt and is active stays."""
-        self.settings = self.outlook.settings = settings
+        self.settings = self.trends.settings = settings
         self.limits_hash = limits_hash(settings)
         self.evaluator.adopt(settings)
         self.tick()
 
     def _look(self) -> None:
         known = self.evaluator.margins is not None
-        if known is not self._known or self.follower.changed():
+        if known is not self._known or self.alarm_tracker.changed():
             self._known = known
             self.on_change()
 
@@ -162,8 +162,8 @@ class Session:
         evaluate: Callable[..., Margins | None],
     ) -> Callable[[bytes], None]:
         """Return the way of a message: decoded, and these fields of the sample evaluated."""
-        clock, count, follower = self.clock, self.counts[name], self.follower
-        see = self.outlook.see
+        clock, count, alarm_tracker = self.clock, self.counts[name], self.alarm_tracker
+        see = self.trends.see
 
         def take(data: bytes) -> None:
             now = time.monotonic_ns() + clock.offset
@@ -176,7 +176,7 @@ class Session:
             if margins is not None:
                 see(margins)
                 self.on_margins(stamp, margins)
-            if (margins is not None) is not self._known or follower.changed():
+            if (margins is not None) is not self._known or alarm_tracker.changed():
                 self._look()
 
         return take

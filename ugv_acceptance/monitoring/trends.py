@@ -1,4 +1,4 @@
-"""What margins were and where they go: the smallest since the start, and the time that is left.
+"""Least margins since the start, and the time left until a limit.
 
 Fed with every sample at the cost of a few comparisons; what it knows is worked out when asked.
 """
@@ -43,7 +43,7 @@ class Ahead:
 
 
 @dataclass(slots=True)
-class Outlook:
+class Trends:
     """Takes the margins of a running robot."""
 
     settings: Settings

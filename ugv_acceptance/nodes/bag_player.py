@@ -1,4 +1,4 @@
-"""`bag_player`: a node that publishes a recording, byte for byte, with its timing and QoS.
+"""Node `bag_player`: publishes a recording with its timing and QoS.
 
 Header stamps are told anew (stamps.py), so that a monitor does not take them for those of a wrong
 clock; without `restamp` they stay as recorded.

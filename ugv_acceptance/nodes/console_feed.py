@@ -1,4 +1,4 @@
-"""The console's live feed: the monitor's word on the robot, and the inputs it speaks of.
+"""The console's live feed: the monitor's verdict and the inputs it speaks of.
 
 The verdict and the alerts are the monitor's: if it falls silent there are NO DATA. What is drawn is
 computed here from the same inputs by the same code, so that a page costs the monitor nothing. What
@@ -184,7 +184,7 @@ class ConsoleNode(Node):
             self.book.take(values, status.message)
 
     def _take_own(self) -> None:
-        self.session.follower.take()
+        self.session.alarm_tracker.take()
 
     def _complain(self, text: str) -> None:
         self.get_logger().warning(text, throttle_duration_sec=5.0)

@@ -1,4 +1,4 @@
-"""Run a node until it is interrupted: a bounded loop on the events executor, a clean end.
+"""Runs a node on the events executor until it is interrupted, and ends it cleanly.
 
 EventsExecutor hears a signal only when a callback runs, so a timer has one run twice a second. Each
 call of it leaks some bytes: it is called once an hour.

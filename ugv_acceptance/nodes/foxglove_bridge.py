@@ -1,4 +1,4 @@
-"""A live Foxglove WebSocket of the topics around: read only, for programs on this machine only.
+"""Foxglove WebSocket of the live topics: read only, for this machine only.
 
 Messages go through as the bytes they came in, with the text of their types. A topic is subscribed
 while somebody watches it, so that nothing is taken from the robot's network for nobody.

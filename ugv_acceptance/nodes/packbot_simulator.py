@@ -1,4 +1,4 @@
-"""`packbot_simulator`: a simulated robot behind the topics of a real one. docs/plan_and_run.md.
+"""Node `packbot_simulator`: a simulated robot behind the topics of a real one.
 
 It publishes joint_states and imu/data (and /clock when asked) and obeys cmd_vel and
 arm_controller/joint_trajectory. What a person does on a test ground comes on topics of its own:

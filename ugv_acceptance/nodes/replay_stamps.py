@@ -1,4 +1,4 @@
-"""Header stamps of a recording in the time of its replay: near now, as a live monitor wants them.
+"""Moves header stamps of a recording to the time of its replay.
 
 A stamp moves by the time between recording and replay, and advances at the rate of the replay. One
 clock's topics move alike, so what they tell of each other stays. A topic whose stamps are far from

@@ -1,4 +1,4 @@
-"""The runner's ears and its brake: records all, hears the monitor, freezes motion at once.
+"""The world of `run` in ROS: records topics, hears the monitor, commands, stops motion.
 
 What freezes: an alert that the step in hand does not expect, and a monitor that has gone silent.
 It runs on the thread that takes messages, so it does not wait for anything the runner does.

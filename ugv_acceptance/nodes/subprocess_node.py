@@ -1,4 +1,4 @@
-"""A node in a process of its own that ends when its parent does, even one that was killed.
+"""A node in a subprocess that ends with its parent, even one that was killed.
 
 `python -m ugv_acceptance.nodes.subprocess_node packbot_simulator --ros-args ...`; its input is the
 parent's pipe.

@@ -1,4 +1,4 @@
-"""Who saw which alert, and when: from the monitor's alerts topic, where a recording holds it."""
+"""Who acknowledged which alert, and when, from the monitor's alerts in the recording."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the monitor would have said of a recording, as the messages it publishes. No ROS here.
+"""The monitor's messages for a recording, as it would have published them.
 
 Margins are those of the evaluation, alerts those of its judgement; verdict and words come from the
 live monitor's own functions, which are given the recording's moments one after another.
@@ -31,7 +31,7 @@ from ugv_acceptance.monitoring.drawing import (
 )
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.margins import margin_rows
-from ugv_acceptance.offline.replayed_session import Retold, moment_of
+from ugv_acceptance.offline.replayed_session import ReplayedSession, moment_of
 
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -64,7 +64,7 @@ class Annotation:
 
     evaluation: Evaluation
     names: dict[str, str] = field(init=False)
-    _session: Retold = field(init=False)
+    _session: ReplayedSession = field(init=False)
     _figure: Figure = field(init=False)
     _bytes: tuple[JointStateBytes, JointStateBytes] = field(init=False)
     _events: list[tuple[int, int, Alert]] = field(init=False)
@@ -78,7 +78,7 @@ class Annotation:
         log, results = ordered(self._judgement.evaluator.watch.log), self.evaluation.alerts
         told = {moment_of(a): r.advice for a, r in zip(log, results, strict=True)}
         nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
-        self._session = Retold(self.settings, *nothing, told=told)
+        self._session = ReplayedSession(self.settings, *nothing, told=told)
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
@@ -114,7 +114,7 @@ class Annotation:
         yield from self._up_to(self.bag.end_ns + 1)
 
     def _stretch(self, rows: MarginRows) -> Iterator[Said]:
-        payloads, heard = self._judgement.examination.payloads, rows.pairs.joints.time
+        payloads, heard = self._judgement.measurement.payloads, rows.pairs.joints.time
         of, until = rows.pairs.of_joints.tolist(), rows.until.tolist()
         felt = (rows.pairs.joints.qd, rows.pairs.joints.effort)
         measured = list(zip(*(map(tuple, table.tolist()) for table in felt), strict=True))
@@ -154,7 +154,7 @@ class Annotation:
                 yield from self._change(now, *self._events.pop()[1:])
             elif verdict == now:
                 self._due[0] += SECOND
-                self._session.counsel.feel()
+                self._session.advisory.feel()
                 yield from self._verdict(now)
             else:
                 self._due[1] += DRAWING
@@ -169,8 +169,8 @@ class Annotation:
         else:
             mine = self._open.pop(id(alert))
             mine.end, mine.peak = alert.end, alert.peak
-            changes = session.follower.take()
-        session.counsel.renew(now, session.active)
+            changes = session.alarm_tracker.take()
+        session.advisory.renew(now, session.active)
         statuses = [alert_status(change, session) for change in changes]
         yield Said(now, self.names['alerts'], self._array(now, statuses))
         yield from self._verdict(now)

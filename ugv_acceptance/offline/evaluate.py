@@ -1,4 +1,4 @@
-"""Evaluate a recording: read once into margins, alerts and a verdict; the one way for everybody."""
+"""Evaluates a recording: read once into margins, alerts and a verdict, for everybody."""
 
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ from ugv_acceptance.config.criteria import load_criteria
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, default_criteria
-from ugv_acceptance.evaluation.criteria.measurement import Examination
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
@@ -161,27 +161,27 @@ def judge(
     """
     bag, topics = recording.bag, recording.chosen()
     span = bag.start_ns, bag.end_ns
-    limits = Examination(default_criteria(settings), settings, *span)
-    asked = Examination(criteria, settings, *span) if criteria else limits
+    limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
+    asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
     evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
     summary, check = Summary(settings), ModelCheck(settings)
-    examinations = [limits] if asked is limits else [limits, asked]
+    measurements = [limits] if asked is limits else [limits, asked]
     told = AlertAdvice(settings, evaluator.watch.log, limits.payloads.at)
     takers = [
-        summary.add, check.add, told.add, *(e.add for e in examinations), *options.takers
+        summary.add, check.add, told.add, *(e.add for e in measurements), *options.takers
     ]  # fmt: skip
     evaluator.start(bag.start_ns)
     reading = bag.batches(topics, workers=options.readers)
     for batch in _stretches(reading):
-        for examination in examinations:
-            examination.payloads.take(batch.payload)
+        for measurement in measurements:
+            measurement.payloads.take(batch.payload)
         rows = evaluator.batch(batch)
         for take in takers:
             take(rows)
         if len(rows.time):
             options.progress(int(rows.time[-1]))
     evaluator.finish(bag.end_ns)
-    for finish in (summary.finish, *(e.finish for e in examinations)):
+    for finish in (summary.finish, *(e.finish for e in measurements)):
         finish(bag.end_ns)
     log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
     data = {

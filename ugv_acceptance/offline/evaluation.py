@@ -1,4 +1,4 @@
-"""What evaluating a recording gives: verdict, reasons, criteria, alerts and margins, all typed."""
+"""The result of evaluating a recording: verdict, reasons, criteria, alerts, margins."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,7 +14,7 @@ from ugv_acceptance.bag.reader import Topics
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.criteria.measurement import Examination
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import AlertRecord
@@ -61,7 +61,7 @@ class Judgement:
     topics: Topics
     evaluator: RecordedEvaluator
     facts: Facts
-    examination: Examination
+    measurement: CriteriaMeasurement
 
 
 @dataclass(frozen=True, eq=False)

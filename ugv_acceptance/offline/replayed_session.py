@@ -1,4 +1,4 @@
-"""A session that is told what a recording came to, in place of messages: the monitor's own words.
+"""A monitoring session replayed from a recording's judgement, for the monitor's own words.
 
 It holds what `verdict_of` and `alert_status` ask a running session for, at a moment of the past.
 """
@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.monitoring.advisory import Counsel
+from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
 from ugv_acceptance.monitoring.session import Session
 
@@ -32,7 +32,7 @@ class PastClock(ReceiptClock):
 
 
 @dataclass(slots=True)
-class PastCounsel(Counsel):
+class PastAdvisory(Advisory):
     """Advice worked out at once. `told` is that of an alert's moment; `measured` the newest."""
 
     told: Mapping[tuple[int, str, str, int], str] = field(default_factory=dict)
@@ -69,7 +69,7 @@ def moment_of(alert: Alert) -> tuple[int, str, str, int]:
 
 
 @dataclass(slots=True)
-class Retold(Session):
+class ReplayedSession(Session):
     """The session; `told` is what to do about each alert, by `moment_of`."""
 
     told: Mapping[tuple[int, str, str, int], str] = field(default_factory=dict)
@@ -78,12 +78,12 @@ class Retold(Session):
     def __post_init__(self) -> None:
         self.clock = self.past
         Session.__post_init__(self)
-        self.counsel = PastCounsel(self.evaluator, self.outlook, self.on_problem, told=self.told)
+        self.advisory = PastAdvisory(self.evaluator, self.trends, self.on_problem, told=self.told)
 
     @property
     def active(self) -> list[Alert]:
         """The alerts that were active then, the most severe first."""
-        return sorted(self.follower.open, key=lambda alert: -alert.rule.level)
+        return sorted(self.alarm_tracker.open, key=lambda alert: -alert.rule.level)
 
     @property
     def level(self) -> int:
@@ -93,12 +93,12 @@ class Retold(Session):
     def take(self, margins: Margins | None, payload: Payload, measured: Measured) -> None:
         """Take the margins of a message, None: they were not known."""
         self.evaluator.margins, self.evaluator.payload = margins, payload
-        if isinstance(self.counsel, PastCounsel):
-            self.counsel.measured = measured
+        if isinstance(self.advisory, PastAdvisory):
+            self.advisory.measured = measured
         if margins is not None:
-            self.outlook.see(margins)
+            self.trends.see(margins)
 
     def raise_alert(self, alert: Alert) -> list[Change]:
         """Raise an alert, which is closed with `end` set on the same object."""
         self.evaluator.watch.log.append(alert)
-        return self.follower.take()
+        return self.alarm_tracker.take()

@@ -1,1 +1,1 @@
-"""Test plans: what is tested and why, derived from the robot's model, written for people."""
+"""Test plans derived from the robot's model: what is tested and why."""

@@ -1,4 +1,4 @@
-"""Postures on both sides of every boundary of the torque map and the rollover map.
+"""Test postures on both sides of every boundary of the torque and rollover maps.
 
 A boundary is a joint's limit in one direction, or the tilt left towards one side; each has a
 warning, a limit and, for tilt, the tip-over itself.
@@ -9,9 +9,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ugv_acceptance.plan.arm_paths import Routes
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Step
 from ugv_acceptance.plan.search import Arm, Found, Mask, look, spread_out
-from ugv_acceptance.plan.ways import Routes
 from ugv_acceptance.plan.writing import Setup, hold_step
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
@@ -50,7 +50,7 @@ def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iter
                     rows = (share * sign > low) & (share * sign < high) & steady
                     rows &= found.most < high
                     if where == ROBOT:
-                        rows &= routes.ways(level, load).reachable
+                        rows &= routes.paths(level, load).reachable
                     name = joint.removesuffix('_joint')
                     text = f'{name} torque {title}, limit {word} {limit:g} N m'
                     purpose = f'the torque map says "{title}" at {load:g} kg: is it so?'
@@ -93,7 +93,7 @@ def _richest(
     """
     name, turret = side
     arm = routes.arm
-    grid: Floats = routes.ways(('level', 0.0), 0.0, turret).q
+    grid: Floats = routes.paths(('level', 0.0), 0.0, turret).q
     for group in ramps:
         found: list[tuple[int, float, float, Found, Mask]] = []
         for load in loads:
@@ -102,7 +102,7 @@ def _richest(
                 left = np.degrees(seen.tilt)
                 rows = (left > band[0]) & (left < band[1]) & (seen.most < STRONG)
                 if reached:
-                    rows &= routes.ways((name, tilt), load, turret).reachable
+                    rows &= routes.paths((name, tilt), load, turret).reachable
                 if rows.any():
                     found.append((int(rows.sum()), load, tilt, seen, rows))
         if found:

@@ -1,4 +1,4 @@
-"""The operator's card: a printable page a step group, what alerts mean, the safe map."""
+"""The operator's card: a printable page a group of steps, with alerts and the safe map."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

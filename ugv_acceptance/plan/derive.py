@@ -1,4 +1,4 @@
-"""A test plan derived from the model: worst postures, both sides of every boundary, loads, speeds.
+"""Derives a test plan from the model: worst postures, boundaries, loads, speeds.
 
 What would fail is left to the simulation, as the paper proposes; what is run on the robot is
 reached by ways that pass no limit either.
@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ugv_acceptance.config import Config
+from ugv_acceptance.plan.arm_paths import Routes
 from ugv_acceptance.plan.boundaries import tip_boundary, torque_boundary
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
 from ugv_acceptance.plan.order import ordered, seconds_of
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
 from ugv_acceptance.plan.search import Arm, look, roles_of, safe
-from ugv_acceptance.plan.ways import Routes
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
@@ -93,7 +93,7 @@ def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
     found = look(arm, arm.grid, level, load)
     for joint in arm.roles.axes:
         use = np.abs(found.share[:, arm.robot.joint_names.index(joint)])
-        within = safe(arm, found, SPARE) & routes.ways(level, load).reachable
+        within = safe(arm, found, SPARE) & routes.paths(level, load).reachable
         for title, rows in (
             ('worst posture of all', np.ones(len(use), bool)),
             ('worst posture within limits', within),
@@ -113,7 +113,7 @@ def _orientations(routes: Routes, tilt: float, loads: Sequence[float]) -> Iterat
         if name == 'level':
             continue
         found = look(arm, arm.grid, (name, tilt), load)
-        rows = safe(arm, found, SPARE) & routes.ways((name, tilt), load).reachable
+        rows = safe(arm, found, SPARE) & routes.paths((name, tilt), load).reachable
         if not rows.any():
             continue
         k = int(np.where(rows, found.tilt, np.inf).argmin())

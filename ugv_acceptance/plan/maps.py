@@ -1,4 +1,4 @@
-"""The failure map of the robot that a plan is for: tip-over and torque over both arm joints."""
+"""The failure map for a plan: tip-over and torque over both arm joints."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Steps that are more than a posture: what it can lift and pull, speeds, driving, endurance."""
+"""Steps with motion: lifting, pulling, speeds, driving, endurance."""
 
 import math
 from collections.abc import Iterator

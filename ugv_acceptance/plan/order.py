@@ -1,4 +1,4 @@
-"""The order of a plan's steps: few changes of ground and load, then the shortest way of the arm."""
+"""Orders the steps of a plan: few changes of ground and load, short moves of the arm."""
 
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""A test plan as data: steps that a test engineer can read and edit in YAML, and their hash.
+"""A test plan as data: steps that people read and edit in YAML, and its hash.
 
 Angles are in degrees here, as they stand in the file; `radians_of` is where they turn into radians.
 """

@@ -1,4 +1,4 @@
-"""Postures of an arm's two axes and what the model says of each: where steps come from."""
+"""Searches postures of the arm's two axes by what the model says of each."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A small drawing of a step's posture: the robot on its ground, seen from where the arm shows.
+"""A small drawing of a step's posture: the robot on its ground.
 
 Drawn from the model's own points, so the picture cannot differ from the numbers beside it.
 """

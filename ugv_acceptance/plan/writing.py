@@ -1,4 +1,4 @@
-"""The words and numbers of a plan's step: preparation, limits, expected margins and alerts."""
+"""The words and numbers of a step: preparation, limits, expected margins and alerts."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Draw maps a person reads without colour: hatched failure, dotted caution, plain safe areas."""
+"""Draws maps that can be read without colour: hatched, dotted and plain areas."""
 
 import io
 from collections.abc import Callable, Sequence

@@ -1,1 +1,1 @@
-"""Runs without ROS: simulated recordings, steps judged, folders of results, labelled runs."""
+"""A test plan carried out: simulated or live, recorded and judged step by step; no ROS."""

@@ -1,4 +1,4 @@
-"""Who moves the robot and sets it up: a simulator, an arm controller, or a person. One table."""
+"""What moves the robot and sets it up: a simulator, an arm controller, or a person."""
 
 import math
 from collections.abc import Callable, Mapping

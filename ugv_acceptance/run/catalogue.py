@@ -1,4 +1,4 @@
-"""The runs `simulate` knows by name: fixed ones, seeded random ones, and one for every fault."""
+"""The runs `simulate` knows by name: fixed, random with a seed, and one for every fault."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""How a fault of the simulated robot is written on a command line.
+"""Reads the faults of a simulated robot as they are written on a command line.
 
 A fault is written KIND[:SUBJECT][=AMOUNT][@START[-END]]: frozen-encoder:shoulder_joint@5-9,
 imu-bias=2, dropped:imu=0.3, wrong-mounting=30deg. Times in seconds; without them it lasts the

@@ -1,4 +1,4 @@
-"""The folder of a run: what is done already, one recording and one result a step, the report.
+"""The folder of a run: which steps are done, a recording and a result a step, the report.
 
     plan.yaml  run.json  journal.jsonl  result.json  report.txt  report.html
     steps/ID/{ID_0.mcap,metadata.yaml}  steps/ID.json

@@ -1,4 +1,4 @@
-"""A simulated run as the messages a driver would publish, faults of the sensors included."""
+"""A simulated run as the messages a driver would publish, faults of sensors included."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Motions that are waited for by the robot's own messages, not by a clock on the wall.
+"""Moves the arm and waits for it by the robot's own messages.
 
 On a slow machine a motion goes on while the arm still comes closer, and a hold lasts while joint
 states keep coming.

@@ -1,4 +1,4 @@
-"""A simulated run recorded as a rosbag2 folder, stretch by stretch, with checksums."""
+"""Records a simulated run as a rosbag2 folder."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""A run's report: what each step came to, and what part of the failure map the run has seen."""
+"""The report of a run: outcomes of its steps, and how much of the failure map it visited."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A plan done step by step: set up, move, hold, record; judged from the recording.
+"""Runs a plan step by step: set up, move, hold, record; judged from the recording.
 
 A step's recording begins before its set-up and ends after what it is for: all that moves is in it.
 """
@@ -12,9 +12,9 @@ import numpy as np
 
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config
+from ugv_acceptance.plan.arm_paths import safe_path
 from ugv_acceptance.plan.plan import SIMULATION, Step, vector_of
 from ugv_acceptance.plan.search import Arm, roles_of
-from ugv_acceptance.plan.ways import safe_way
 from ugv_acceptance.run.actuation import SIM, Hands
 from ugv_acceptance.run.folder import RunFolder
 from ugv_acceptance.run.motions import REFUSED, Moves, holds
@@ -157,16 +157,16 @@ class Runner:
     def _go_home(self) -> str:
         """Go home straight where that is safe, else the way the arm came; return what is wrong."""
         self.brake.arm(ALWAYS)
-        home, ways = self.folder.plan.home_deg, self.moves.trail[-2::-1]
+        home, paths = self.folder.plan.home_deg, self.moves.trail[-2::-1]
         robot = self.config.settings.robot
         if self.moves.trail and self._setup:
             arm = Arm(self.config.settings, roles_of(self.config.settings))
             straight = [np.array(vector_of(robot, home, p)) for p in (self.moves.trail[-1], home)]
             ground, load = self._setup
             slope = ground.orientation, math.radians(ground.tilt_deg)
-            if safe_way(arm, straight, slope, load):
-                ways = []
-        for posture in (*ways, home):
+            if safe_path(arm, straight, slope, load):
+                paths = []
+        for posture in (*paths, home):
             if wrong := self.moves.go(posture, HOME_SPEED):
                 return wrong
         self.moves.trail = []

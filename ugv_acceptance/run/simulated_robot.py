@@ -1,4 +1,4 @@
-"""A simulated robot that publishes and obeys as a real one does; no clock, no ROS of its own."""
+"""A simulated robot that publishes and obeys as a real one does; no clock, no ROS."""
 
 import heapq
 import math

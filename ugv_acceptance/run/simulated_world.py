@@ -1,4 +1,4 @@
-"""A run without ROS and as fast as it goes: robot, monitor's evaluation and recording in one place.
+"""The world of `run` without ROS, as fast as it goes: robot, evaluation and recording.
 
 Nothing here depends on the speed of the machine: the same seed gives the same recordings, bit for
 bit, and the same verdicts. What is judged, and by what, is the same as over ROS.

@@ -1,4 +1,4 @@
-"""A step of a plan judged by the recording made while it was done."""
+"""Judges a step of a plan by the recording made of it."""
 
 import math
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""What a runner needs of the world it works in: messages heard, time that passes, a brake."""
+"""What a runner needs of its world: messages heard, time that passes, stopping motion."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,1 +1,1 @@
-"""A MuJoCo vehicle made from the robot description (no ROS)."""
+"""The robot in MuJoCo, made from its description; no ROS."""

@@ -1,4 +1,4 @@
-"""What faults make of a robot, of what its sensors say, and of how messages arrive.
+"""Applies faults to a robot, to its sensors' readings and to how messages arrive.
 
 The functions of logs take any number of rows, so a live simulator hands in one row at a time.
 """

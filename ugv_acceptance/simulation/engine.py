@@ -1,4 +1,4 @@
-"""MuJoCo, an extra: who simulates imports it from here, or is told how to get it."""
+"""Imports MuJoCo, or says how to install it."""
 
 from ugv_acceptance import AcceptanceError, pip_install
 

@@ -1,4 +1,4 @@
-"""Faults a run can be given: their names, and what they do."""
+"""The faults a simulated run can have: names, effects, how they are written."""
 
 import math
 from dataclasses import dataclass

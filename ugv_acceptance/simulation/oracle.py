@@ -1,4 +1,4 @@
-"""Does it tip? The answer of a simulated robot on a slowly tilting plane, joints held rigidly.
+"""Does it tip? Decided by MuJoCo on a slowly tilting plane with rigid joints.
 
 The plane tilts by turning gravity; friction is so high that nothing slides. The robot has tipped
 when it has turned by TIPPED against the plane on which it had come to rest.

@@ -1,4 +1,4 @@
-"""Seeded random runs of every kind an acceptance test meets, from a quiet shift to a tip-over.
+"""Random runs with a seed, of every kind an acceptance test meets.
 
 Each kind is a function of robot, random numbers and length. Nothing here says what will happen: the
 simulation's truth does.

@@ -1,4 +1,4 @@
-"""What a simulated run is asked to do: commands at times, and how its sensors read."""
+"""A scenario of a simulated run: commands at times, and how the sensors read."""
 
 from dataclasses import dataclass
 

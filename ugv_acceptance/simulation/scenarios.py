@@ -1,4 +1,4 @@
-"""Named runs of the PackBot that ships: what an acceptance test meets."""
+"""The named scenarios of the PackBot that ships."""
 
 from collections.abc import Callable
 from math import pi, radians

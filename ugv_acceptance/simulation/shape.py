@@ -1,4 +1,4 @@
-"""What touches what: contact spheres, wheels, a robot's bulk after a tip-over, blocks to climb."""
+"""Geometry for contact: spheres, wheels, the body after a tip-over, obstacles."""
 
 import math
 from collections.abc import Iterable, Mapping

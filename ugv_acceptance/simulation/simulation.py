@@ -1,4 +1,4 @@
-"""A robot that moves through time: servos with limits, wheels, slopes, a load; no clock, no ROS.
+"""Steps a robot through time: servos with limits, wheels, slopes, a load.
 
 The ground is the plane z = 0 of the simulation; a slope is a change of gravity's direction, so the
 attitude a gravity-aligned world would see is the ground's own times the robot's on it. The ground

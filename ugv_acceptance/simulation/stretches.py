@@ -1,4 +1,4 @@
-"""A scenario simulated stretch by stretch, as fast as it goes: runs of any length."""
+"""Simulates a scenario part by part, so that runs can be of any length."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A joint swept at constant speed, as the paper's ADAMS model did: forces and motion at all joints.
+"""Sweeps a joint at constant speed, as the paper's ADAMS model did.
 
 On a fixed base the motion is prescribed and the forces follow from it exactly (inverse dynamics).
 On the free base the whole vehicle stands on wheels and yields; stiff servos hold the motion.

@@ -1,4 +1,4 @@
-"""The force-angle of the model against simulated truth: random postures, loads and slopes."""
+"""Compares the tip-over margin with simulated truth over random cases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""What the model is asked before a test: maps, validity of statics, capacity, risk, reliability."""
+"""Studies of the model before a test: maps, validity, capacity, risk, reliability."""

@@ -1,4 +1,4 @@
-"""A quantity over two joints as a 3 x 3 form: exact, and why a map costs next to nothing.
+"""A quantity over two joints as an exact 3 x 3 form, so that maps are cheap.
 
 Every link's position is linear in (1, cos q, sin q) of each joint angle and in (1, x) of each
 prismatic joint; so are the centre of gravity, the potential energy and, as its derivative, each

@@ -1,4 +1,4 @@
-"""Intervals of an angle on one turn: where a torque that is a sine of one joint stays in bounds."""
+"""Intervals of an angle on one turn in which a sinusoidal torque stays in bounds."""
 
 import math
 

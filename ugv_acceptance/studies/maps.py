@@ -1,4 +1,4 @@
-"""Maps over two joints: torque utilisation and the tilt left, and where they turn into failure.
+"""Maps over two joints: torque utilisation and tip-over margin, and where they fail.
 
 Both come from 3 x 3 forms (bilinear.py) where the support polygon stays the same over the map, and
 from the general functions of arrays where it does not.

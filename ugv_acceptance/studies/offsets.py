@@ -1,4 +1,4 @@
-"""Table 2 explained: the centres of gravity of the paper's dynamic model that give all its cells.
+"""Explains the paper's Table 2: centres of gravity that give all its cells.
 
 With both centres of gravity at mid-link the two models agree at rest, the reference error at
 1 deg/s is nearly zero and F grows as the fourth power of speed. Table 2 needs a reference error of

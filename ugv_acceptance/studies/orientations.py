@@ -1,4 +1,4 @@
-"""The paper's Figure 6: orientations of the chassis from which an arm's whole range is tested."""
+"""The orientations of the chassis in the paper's Figure 6."""
 
 import math
 from dataclasses import dataclass

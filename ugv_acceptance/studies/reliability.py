@@ -1,4 +1,4 @@
-"""What operating hours and failures say: MTBF, availability, success and trend, with exact bounds.
+"""MTBF, availability, success and trend from hours and failures, with exact bounds.
 
 Exact bounds of an MTBF rest on a constant failure rate (exponential times between failures); the
 trend tests say whether that may be assumed. Times in hours; infinite where nothing bounds.

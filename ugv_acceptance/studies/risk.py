@@ -1,4 +1,4 @@
-"""Probability of torque saturation and of rollover when environment, load and robot are uncertain.
+"""Probability of saturation and rollover where environment, load and robot are uncertain.
 
 Plain Monte Carlo in blocks: exact binomial intervals, memory that does not grow, and the same
 counts for a seed whatever the number of processes.

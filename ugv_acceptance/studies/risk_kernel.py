@@ -1,4 +1,4 @@
-"""The formula of a risk study: torques, weight and contacts from whatever numbers are uncertain.
+"""The compiled formula of a risk study over the numbers that are uncertain.
 
 The recursion of every other margin, compiled with a symbol for each uncertain number and a constant
 for the rest, so that what does not vary costs nothing.

@@ -1,4 +1,4 @@
-"""How an uncertain number is spread: uniform or normal, drawn in place."""
+"""Distributions of uncertain numbers: uniform or normal."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Two robots or two firmware versions compared: exact tests, and how likely they see a difference.
+"""Compares two groups by exact tests, and the chance that a difference would be seen.
 
 Failure rates: given all failures, those of the first are binomial by its share of the hours.
 Successes: Fisher's exact test. Both hold for any number of failures, none included.

@@ -1,4 +1,4 @@
-"""How fast a joint may move before the static model is no longer good enough: equations (9), (10).
+"""Joint speeds up to which the static model holds: equations (9) and (10).
 
 A joint that moves at a constant rate v adds v^2 c(q) to the torques, exactly; the error of the
 static model is e = s + v^2 c, where s is what the two models differ by at rest. Its mean square is

@@ -1,4 +1,4 @@
-"""Bounds on a value that depends on i + j alone: a sliding window over a table of ranks.
+"""Sliding-window bounds of a table whose value depends on i + j alone.
 
 On a grid of equal steps cos(a_i + b_j) has only n + m - 1 values. They are ranked once; each row's
 two bounds become ranks too, so that a cell costs one 16-bit subtraction and one comparison. Ranks

@@ -1,4 +1,4 @@
-"""Equations (3) to (8) for any tree: the worst and the safe positions of one joint, closed form.
+"""Worst and safe positions of one joint in closed form: equations (3) to (8).
 
 Over one turning joint every static torque is c + R cos(x - phase); three postures tell it.
 """

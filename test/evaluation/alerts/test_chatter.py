@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert, Rule, Signal
 
 PERIOD = 20_000_000  # ns: 50 Hz
-PACKBOT = Watch(load().settings)
+PACKBOT = RuleSet(load().settings)
 RULES = [signal.rule for pair in (*PACKBOT.tip, *PACKBOT.torque) for signal in pair]
 
 

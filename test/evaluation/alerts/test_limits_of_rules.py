@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from evaluation.streams import LEVEL, MS, REST, STILL, T0, Imu, Joints, S, run_of, settings
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN, Rule, Signal
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 from ugv_acceptance.evaluation.inputs.low_pass import LowPass
-from ugv_acceptance.evaluation.inputs.timeouts import Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 
@@ -22,33 +22,33 @@ G = 9.81
 @pytest.mark.parametrize(('apart', 'wrong'), [(S, 0.0), (S + 1, 1.0), (-S, 0.0), (-S - 1, 1.0)])
 def test_two_clocks_may_differ_by_a_second(apart: int, wrong: float) -> None:
     """A nanosecond more is a fault; alone and in columns."""
-    assert Freshness(Delays()).clock(T0, T0 + apart) == wrong
+    assert InputTimeout(Delays()).clock(T0, T0 + apart) == wrong
     times = np.array([T0])
-    assert Freshness(Delays()).clocks(times, times + apart).tolist() == [wrong]
+    assert InputTimeout(Delays()).clocks(times, times + apart).tolist() == [wrong]
 
 
 @pytest.mark.parametrize(('jump', 'wrong'), [(S, 0.0), (S + 1, 1.0), (-S, 0.0), (-S - 1, 1.0)])
 def test_a_stamp_may_jump_by_a_second(jump: int, wrong: float) -> None:
     """Between messages 10 ms apart; stamps half a second early and late are near enough."""
     start = -jump // 2
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     assert fresh.clock(T0, T0 + start) == 0.0
     fresh.message(T0)
     assert fresh.clock(T0 + 10 * MS, T0 + 10 * MS + start + jump) == wrong
     times = np.array([T0, T0 + 10 * MS])
     stamps = times + np.array((start, start + jump))
-    assert Freshness(Delays()).clocks(times, stamps).tolist() == [0.0, wrong]
+    assert InputTimeout(Delays()).clocks(times, stamps).tolist() == [0.0, wrong]
 
 
 @pytest.mark.parametrize(('after', 'wrong'), [(500 * MS, 0.0), (500 * MS + 1, 1.0)])
 def test_a_stamp_may_stand_for_half_a_second(after: int, wrong: float) -> None:
     """The same stamp again and again is a frozen clock; alone and in columns."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     fresh.clock(T0, T0)
     fresh.message(T0)
     assert fresh.clock(T0 + after, T0) == wrong
     times = np.array([T0, T0 + after])
-    assert Freshness(Delays()).clocks(times, np.array([T0, T0])).tolist() == [0.0, wrong]
+    assert InputTimeout(Delays()).clocks(times, np.array([T0, T0])).tolist() == [0.0, wrong]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_stamp_may_stand_for_half_a_second(after: int, wrong: float) -> None:
 )
 def test_silence_is_three_periods_but_at_least_a_tenth(period: int, limit: int) -> None:
     """Half a second until 32 intervals were seen, and never more than 2 s; ms."""
-    fresh, columns = Freshness(Delays()), Freshness(Delays())
+    fresh, columns = InputTimeout(Delays()), InputTimeout(Delays())
     times = T0 + np.arange(33) * period * MS
     for now in times[:32]:
         fresh.message(int(now))
@@ -72,7 +72,7 @@ def test_silence_is_three_periods_but_at_least_a_tenth(period: int, limit: int) 
 
 def test_silence_counts_from_the_start_until_a_message_came() -> None:
     """Who has not begun to listen misses nothing."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     assert fresh.deadline is None
     fresh.started = T0
     assert fresh.deadline == T0 + 500 * MS
@@ -81,7 +81,7 @@ def test_silence_counts_from_the_start_until_a_message_came() -> None:
 def tracked(*messages: Imu, **chosen: Any) -> list[tuple[tuple[float, ...], bool]]:
     """Return gravity and whether it is unusable, message by message."""
     told = settings(ImuInput(**chosen))
-    tracker = ImuTracker(told, Watch(told).attitude)
+    tracker = ImuTracker(told, RuleSet(told).attitude)
     return [
         tracker.step(
             m.time, m.time, m.orientation, m.covariance_0, m.omega, m.acceleration, m.frame
@@ -120,7 +120,7 @@ def test_an_orientation_is_believed_while_nothing_is_said_against_it() -> None:
 def test_a_quaternion_is_one_within_a_hundredth(norm: float, used: int) -> None:
     """Single precision and rounding; what is longer or shorter tells nothing."""
     told = settings(ImuInput(attitude='orientation'))
-    tracker = ImuTracker(told, Watch(told).attitude)
+    tracker = ImuTracker(told, RuleSet(told).attitude)
     half = norm * math.sqrt(0.5)
     tracker.step(T0, T0, (half, 0.0, 0.0, half), 0.0, STILL, (0.0, 9.81, 0.0))
     tracker.step(T0 + 1, T0 + 1, (half, 0.0, 0.0, half), -1.0, STILL, REST)
@@ -171,7 +171,7 @@ def test_signals_are_watched_at_the_limits_of_the_configuration() -> None:
     """WARN and ERROR at their shares, deadbands beyond, and each with its own delays (ns)."""
     limits = Limits((40.0, math.inf), 0.7, 0.9, 3.0, 0.3, 0.2, 0.05, (0.5, math.inf))
     delays = Delays(0.2, 0.3, 0.4, 2.0, 6.0)
-    watch = Watch(settings(limits=limits, delays=delays))
+    watch = RuleSet(settings(limits=limits, delays=delays))
     rule = [(s.rule.level, s.rule.on, s.rule.off, s.rule.on_delay, s.rule.off_delay)
             for s in (*watch.torque[0], *watch.tip[0], watch.speed[0], watch.support)]  # fmt: skip
     assert rule == [
@@ -183,10 +183,10 @@ def test_signals_are_watched_at_the_limits_of_the_configuration() -> None:
         (ERROR, 0.5, 0.5, 200 * MS, 2 * S),
     ]
     assert math.isinf(watch.speed[1].rule.on)
-    assert [s.rule.on for s in watch.leaps] == [20.0, 10.0]
-    for signal in (watch.missing, watch.payload, *watch.leaps):
+    assert [s.rule.on for s in watch.jump_signals] == [20.0, 10.0]
+    for signal in (watch.missing, watch.payload, *watch.jump_signals):
         assert signal.rule.on_delay == 400 * MS
-    unlimited = Watch(settings(limits=Limits((40.0, 30.0))))
+    unlimited = RuleSet(settings(limits=Limits((40.0, 30.0))))
     assert [s.rule.on for s in unlimited.speed] == [math.inf, math.inf]
 
 
@@ -258,12 +258,12 @@ def test_the_period_is_the_middle_of_thirty_two_intervals() -> None:
     """Squares in ms, in any order: (16^2 + 17^2) / 2 = 272.5 ms; alone, in columns, in pieces."""
     intervals = np.random.default_rng(2).permutation(np.arange(1, 33) ** 2) * MS
     times = T0 + np.concatenate(([0], np.cumsum(intervals)))
-    one = Freshness(Delays())
+    one = InputTimeout(Delays())
     for now in times:
         one.message(int(now))
     assert (one.period, one.limit) == (272.5 * MS, round(817.5 * MS))
     for cut in (0, 1, 7, 32, 33):
-        many = Freshness(Delays())
+        many = InputTimeout(Delays())
         limits: list[int] = []
         for part in (times[:cut], times[cut:]):
             if len(part):

@@ -9,7 +9,7 @@ import pytest
 from evaluation.margin_rows import rows
 from evaluation.streams import MS, T0, S, settings
 
-from ugv_acceptance.evaluation.alerts.prediction import Foresight, foresight_of
+from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.settings import Delays, Limits
 
@@ -43,15 +43,15 @@ class Looks:
             return Signal(Rule(code, subject, WARN, *at, round(delay * S), 0), log)
 
         limits = Limits(self.limit, torque_warn=0.8, torque_deadband=2.0)
-        foresight = foresight_of(settings(limits=limits, delays=self.delays), signal)
+        prediction = foresight_of(settings(limits=limits, delays=self.delays), signal)
         for k in range(count):
             now = T0 + round(self.at(k) * MS)
             angle = (self.tilt(k), 1.0, 1.0, math.nan)
             torque, effort = (self.torque(k), 0.0), (self.effort(k), 0.0)
-            foresight.keep(now, angle, torque, effort, (self.q(k), float(k)))
+            prediction.keep(now, angle, torque, effort, (self.q(k), float(k)))
             if (k + 1) % each == 0:
-                foresight.judge(self.limit)
-        foresight.judge(self.limit)
+                prediction.judge(self.limit)
+        prediction.judge(self.limit)
         return [(a.rule.code, a.rule.subject, _look(a.start), a.end and _look(a.end)) for a in log]
 
 
@@ -287,14 +287,14 @@ def test_what_gravity_changes_is_no_sign_of_a_frozen_encoder(each: int) -> None:
 
 
 @EACH
-@pytest.mark.parametrize(('leap', 'told'), [(2, []), (4, [9.0])])
+@pytest.mark.parametrize(('jump', 'told'), [(2, []), (4, [9.0])])
 def test_a_change_counts_since_the_position_last_moved(
-    leap: int, told: list[float], each: int
+    jump: int, told: list[float], each: int
 ) -> None:
     """It moves at look 3: an effort that leapt before says nothing, one that leaps later does."""
 
     def effort(k: int) -> float:
-        return 10.0 + 7.0 * (k >= leap)
+        return 10.0 + 7.0 * (k >= jump)
 
     assert frozen(each, 13, effort=effort, q=steps(0.5, 0.5, 0.5, 0.6)) == told
 
@@ -338,13 +338,13 @@ def test_every_kind_of_warning_has_its_own_delay() -> None:
 @pytest.mark.parametrize(('now', 'due'), [(0, 50), (1, 50), (49, 50), (50, 100), (130, 150)])
 def test_the_next_look_is_due_at_a_whole_multiple_of_fifty_milliseconds(now: int, due: int) -> None:
     """After the sample that was kept; the first one is due whenever it comes."""
-    foresight = quiet([])
-    assert foresight.due == 0
-    foresight.keep(T0 + now * MS, (1.0,) * 4, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    assert foresight.due == T0 + due * MS
+    prediction = quiet([])
+    assert prediction.due == 0
+    prediction.keep(T0 + now * MS, (1.0,) * 4, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    assert prediction.due == T0 + due * MS
 
 
-def quiet(log: list[Alert]) -> Foresight:
+def quiet(log: list[Alert]) -> Prediction:
     """Return the foresight of the small robot, whose alerts go to a log without delay."""
 
     def signal(code: str, subject: str, at: tuple[float, float], _: float) -> Signal:
@@ -356,11 +356,11 @@ def quiet(log: list[Alert]) -> Foresight:
 def test_who_never_lets_time_pass_keeps_the_last_thousand_looks() -> None:
     """1024 of them wait at most: the first 76 of 1100 are forgotten."""
     log: list[Alert] = []
-    foresight = quiet(log)
+    prediction = quiet(log)
     for k in range(1100):
         effort = (35.0 if k < 100 else 0.0, 0.0)
-        foresight.keep(T0 + k * 50 * MS, (1.0,) * 4, (0.0, 0.0), effort, (float(k), float(k)))
-    foresight.judge(LIMIT)
+        prediction.keep(T0 + k * 50 * MS, (1.0,) * 4, (0.0, 0.0), effort, (float(k), float(k)))
+    prediction.judge(LIMIT)
     assert [(_look(a.start), a.end and _look(a.end)) for a in log] == [(76.0, 100.0)]
 
 
@@ -377,7 +377,7 @@ def test_the_signals_are_those_of_sides_and_joints() -> None:
 
 def test_of_a_recording_the_first_known_row_of_each_fifty_milliseconds_is_a_look() -> None:
     """However it is cut into parts."""
-    foresight = quiet([])
+    prediction = quiet([])
     parts = [
         ((0.010, 0.020, 0.060, 0.070), (True, True, False, True)),
         ((0.099, 0.120, 0.149, 0.150), (True, True, True, True)),
@@ -390,7 +390,7 @@ def test_of_a_recording_the_first_known_row_of_each_fifty_milliseconds_is_a_look
         told = rows(time, known=known)
         joints = told.pairs.joints
         effort = replace(joints, effort=np.zeros_like(joints.q))
-        foresight.rows(replace(told, pairs=replace(told.pairs, joints=effort)), LIMIT)
-        dues.append(foresight.due // MS)
-    assert (foresight._time // MS).tolist() == [10, 70, 120, 150, 200, 260, 330]
+        prediction.rows(replace(told, pairs=replace(told.pairs, joints=effort)), LIMIT)
+        dues.append(prediction.due // MS)
+    assert (prediction._time // MS).tolist() == [10, 70, 120, 150, 200, 260, 330]
     assert dues == [100, 200, 200, 350, 350]

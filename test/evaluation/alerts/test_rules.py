@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from evaluation.streams import MS, T0, S, settings
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Signal
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 
@@ -23,10 +23,10 @@ DELAYS = Delays(tip_on=0.2, torque_on=0.3, fault_on=0.4, off=2.0, tip_off=6.0)
 def test_sliding_is_watched_where_the_friction_is_known() -> None:
     """A warning from the tilt's warning limit on, with its deadband and delay; else never."""
     limits = Limits((40.0, 30.0), tip_warn=0.3, tip_deadband=0.05, friction=0.5)
-    slide = Watch(settings(limits=limits, delays=DELAYS)).slide
+    slide = RuleSet(settings(limits=limits, delays=DELAYS)).slide
     assert rule(slide) == ('SLIDE', WARN, -0.3, -0.35, 200 * MS, 2 * S)
     assert slide.rule.subject == 'robot'
-    assert Watch(settings()).slide.rule.on == math.inf
+    assert RuleSet(settings()).slide.rule.on == math.inf
 
 
 def test_the_way_to_gravity_is_watched_with_the_delay_of_the_imu() -> None:
@@ -34,7 +34,7 @@ def test_the_way_to_gravity_is_watched_with_the_delay_of_the_imu() -> None:
 
     The acceleration may be 15 % from g.
     """
-    of = Watch(settings(ImuInput(agreement=0.2, agreement_delay=1.5), DELAYS)).attitude
+    of = RuleSet(settings(ImuInput(agreement=0.2, agreement_delay=1.5), DELAYS)).attitude
     found = [rule(s) for s in (of.frame, of.orientation, of.strange, of.disagreement)]
     assert found == [
         ('IMU_FRAME', ERROR, 0.5, 0.5, 400 * MS, 2 * S),
@@ -58,12 +58,12 @@ def test_a_strange_acceleration_is_a_warning_to_who_asks_for_the_orientation_alo
 ) -> None:
     """To all others margins hang on it."""
     imu = ImuInput(attitude=attitude, specific_force=specific_force)
-    assert Watch(settings(imu)).attitude.strange.rule.level == level
+    assert RuleSet(settings(imu)).attitude.strange.rule.level == level
 
 
 def test_faults_of_inputs_have_their_level_and_delay() -> None:
     """Silence is told at once: how long it lasted is known already."""
-    watch = Watch(settings(delays=DELAYS))
+    watch = RuleSet(settings(delays=DELAYS))
     for subject, of in (('joint_states', watch.joints), ('imu', watch.imu)):
         assert [rule(s) for s in (of.stale, of.invalid, of.clock)] == [
             ('INPUT_STALE', STALE, 0.5, 0.5, 0, 2 * S),
@@ -73,12 +73,12 @@ def test_faults_of_inputs_have_their_level_and_delay() -> None:
         assert {s.rule.subject for s in (of.stale, of.invalid, of.clock)} == {subject}
     assert rule(watch.missing) == ('INPUT_INCOMPLETE', STALE, 0.5, 0.5, 400 * MS, 2 * S)
     assert rule(watch.payload) == ('PAYLOAD_INVALID', ERROR, 0.5, 0.5, 400 * MS, 2 * S)
-    assert rule(watch.leaps[0]) == ('POSITION_LEAP', ERROR, 20.0, 20.0, 400 * MS, 2 * S)
+    assert rule(watch.jump_signals[0]) == ('POSITION_LEAP', ERROR, 20.0, 20.0, 400 * MS, 2 * S)
 
 
 def test_what_is_active_comes_with_the_most_severe_first() -> None:
     """STALE before ERROR before WARN; what is over is not active."""
-    watch = Watch(settings(delays=Delays(tip_on=0.0, torque_on=0.0, off=0.0)))
+    watch = RuleSet(settings(delays=Delays(tip_on=0.0, torque_on=0.0, off=0.0)))
     wanted = (watch.torque[0][0], watch.support, watch.imu.stale)
     for signal in wanted:
         signal.step(T0, 1e3)
@@ -89,7 +89,7 @@ def test_what_is_active_comes_with_the_most_severe_first() -> None:
 
 def test_every_signal_is_listed_once() -> None:
     """One a code, subject and level; all write into the same log."""
-    watch = Watch(settings())
+    watch = RuleSet(settings())
     rules = [(s.rule.code, s.rule.subject, s.rule.level) for s in watch.signals()]
     assert len(set(rules)) == len(rules)
     assert all(signal.log is watch.log for signal in watch.signals())

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert, Rule, Signal, feed, runs
 from ugv_acceptance.evaluation.settings import Delays, Limits
 
@@ -173,7 +173,7 @@ def hovering(seed: int, period: float) -> tuple[Signal, NDArray[np.int64], NDArr
     limit = math.degrees(Limits(()).tip_error)
     swing = np.sin(times * 2e-9 * math.pi / period)
     degrees = limit + swing + random.normal(0.0, 0.5, len(times))
-    signal = Watch(settings(delays=Delays())).tip[0][1]
+    signal = RuleSet(settings(delays=Delays())).tip[0][1]
     for now, value in zip(times.tolist(), degrees.tolist(), strict=True):
         signal.step(now, -math.radians(value))
     signal.advance(int(times[-1]))

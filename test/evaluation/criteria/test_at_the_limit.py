@@ -9,7 +9,7 @@ import pytest
 from evaluation.streams import LEVEL, MS, REST, STILL, T0, Joints, S, batch_of, settings
 from scipy import stats
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.criteria.criteria import default_criteria
 from ugv_acceptance.evaluation.effort.model_check import independent_samples, least_squares
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
@@ -61,17 +61,17 @@ def test_a_tilt_exactly_at_its_limit_is_too_little() -> None:
     assert code not in alerts_of(Limits((99.0, 300.0), tip_warn=less, tip_error=0.01))
 
 
-@pytest.mark.parametrize(('leap', 'told'), [(1.99, False), (2.01, True)])
-def test_a_joint_that_leaps_ten_times_faster_than_it_can_is_lost(leap: float, told: bool) -> None:  # noqa: FBT001
+@pytest.mark.parametrize(('jump', 'told'), [(1.99, False), (2.01, True)])
+def test_a_joint_that_leaps_ten_times_faster_than_it_can_is_lost(jump: float, told: bool) -> None:  # noqa: FBT001
     """The slide makes 1 m/s: 10 m/s are looked for once a second, over what has passed since."""
     robot = settings().robot
     wide = replace(robot, joints=tuple(replace(j, lower=-99.0, upper=99.0, velocity=0.1)
                                        for j in robot.joints))  # fmt: skip
     told_settings = replace(settings(), robot=wide)
-    merger = JointMerger(told_settings, Watch(told_settings).leaps)
+    merger = JointMerger(told_settings, RuleSet(told_settings).jump_signals)
     for k in range(3):
         at = T0 + 2 * k * S
-        merger.merge(at, ('hand_slide',), (leap * (k % 2),), (), ())
+        merger.merge(at, ('hand_slide',), (jump * (k % 2),), (), ())
         assert math.isnan(merger.q[1]) == (told and k > 0)
 
 
@@ -85,8 +85,8 @@ def slow_slide() -> Any:
 @pytest.mark.parametrize(('apart', 'told'), [(0.49, False), (0.5, True)])
 def test_positions_are_compared_half_a_second_apart_or_more(apart: float, told: bool) -> None:  # noqa: FBT001
     """Nearer together, a little jitter would look like a leap; the one before stays."""
-    watch = Watch(slow_slide())
-    merger = JointMerger(slow_slide(), watch.leaps)
+    watch = RuleSet(slow_slide())
+    merger = JointMerger(slow_slide(), watch.jump_signals)
     for at, q in ((T0 + S - int(apart * 1e9) // 2, 0.0), (T0 + S + int(apart * 1e9) // 2, 0.9)):
         merger.merge(at, ('hand_slide',), (q,), (), ())
     assert math.isnan(merger.q[1]) == told
@@ -103,14 +103,14 @@ def test_columns_see_the_leaps_that_messages_show() -> None:
             for k, q in enumerate(np.cumsum(steps).tolist())
             for names in [(('lift', 'hand_slide'), ('hand_slide',))[int(rng.integers(2))]]
         ]
-        seen = Watch(slow_slide())
-        one = JointMerger(slow_slide(), seen.leaps)
+        seen = RuleSet(slow_slide())
+        one = JointMerger(slow_slide(), seen.jump_signals)
         expected = []
         for m in run:
             one.merge(m.time, m.names, m.position, (), ())
             expected.append(list(one.q))
-        watch = Watch(slow_slide())
-        many = JointMerger(slow_slide(), watch.leaps)
+        watch = RuleSet(slow_slide())
+        many = JointMerger(slow_slide(), watch.jump_signals)
         rows = [many.merge_columns(batch_of(part).joints).q for part in (run[:23], run[23:])]
         for found, log in ((np.concatenate(rows), watch.log), (np.array(expected), seen.log)):
             assert [(a.start, a.end) for a in log] == [(a.start, a.end) for a in seen.log]

@@ -17,7 +17,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Demand,
     Value,
 )
-from ugv_acceptance.evaluation.criteria.measurement import Examination, Moment, ValueMeasure
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, Moment, ValueMeasure
 from ugv_acceptance.evaluation.criteria.uncertainty import (
     _OF,
     Bounds,
@@ -178,7 +178,7 @@ def test_margins_of_a_result_get_their_bounds() -> None:
     slide = Value('torque_utilisation', 'slide', below=True, limit=1.0)
     demands: dict[str, Demand] = {'a': use, 'b': slide, 'c': FRONT, 'd': AlertDemand(raised=False)}
     criteria = CriteriaSet('', 1, tuple(Criterion(k, d) for k, d in demands.items()), '')
-    found = Examination(criteria, TOLD, 0, 1)
+    found = CriteriaMeasurement(criteria, TOLD, 0, 1)
     for name, value, subject in (('a', 0.5, 'lift'), ('c', 0.7, 'front')):
         of = found.measures[name]
         assert isinstance(of, ValueMeasure)

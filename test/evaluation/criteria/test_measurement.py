@@ -32,7 +32,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Window,
 )
 from ugv_acceptance.evaluation.criteria.measurement import (
-    Examination,
+    CriteriaMeasurement,
     KnownTime,
     MapMeasure,
     ValueMeasure,
@@ -53,25 +53,25 @@ def examined(
     cuts: list[int],
     end: int,
     told: Settings = TOLD,
-) -> tuple[Examination, list[MarginRows]]:
+) -> tuple[CriteriaMeasurement, list[MarginRows]]:
     """Return criteria measured over a recording handed over in pieces, and its rows."""
-    examination = Examination(CriteriaSet('', 1, tuple(criteria), ''), told, T0, end)
-    evaluator = RecordedEvaluator(told, examination.detail)
+    measurement = CriteriaMeasurement(CriteriaSet('', 1, tuple(criteria), ''), told, T0, end)
+    evaluator = RecordedEvaluator(told, measurement.detail)
     evaluator.start(T0)
     found = []
     for part in split(messages, cuts):
         batch = batch_of(part)
-        examination.payloads.take(batch.payload)
+        measurement.payloads.take(batch.payload)
         found.append(evaluator.batch(batch))
-        examination.add(found[-1])
+        measurement.add(found[-1])
     evaluator.finish(end)
-    examination.finish(end)
-    return examination, found
+    measurement.finish(end)
+    return measurement, found
 
 
-def measure_of(examination: Examination, name: str) -> ValueMeasure:
+def measure_of(measurement: CriteriaMeasurement, name: str) -> ValueMeasure:
     """Return what was measured for a criterion on a value."""
-    measure = examination.measures[name]
+    measure = measurement.measures[name]
     assert isinstance(measure, ValueMeasure)
     return measure
 
@@ -124,10 +124,10 @@ def test_a_value_is_measured_as_by_a_loop_over_the_rows(
 ) -> None:
     """Time evaluated, time in violation and worst value, whatever the pieces and the window."""
     end = messages[-1].time + rest * MS
-    examination, _ = examined([Criterion('c', demand, window=window)], messages, cuts, end)
+    measurement, _ = examined([Criterion('c', demand, window=window)], messages, cuts, end)
     _, rows = examined([Criterion('c', demand)], messages, [], end)
-    measure = measure_of(examination, 'c')
-    span = examination.span_of(window)
+    measure = measure_of(measurement, 'c')
+    span = measurement.span_of(window)
     evaluated, violated, seen = held(rows, demand, span, end)
     assert (measure.evaluated, measure.violation.total) == (evaluated, violated)
     assert measure.samples == len(seen)
@@ -144,8 +144,8 @@ def test_a_value_is_measured_as_by_a_loop_over_the_rows(
 def test_the_worst_moment_gives_its_value_again(messages: list[Message], cuts: list[int]) -> None:
     """Posture, attitude and payload of a moment are those its torque was computed from."""
     demand = Value('torque', ANY, below=True, limit=1.0)
-    examination, _ = examined([Criterion('c', demand)], messages, cuts, messages[-1].time)
-    for moment in measure_of(examination, 'c').worst:
+    measurement, _ = examined([Criterion('c', demand)], messages, cuts, messages[-1].time)
+    for moment in measure_of(measurement, 'c').worst:
         torque = static_torque(TOLD.robot, moment.q, moment.gravity, moment.payload)
         j = TOLD.robot.joint_names.index(moment.subject)
         np.testing.assert_allclose(abs(torque[j]), moment.value, rtol=1e-9, atol=1e-9)
@@ -155,9 +155,9 @@ def test_a_payload_counts_from_the_next_joint_state_on() -> None:
     """The moment before a declaration has the robot's payload, the moment after it the new one."""
     messages: list[Message] = [*run_of(1.0), Carry(T0 + S // 2, 3.0)]
     messages.sort(key=lambda m: m.time)
-    examination, _ = examined([], messages, [], T0 + S)
-    assert examination.payloads.at(T0 + S // 2 - 1) == TOLD.robot.payload
-    assert examination.payloads.at(T0 + S // 2) == Payload(3.0, (0.0, 0.0, 0.0))
+    measurement, _ = examined([], messages, [], T0 + S)
+    assert measurement.payloads.at(T0 + S // 2 - 1) == TOLD.robot.payload
+    assert measurement.payloads.at(T0 + S // 2) == Payload(3.0, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize('cuts', [[], [10], [20, 60, 61]])
@@ -169,8 +169,8 @@ def test_dwell_is_the_longest_stretch_within_the_limit(cuts: list[int]) -> None:
             message = replace(message, position=(-0.9, 0.0))  # noqa: PLW2901
         run.append(message)
     demand = Value('position', 'lift', below=False, limit=0.5, dwell=0.5)
-    examination, _ = examined([Criterion('up', demand)], run, cuts, T0 + 2 * S)
-    longest = measure_of(examination, 'up').kept.longest
+    measurement, _ = examined([Criterion('up', demand)], run, cuts, T0 + 2 * S)
+    longest = measure_of(measurement, 'up').kept.longest
     assert longest == (T0 + 400 * MS, T0 + 1200 * MS)
 
 
@@ -184,10 +184,10 @@ def test_known_time_does_not_depend_on_the_pieces(
         Criterion('alert', AlertDemand(raised=False), window=window),
         Criterion('value', Value('position', 'lift', below=True, limit=9.0), window=window),
     ]
-    examination, _ = examined(criteria, messages, cuts, messages[-1].time)
-    known = examination.measures['alert']
+    measurement, _ = examined(criteria, messages, cuts, messages[-1].time)
+    known = measurement.measures['alert']
     assert isinstance(known, KnownTime)
-    assert known.evaluated == measure_of(examination, 'value').evaluated
+    assert known.evaluated == measure_of(measurement, 'value').evaluated
 
 
 def test_visited_cells_are_those_the_run_was_in() -> None:
@@ -199,8 +199,8 @@ def test_visited_cells_are_those_the_run_was_in() -> None:
             # The lift counts downwards from 0.1: messages of 0.1 .. -0.35 are 0 .. 0.45 rad.
             message = replace(message, position=(0.1 - 0.46 * k / 150, 0.05))  # noqa: PLW2901
         sweep.append(message)
-    examination, _ = examined([Criterion('map', demand)], sweep, [7, 50], T0 + S)
-    measure = examination.measures['map']
+    measurement, _ = examined([Criterion('map', demand)], sweep, [7, 50], T0 + S)
+    measure = measurement.measures['map']
     assert isinstance(measure, MapMeasure)
     expected = np.zeros((10, 6), np.bool_)
     expected[:5, 2] = True

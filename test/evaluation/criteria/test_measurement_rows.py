@@ -21,7 +21,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Window,
 )
 from ugv_acceptance.evaluation.criteria.measurement import (
-    Examination,
+    CriteriaMeasurement,
     KnownTime,
     MapMeasure,
     ValueMeasure,
@@ -39,7 +39,7 @@ def measured(
 ) -> Any:
     """Return what a demand's measure comes to over the parts of a recording from 0 s."""
     criterion = Criterion('c', demand, window=window)
-    found = Examination(CriteriaSet('', 1, (criterion,), ''), TOLD, 0, round(end * S))
+    found = CriteriaMeasurement(CriteriaSet('', 1, (criterion,), ''), TOLD, 0, round(end * S))
     for part in parts:
         found.add(part)
     found.finish(round(end * S))
@@ -150,7 +150,7 @@ def test_a_moment_is_a_row_in_full() -> None:
     """Value, joint, posture, attitude, and the payload when the joints were heard."""
     demand = Value('torque', ANY, below=True, limit=5.0)
     criterion = Criterion('c', demand)
-    found = Examination(CriteriaSet('', 1, (criterion,), ''), TOLD, 0, 9 * S)
+    found = CriteriaMeasurement(CriteriaSet('', 1, (criterion,), ''), TOLD, 0, 9 * S)
     later = Payload(3.0, (0.0, 0.0, 0.0))
     found.payloads.since.append(3 * S // 2 + 1)
     found.payloads.payloads.append(later)
@@ -255,7 +255,7 @@ def test_the_known_time_of_a_last_row_ends_with_what_comes_next() -> None:
 
 def test_a_window_counts_from_the_start_of_the_recording() -> None:
     """In seconds; without one it is the whole recording."""
-    found = Examination(CriteriaSet('', 1, (), ''), TOLD, 7 * S, 20 * S)
+    found = CriteriaMeasurement(CriteriaSet('', 1, (), ''), TOLD, 7 * S, 20 * S)
     assert found.span_of(None) == (7 * S, 20 * S)
     assert found.span_of((0.5, 2.25)) == (15 * S // 2, 37 * S // 4)
 
@@ -268,6 +268,6 @@ def test_energies_and_zmp_need_detail(signal: str, *, detail: bool) -> None:
     """Only where a criterion asks for them."""
     other = Criterion('b', DataDemand('gaps'))
     demand = Criterion('c', Value(signal, ANY, below=False, limit=1.0))
-    found = Examination(CriteriaSet('', 1, (other, demand), ''), TOLD, 0, S)
+    found = CriteriaMeasurement(CriteriaSet('', 1, (other, demand), ''), TOLD, 0, S)
     assert found.detail is detail
     assert list(found.measures) == ['c']  # what is demanded of the data is not measured here

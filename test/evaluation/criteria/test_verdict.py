@@ -32,7 +32,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Window,
     default_criteria,
 )
-from ugv_acceptance.evaluation.criteria.measurement import Examination
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
@@ -47,15 +47,15 @@ def judged(
     criteria: CriteriaSet, messages: Sequence[Message], end: int, sources: Sequence[Source] = ()
 ) -> Any:
     """Return the judgement of a recording by criteria."""
-    examination = Examination(criteria, TOLD, T0, end)
-    evaluator, summary = RecordedEvaluator(TOLD, examination.detail), Summary(TOLD)
+    measurement = CriteriaMeasurement(criteria, TOLD, T0, end)
+    evaluator, summary = RecordedEvaluator(TOLD, measurement.detail), Summary(TOLD)
     evaluator.start(T0)
     batch = batch_of(messages)
-    examination.payloads.take(batch.payload)
+    measurement.payloads.take(batch.payload)
     rows = evaluator.batch(batch)
-    examination.add(rows)
+    measurement.add(rows)
     summary.add(rows)
-    for finish in (evaluator.finish, examination.finish, summary.finish):
+    for finish in (evaluator.finish, measurement.finish, summary.finish):
         finish(end)
     alerts = ordered(evaluator.watch.log)
     source = {'rate_hz': 50.0, 'gaps': 0, 'longest_gap_s': 0.0, 'messages': 1, 'malformed': 0}
@@ -64,7 +64,7 @@ def judged(
         'inputs': {'joint_states': source, 'imu': {**source, 'rate_hz': None}, 'late_messages': 0},
         'bag': {'protected': 'part', 'salvaged': None, 'lost_messages': 0, 'findings': []},
     }
-    return judge_criteria(Findings(examination, alerts, data, Bounds(TOLD, tuple(sources))))
+    return judge_criteria(Findings(measurement, alerts, data, Bounds(TOLD, tuple(sources))))
 
 
 def outcome(

@@ -25,7 +25,11 @@ from ugv_acceptance.type_aliases import Floats
 
 
 def samples(
-    count: int, effort: Callable[[Floats, Floats], Floats], *, moving: int = 0, lever: float = 2.0
+    count: int,
+    effort: Callable[[Floats, Floats], Floats],
+    *,
+    moving: int = 0,
+    torque_gradient: float = 2.0,
 ) -> _Samples:
     """Return samples of one joint: `moving` of them at rates of both signs, the others at rest."""
     rng = np.random.default_rng(count)
@@ -33,7 +37,7 @@ def samples(
     rate = np.zeros(count)
     rate[:moving] = rng.uniform(0.1, 1.0, moving) * np.where(np.arange(moving) % 2, 1.0, -1.0)
     return _Samples(
-        effort(torque, rate), torque, np.full(count, lever), rate,
+        effort(torque, rate), torque, np.full(count, torque_gradient), rate,
         np.zeros(count, np.bool_), rate == 0.0,
     )  # fmt: skip
 
@@ -90,10 +94,13 @@ def test_thirty_samples_at_rest_tell_of_bias_scale_and_payload(count: int, told:
         assert found['sign'] == 'same'
 
 
-@pytest.mark.parametrize(('lever', 'told'), [(0.51, True), (0.5, False), (-0.51, True)])
-def test_a_joint_that_feels_half_a_newton_metre_a_kg_weighs(lever: float, told: bool) -> None:  # noqa: FBT001
+@pytest.mark.parametrize(('torque_gradient', 'told'), [(0.51, True), (0.5, False), (-0.51, True)])
+def test_a_joint_that_feels_half_a_newton_metre_a_kg_weighs(
+    torque_gradient: float,
+    told: bool,  # noqa: FBT001
+) -> None:
     """Less leverage tells nothing of a payload."""
-    s = samples(50, lambda t, _: t + 1.0, lever=lever)
+    s = samples(50, lambda t, _: t + 1.0, torque_gradient=torque_gradient)
     assert (comparison._rest(s)['payload_kg'] is not None) == told
     assert (comparison._pooled_payload([s]) is not None) == told
 
@@ -102,10 +109,10 @@ def test_joints_weigh_together_by_how_even_they_are() -> None:
     """Least squares of all, each divided by its own scatter."""
     rng = np.random.default_rng(8)
     noisy = samples(60, lambda t, _: t + 1.0 + rng.normal(0.0, 1.0, len(t)))
-    even = samples(70, lambda t, _: t + 3.0 + rng.normal(0.0, 0.1, len(t)), lever=3.0)
+    even = samples(70, lambda t, _: t + 3.0 + rng.normal(0.0, 0.1, len(t)), torque_gradient=3.0)
     found = comparison._pooled_payload([noisy, even])
     assert found is not None
-    parts = [(s.lever / s.difference.std(), s.difference / s.difference.std())
+    parts = [(s.torque_gradient / s.difference.std(), s.difference / s.difference.std())
              for s in (noisy, even)]  # fmt: skip
     x, y = (np.concatenate(part) for part in zip(*parts, strict=True))
     assert found['value'] == pytest.approx(float(x @ y / (x @ x)))
@@ -158,10 +165,10 @@ def test_motion_is_faster_than_a_twentieth(rate: float, motion: int) -> None:
     assert s.motion().sum() == motion
 
 
-def still(effort: Floats, torque: Floats, lever: float = 2.0) -> _Samples:
+def still(effort: Floats, torque: Floats, torque_gradient: float = 2.0) -> _Samples:
     """Return samples of a joint at rest."""
     n, no = len(effort), np.zeros(len(effort), np.bool_)
-    return _Samples(effort, torque, np.full(n, lever), np.zeros(n), no, ~no)
+    return _Samples(effort, torque, np.full(n, torque_gradient), np.zeros(n), no, ~no)
 
 
 @pytest.mark.parametrize(('half', 'told'), [(0.5, False), (0.501, True)])
@@ -213,7 +220,8 @@ def test_a_joint_without_any_scatter_decides_about_the_payload() -> None:
 def test_joints_that_do_not_weigh_do_not_count() -> None:
     """Too few samples, or too little leverage."""
     good, few, light = (
-        still(np.full(n, 4.0), np.zeros(n), lever) for n, lever in ((40, 2.0), (29, 1.0), (40, 0.1))
+        still(np.full(n, 4.0), np.zeros(n), torque_gradient)
+        for n, torque_gradient in ((40, 2.0), (29, 1.0), (40, 0.1))
     )
     alone, together = (comparison._pooled_payload(x) for x in ([good], [few, good, light]))
     assert alone is not None

@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 from ugv_acceptance.evaluation.inputs.low_pass import LowPass
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
@@ -43,7 +43,7 @@ QUARTER_ROLL = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
 def tracker(imu: ImuInput | None = None) -> ImuTracker:
     """Return a tracker of the small robot."""
     told = settings(imu)
-    return ImuTracker(told, Watch(told).attitude)
+    return ImuTracker(told, RuleSet(told).attitude)
 
 
 def step(of: ImuTracker, m: Imu) -> tuple[Vector, bool]:
@@ -152,7 +152,7 @@ def test_an_identity_that_the_accelerometer_confirms_is_no_fault() -> None:
 def test_only_one_bad_orientation_is_no_alert() -> None:
     """A glitch leaves one message to the accelerometer; the fault has to last."""
     told = settings()
-    watch = Watch(told)
+    watch = RuleSet(told)
     of = ImuTracker(told, watch.attitude)
     for k in range(300):
         orientation = (0.0,) * 4 if k == 50 else tilted(0.1)

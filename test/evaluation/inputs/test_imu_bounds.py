@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from evaluation.streams import LEVEL, MS, STILL, T0, Imu, imu_columns, settings, tilted, upright
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 from ugv_acceptance.evaluation.settings import ImuInput
 
@@ -26,7 +26,7 @@ def tracked(
     """
     told = settings(ImuInput(agreement_delay=0.5, **chosen))
     told = replace(told, robot=replace(told.robot, gravity=10.0))
-    watch, other = Watch(told), Watch(told)
+    watch, other = RuleSet(told), RuleSet(told)
     one, many = ImuTracker(told, watch.attitude), ImuTracker(told, other.attitude)
     run = [replace(message, time=T0 + 10 * k * MS) for k in range(count)]
     for m in run:
@@ -182,11 +182,11 @@ def test_gravity_is_gone_from_the_alert_on_until_the_alert_ends() -> None:
     right, wrong = Imu(T0, LEAN, STILL, upright(LEAN)), Imu(T0, tilted(0.9), STILL, upright(LEAN))
     run = [replace(wrong if 30 <= k < 100 else right, time=T0 + 10 * k * MS) for k in range(300)]
     known = [k for k in range(300) if not 80 <= k < 200]
-    one = ImuTracker(told, Watch(told).attitude)
+    one = ImuTracker(told, RuleSet(told).attitude)
     steps = [one.step(m.time, m.time, m.orientation, 0.0, m.omega, m.acceleration)[0] for m in run]
     assert [k for k, g in enumerate(steps) if math.isfinite(g[0])] == known
     for cut in (0, 50, 80, 150, 199, 200, 201):
-        many = ImuTracker(told, Watch(told).attitude)
+        many = ImuTracker(told, RuleSet(told).attitude)
         parts = [many.columns([imu_columns(part)]) for part in (run[:cut], run[cut:]) if part]
         gravity = np.concatenate([rows.gravity for rows in parts])
         assert np.flatnonzero(np.isfinite(gravity[:, 0])).tolist() == known
@@ -199,12 +199,12 @@ def test_messages_of_several_frames_come_in_order_of_receipt() -> None:
         [Imu(T0 + k * MS, tilted(0.01 * k), (9.0, 0.0, 0.0), frame=frame) for k in times]
         for frame, times in (('a', (1, 4)), ('b', (2, 3)))
     )
-    rows = ImuTracker(told, Watch(told).attitude).columns(
+    rows = ImuTracker(told, RuleSet(told).attitude).columns(
         [imu_columns(first), imu_columns([]), imu_columns(second)]
     )
     assert rows.time.tolist() == [T0 + k * MS for k in (1, 2, 3, 4)]
     np.testing.assert_allclose(
         rows.gravity[:, 1], [-9.81 * math.sin(0.01 * k) for k in (1, 2, 3, 4)]
     )
-    empty = ImuTracker(told, Watch(told).attitude).columns([])
+    empty = ImuTracker(told, RuleSet(told).attitude).columns([])
     assert (empty.time.shape, empty.gravity.shape, empty.unusable.shape) == ((0,), (0, 3), (0,))

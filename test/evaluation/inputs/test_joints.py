@@ -11,7 +11,7 @@ from evaluation.streams import MS, T0, Joints, S, batch_of, joint_messages, sett
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.alerts.rules import Watch
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.settings import JointInput
 
@@ -139,8 +139,8 @@ def turning(unit: float, wrapped: float = 0.0) -> tuple[list[float], list[str]]:
     told = settings()
     lift = replace(told.robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf)
     told = replace(told, robot=replace(told.robot, joints=(lift, told.robot.joints[1])))
-    watch = Watch(told)
-    merger, known = JointMerger(told, watch.leaps), []
+    watch = RuleSet(told)
+    merger, known = JointMerger(told, watch.jump_signals), []
     for k in range(1000):
         angle = k * 0.01
         angle = angle - wrapped * round(angle / wrapped) if wrapped else angle
@@ -170,8 +170,8 @@ def test_a_leap_is_forgotten_when_the_joint_is_slow_again() -> None:
     slide = [0.0] * 150 + [0.3] * 450
     told = [replace(j, velocity=0.01) for j in settings().robot.joints]
     slow = replace(settings(), robot=replace(settings().robot, joints=tuple(told)))
-    watch = Watch(slow)
-    merger, known = JointMerger(slow, watch.leaps), []
+    watch = RuleSet(slow)
+    merger, known = JointMerger(slow, watch.jump_signals), []
     for k, q in enumerate(slide):
         merger.merge(T0 + k * 10 * MS, ('lift', 'hand_slide'), (0.1, q), (), ())
         known.append(merger.q[1])
@@ -191,8 +191,8 @@ def heard(
     of = replace(settings(), robot=replace(robot, joints=joints))
     logs = []
     for columns in (False, True):
-        watch = Watch(of)
-        merger = JointMerger(of, watch.leaps)
+        watch = RuleSet(of)
+        merger = JointMerger(of, watch.jump_signals)
         run = [Joints(T0 + at * MS, (joint,), (q,)) for at, q in told]
         for part in split(run, [len(run) // 3, 370]):
             if columns:
@@ -232,8 +232,8 @@ def test_messages_that_come_late_and_all_at_once_do_not_leap() -> None:
     assert not heard([(at - at % 50 + at % 50 // 10, at / 1e3) for at in range(0, 3000, 10)])
 
 
-@pytest.mark.parametrize(('kind', 'leaps'), [('continuous', 0), ('revolute', 1)])
-def test_a_turn_to_and_fro_is_no_leap_of_an_endless_joint(kind: str, leaps: int) -> None:
+@pytest.mark.parametrize(('kind', 'jump_signals'), [('continuous', 0), ('revolute', 1)])
+def test_a_turn_to_and_fro_is_no_leap_of_an_endless_joint(kind: str, jump_signals: int) -> None:
     """It rests where its driver wraps: told as half a turn, and minus half a turn."""
     told = [(at, math.pi * (-1) ** (at // 10)) for at in range(5, 3000, 10)]
-    assert len(heard(told, 'lift', kind=kind)) == leaps
+    assert len(heard(told, 'lift', kind=kind)) == jump_signals

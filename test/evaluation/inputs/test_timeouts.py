@@ -6,7 +6,7 @@ from evaluation.streams import MS, T0, S
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.inputs.timeouts import STARTUP, WINDOW, Freshness
+from ugv_acceptance.evaluation.inputs.timeouts import STARTUP, WINDOW, InputTimeout
 from ugv_acceptance.evaluation.settings import Delays
 
 _steps = st.lists(st.integers(1, 400), min_size=1, max_size=150)
@@ -21,7 +21,7 @@ def times_of(steps: list[int]) -> list[int]:
 def test_many_messages_are_as_many_single_ones(steps: list[int], cuts: list[int]) -> None:
     """Limits before and after each message, period and deadline are the same."""
     times = times_of(steps)
-    one, many = Freshness(Delays()), Freshness(Delays())
+    one, many = InputTimeout(Delays()), InputTimeout(Delays())
     expected = []
     for now in times:
         before = one.limit
@@ -40,7 +40,7 @@ def test_many_messages_are_as_many_single_ones(steps: list[int], cuts: list[int]
 @given(_steps)
 def test_the_period_is_the_median_of_the_last_full_window(steps: list[int]) -> None:
     """Of 32 intervals; until then nothing is known and the start-up limit holds."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     fresh.messages(np.array(times_of(steps)))
     whole = (len(steps) - 1) // WINDOW * WINDOW
     if not whole:
@@ -61,7 +61,7 @@ def test_clock_of_many_is_clock_of_each(pairs: list[tuple[int, int]], cut: int, 
     """Also where the messages come in two parts, or a clock is so coarse that it stands."""
     times = T0 + np.cumsum([step for step, _ in pairs])
     stamps = (times + [shift for _, shift in pairs]) // grain * grain
-    one, many = Freshness(Delays()), Freshness(Delays())
+    one, many = InputTimeout(Delays()), InputTimeout(Delays())
     expected = []
     for now, stamp in zip(times.tolist(), stamps.tolist(), strict=True):
         expected.append(one.clock(now, stamp))
@@ -87,7 +87,7 @@ def test_stamps_that_jump_or_are_days_off_are_a_clock_fault(
     stamps: list[int], wrong: list[float]
 ) -> None:
     """A second of slack; staleness does not depend on stamps."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     times = np.array([T0, T0 + S])
     assert fresh.clocks(times, T0 + np.array(stamps) * S).tolist() == wrong
     fresh.messages(times)
@@ -96,7 +96,7 @@ def test_stamps_that_jump_or_are_days_off_are_a_clock_fault(
 
 def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
     """Stamps that stand still while messages are received."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     wrong = []
     for k in range(40):
         wrong.append(fresh.clock(T0 + k * 50 * MS, T0))
@@ -106,7 +106,7 @@ def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
 
 def test_columns_learn_the_period_of_a_slow_input() -> None:
     """A hundred messages at 60 ms: stale after three periods."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     _, limits = fresh.messages(T0 + np.arange(100) * 60 * MS)
     assert fresh.period == 60 * MS
     assert limits[-1] == fresh.limit == 180 * MS
@@ -115,12 +115,12 @@ def test_columns_learn_the_period_of_a_slow_input() -> None:
 def test_columns_of_a_frozen_clock_are_wrong_after_half_a_second() -> None:
     """Not at half a second: only what is longer."""
     times = T0 + np.arange(20) * 50 * MS
-    wrong = Freshness(Delays()).clocks(times, np.full(20, T0))
+    wrong = InputTimeout(Delays()).clocks(times, np.full(20, T0))
     assert np.flatnonzero(wrong)[0] * 50 == 550
 
 
 def test_no_message_has_no_clock() -> None:
     """A batch without one changes nothing."""
-    fresh = Freshness(Delays())
+    fresh = InputTimeout(Delays())
     assert fresh.clocks(np.empty(0, np.int64), np.empty(0, np.int64)).tolist() == []
     assert fresh.deadline is None

@@ -1,4 +1,4 @@
-"""Paths that an operator could follow: one joint moved one way, or the robot turned on the spot."""
+"""Candidate motions: one joint moved one way, or the robot turned on the spot."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

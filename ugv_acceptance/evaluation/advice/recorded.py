@@ -1,4 +1,4 @@
-"""What to do about each alert of a recording, computed for the moment it was raised.
+"""Advice for each alert of a recording, for the moment it was raised.
 
 A case is kept an alert, not a message; what costs milliseconds is done at the end, for so many.
 """

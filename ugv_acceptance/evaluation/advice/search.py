@@ -1,4 +1,4 @@
-"""What to do about the worst margin: which joint to move which way, turn, or set the load down.
+"""Searches advice: which motion helps the worst margin most, and its words.
 
 Each candidate is a path, followed step by step with the compiled model: it is left where another
 margin falls below its warning limit, where a motor would have to lift more than it can, or where

@@ -1,4 +1,4 @@
-"""Alarm management as ISA-18.2, IEC 62682 and OPC UA know it: what a person has seen of an alert.
+"""Alarm management (ISA-18.2, IEC 62682): acknowledged, shelved, latched.
 
 An alert is active or over; an alarm also remembers whether somebody acknowledged it. Pure: events
 and their times (ns) come in, changes go out.

@@ -1,4 +1,4 @@
-"""Alerts in plain words: where, what, how much, and what to do."""
+"""The sentences of alerts, the words of levels, and where a failure has its source."""
 
 import math
 from enum import Enum

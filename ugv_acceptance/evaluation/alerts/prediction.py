@@ -1,4 +1,4 @@
-"""What comes next, from the last half second: margins that shrink fast, motors that give all.
+"""Short-horizon prediction: time to a limit from the last half second of margins.
 
 Looked at every 50 ms of receipt time, so that a message costs a comparison. A recording and a live
 stream are judged by the same columns: the live one whenever time passes (`judge`).
@@ -60,7 +60,7 @@ MOST = 1024
 
 
 @dataclass(slots=True)
-class Foresight:
+class Prediction:
     """One signal a rule; `tip` follows SIDES, the others `robot.joint_names`.
 
     `due` (ns) is when the next look is.
@@ -220,12 +220,12 @@ def _largest(values: Floats, over: int) -> Floats:
     return reduce(np.maximum, [values[k : last + k] for k in range(over)])
 
 
-def foresight_of(settings: Settings, signal: SignalOf) -> Foresight:
+def foresight_of(settings: Settings, signal: SignalOf) -> Prediction:
     """Return the rules of a robot; `signal` makes one of code, subject, (on, off) and delay (s)."""
     names, limits, delays = settings.robot.joint_names, settings.limits, settings.delays
     ahead, levels = (-SOON, -LATER), [limits.torque_warn * limit for limit in limits.torque]
     at = [(level, level - min(limits.torque_deadband, level / 2.0)) for level in levels]
-    return Foresight(
+    return Prediction(
         [signal('TIP_AHEAD', side, ahead, delays.tip_on) for side in SIDES],
         [signal('TORQUE_AHEAD', name, ahead, delays.torque_on) for name in names],
         [

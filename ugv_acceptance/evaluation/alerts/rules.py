@@ -1,8 +1,8 @@
-"""The rules of an evaluation and their signals: what is watched, live and in a recording alike."""
+"""The rules of alerts: what is watched at which limit, live and recorded alike."""
 
 from dataclasses import dataclass, field
 
-from ugv_acceptance.evaluation.alerts.prediction import Foresight, foresight_of
+from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
 from ugv_acceptance.evaluation.margin_table import MarginRows
@@ -19,7 +19,7 @@ LEAP = 10.0
 
 
 @dataclass(slots=True)
-class Watch:
+class RuleSet:
     """One signal a rule, (WARN, ERROR) where a rule has two levels. `log` receives all alerts.
 
     `torque` and `speed` follow `robot.joint_names`, `tip` follows SIDES.
@@ -35,9 +35,9 @@ class Watch:
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
     missing: Signal = field(init=False)
-    leaps: list[Signal] = field(init=False)
+    jump_signals: list[Signal] = field(init=False)
     attitude: AttitudeSignals = field(init=False)
-    foresight: Foresight = field(init=False)
+    prediction: Prediction = field(init=False)
     slide: Signal = field(init=False)
     relaxed: dict[str, Signal] = field(init=False)
     _told: Settings | None = None
@@ -65,9 +65,9 @@ class Watch:
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
-        self.leaps = [self._leap(name) for name in names]
+        self.jump_signals = [self._jump_signal(name) for name in names]
         self.attitude = self._attitude()
-        self.foresight = foresight_of(self.settings, self._warning)
+        self.prediction = foresight_of(self.settings, self._warning)
         self.slide = self._slide()
         self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
 
@@ -79,13 +79,13 @@ class Watch:
             for name, signal in self.relaxed.items():
                 signal.step(now, 1.0 if name in found else 0.0)
 
-    def foresee(self) -> None:
+    def predict(self) -> None:
         """Judge what live samples gave the foresight; before time passes."""
-        self.foresight.judge(self.settings.limits.torque)
+        self.prediction.judge(self.settings.limits.torque)
 
-    def foresee_rows(self, rows: MarginRows) -> None:
+    def predict_rows(self, rows: MarginRows) -> None:
         """Judge what a stretch of a recording gives the foresight."""
-        self.foresight.rows(rows, self.settings.limits.torque)
+        self.prediction.rows(rows, self.settings.limits.torque)
 
     def _warning(self, code: str, subject: str, at: tuple[float, float], delay: float) -> Signal:
         return self._signal(code, subject, WARN, at, delay)
@@ -122,7 +122,7 @@ class Watch:
         """It stands as long as the limit is in force: no delay, whatever the delays are."""
         return Signal(Rule('LIMITS_RELAXED', name, WARN, 0.5, 0.5, 0, 0), self.log)
 
-    def _leap(self, joint: str) -> Signal:
+    def _jump_signal(self, joint: str) -> Signal:
         limit = LEAP * self.settings.robot.joint(joint).velocity
         delay = self.settings.delays.fault_on
         return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
@@ -163,11 +163,11 @@ class Watch:
         return [
             *pairs,
             *self.speed,
-            *self.leaps,
+            *self.jump_signals,
             *inputs,
             *faults,
             self.slide,
-            *self.foresight.signals(),
+            *self.prediction.signals(),
             *self.relaxed.values(),
         ]
 

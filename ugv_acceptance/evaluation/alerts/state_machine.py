@@ -1,4 +1,4 @@
-"""From levels to alerts: a rule with a deadband, and the state machine with its delays.
+"""The state machine of an alert: limit, deadband, on-delay and off-delay.
 
 The machine has no clock. What falls due between two samples is dated to the moment it fell due, so
 the same data give the same alerts whether they come one at a time or as runs of a recording.

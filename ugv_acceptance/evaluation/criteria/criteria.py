@@ -1,4 +1,4 @@
-"""What is demanded of a run, as data: criteria, and those that hold where nobody wrote any.
+"""Acceptance criteria as data, and the default ones from the limits of the robot.
 
 Values are SI and radians; times in windows are seconds since the start of the recording. `config`
 reads criteria from YAML, examination.py measures, verdicts.py judges. docs/criteria.md explains.

@@ -1,4 +1,4 @@
-"""Criteria measured while a recording is read: worst values, violations, dwell, visited cells."""
+"""Measures for criteria while a recording is read: worst values, time in violation."""
 
 from dataclasses import dataclass, field
 from heapq import nsmallest
@@ -274,7 +274,7 @@ Measure = ValueMeasure | MapMeasure | KnownTime
 
 
 @dataclass(slots=True)
-class Examination:
+class CriteriaMeasurement:
     """Everything that is measured for a set of criteria, and the payloads it needs for that."""
 
     criteria: CriteriaSet

@@ -1,4 +1,4 @@
-"""Criteria and what became of them in plain words."""
+"""The sentences of criteria and their outcomes."""
 
 import math
 from collections.abc import Sequence

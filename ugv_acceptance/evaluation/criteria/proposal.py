@@ -1,4 +1,4 @@
-"""Criteria proposed from a good run, as YAML: its worst values, its bounds, and some room."""
+"""Proposes criteria from a good run, as YAML: its worst values and some room."""
 
 import json
 import math

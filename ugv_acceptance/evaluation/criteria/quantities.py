@@ -1,4 +1,4 @@
-"""The values a criterion can be about: how each is taken from margin rows, its unit, its words."""
+"""The quantities a criterion can be about: margins, other values, quality of the data."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

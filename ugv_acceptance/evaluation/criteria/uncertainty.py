@@ -1,4 +1,4 @@
-"""The bound on a margin that follows from the stated +/- of the numbers it is computed from.
+"""Uncertainty of worst values, from the stated +/- of the numbers they come from.
 
 First order: every number is moved by its +/- to both sides while the posture, the payload and the
 support polygon stay what they are; half the difference is that number's effect. Effects are
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance.evaluation.criteria.criteria import IGNORED, RSS, WORST_CASE, Value
-from ugv_acceptance.evaluation.criteria.measurement import Examination, Moment, ValueMeasure
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, Moment, ValueMeasure
 from ugv_acceptance.evaluation.criteria.quantities import shown
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
@@ -309,7 +309,7 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
     }
 
 
-def margin_bounds(result: dict[str, Any], limits: Examination, bounds: Bounds) -> None:
+def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: Bounds) -> None:
     """Add to every joint's and to the tip-over margin of a result the bound at its worst moment."""
     for measure in limits.measures.values():
         if not isinstance(measure, ValueMeasure):

@@ -1,4 +1,4 @@
-"""From measures to verdicts: each criterion PASS, FAIL or INCONCLUSIVE, with its evidence.
+"""Judges each criterion, and the run by the worst of them: PASS, FAIL, INCONCLUSIVE.
 
 A violation is a FAIL however little was evaluated; a PASS needs the data, and a margin beyond the
 bound of its uncertainty.
@@ -23,7 +23,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.measurement import (
-    Examination,
+    CriteriaMeasurement,
     KnownTime,
     MapMeasure,
     ValueMeasure,
@@ -44,7 +44,7 @@ from ugv_acceptance.type_aliases import Json
 class Findings:
     """What verdicts are made from: measures, alerts, the data's numbers (a result), bounds."""
 
-    examination: Examination
+    measurement: CriteriaMeasurement
     alerts: Sequence[Alert]
     data: Json
     bounds: Bounds
@@ -52,11 +52,11 @@ class Findings:
     @property
     def settings(self) -> Settings:
         """Return the settings of the evaluation."""
-        return self.examination.settings
+        return self.measurement.settings
 
     def seconds(self, time: int) -> float:
         """Return seconds since the start of the recording."""
-        return (time - self.examination.start) / 1e9
+        return (time - self.measurement.start) / 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +71,9 @@ class Outcome:
 
 def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> str | None:
     """Return why too little of a criterion's window was evaluated; None where enough was."""
-    examination = findings.examination
-    start, end = examination.span_of(criterion.window)
-    share, needed = evaluated / (end - start) if end > start else 0.0, examination.criteria.coverage
+    measurement = findings.measurement
+    start, end = measurement.span_of(criterion.window)
+    share, needed = evaluated / (end - start) if end > start else 0.0, measurement.criteria.coverage
     if share >= needed and end > start:
         return None
     what = 'the recording'
@@ -93,7 +93,7 @@ def alert_words(alert: Alert, findings: Findings) -> str:
 
 def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     """Return what becomes of a criterion on a value."""
-    measure = findings.examination.measures[criterion.name]
+    measure = findings.measurement.measures[criterion.name]
     assert isinstance(measure, ValueMeasure)  # noqa: S101 - by its demand
     measured = _measured(measure, findings)
     evidence = tuple(_related(measure, findings))
@@ -119,7 +119,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
 
 
 def _decides(criterion: Criterion, findings: Findings) -> bool:
-    return findings.examination.criteria.uncertainty_of(criterion) != IGNORED
+    return findings.measurement.criteria.uncertainty_of(criterion) != IGNORED
 
 
 def _met(measure: ValueMeasure) -> bool:
@@ -146,7 +146,7 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
     """Return a value's numbers in the unit people see."""
     demand, violation = measure.demand, measure.violation
     scale, unit = shown(demand.signal, demand.of, findings.settings)
-    method = findings.examination.criteria.uncertainty_of(measure.criterion)
+    method = findings.measurement.criteria.uncertainty_of(measure.criterion)
     worst = measure.worst[0] if measure.worst and isfinite(measure.worst[0].value) else None
     bound, first = findings.bounds.worst(measure, method), measure.first
     start, end = measure.span
@@ -203,7 +203,7 @@ def _related(measure: ValueMeasure, findings: Findings) -> list[str]:
 
 def judge_criteria(findings: Findings) -> Json:
     """Return verdict, reasons and every criterion's outcome, ready for JSON."""
-    criteria = findings.examination.criteria
+    criteria = findings.measurement.criteria
     outcomes = [(c, _outcome(c, findings)) for c in criteria.criteria]
     word, reasons = _overall([outcome for _, outcome in outcomes], findings)
     return {
@@ -229,7 +229,7 @@ def _overall(outcomes: Sequence[Outcome], findings: Findings) -> tuple[str, list
         if reasons:
             return word, reasons
     share = findings.data['coverage']['fraction']
-    text = 'all margins kept' if findings.examination.criteria.path is None else 'all criteria met'
+    text = 'all margins kept' if findings.measurement.criteria.path is None else 'all criteria met'
     wider = relaxed_words(findings.settings)
     return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
 
@@ -255,7 +255,7 @@ def _outcome(criterion: Criterion, findings: Findings) -> Outcome:
 
 
 def _judge_alert(criterion: Criterion, findings: Findings) -> Outcome:
-    demand, measure = criterion.demand, findings.examination.measures[criterion.name]
+    demand, measure = criterion.demand, findings.measurement.measures[criterion.name]
     assert isinstance(demand, AlertDemand)  # noqa: S101 - by its kind
     assert isinstance(measure, KnownTime)  # noqa: S101 - the same
     start, end = measure.span
@@ -329,7 +329,7 @@ def _unmet_words(
 
 
 def _judge_map(criterion: Criterion, findings: Findings) -> Outcome:
-    demand, measure = criterion.demand, findings.examination.measures[criterion.name]
+    demand, measure = criterion.demand, findings.measurement.measures[criterion.name]
     assert isinstance(demand, MapDemand)  # noqa: S101 - by its kind
     assert isinstance(measure, MapMeasure)  # noqa: S101 - the same
     cells, visited = measure.visited.size, int(measure.visited.sum())

@@ -1,4 +1,4 @@
-"""The model held against the run: measured efforts beside static torque, at rest and in motion.
+"""Compares measured efforts with static torques over a run: scale, offset, intervals.
 
 At rest: bias, scale and sign of each joint's effort, and the payload that would explain the
 difference. In motion: friction, and the paper's F test of the run against its own slow part.
@@ -93,20 +93,20 @@ class ModelCheck:
     def _lever(self, q: Floats, gravity: Floats) -> Floats:
         robot = self.settings.robot
         one, none = (Payload(mass, robot.payload.cog) for mass in (1.0, 0.0))
-        lever: Floats = static_torque(robot, q, gravity, one) - static_torque(
+        torque_gradient: Floats = static_torque(robot, q, gravity, one) - static_torque(
             robot, q, gravity, none
         )
-        return lever
+        return torque_gradient
 
     def result(self) -> Json:
         """Return the comparison for JSON: each joint's, the payload of all, the speed's share."""
         names = self.settings.robot.joint_names
         time, (effort, torque, rate, q, gravity) = self._samples.samples(len(names))
-        lever = self._lever(q, gravity)
+        torque_gradient = self._lever(q, gravity)
         slow = np.abs(np.nan_to_num(rate)).max(axis=1, initial=0.0) <= REST
         clipped = np.abs(effort) >= CLIPPED * np.array(self.settings.limits.torque)
         effort = np.where(clipped, np.nan, effort)
-        columns = zip(effort.T, torque.T, lever.T, rate.T, clipped.T, strict=True)
+        columns = zip(effort.T, torque.T, torque_gradient.T, rate.T, clipped.T, strict=True)
         samples = [_Samples(*column, slow) for column in columns]
         return {
             'samples': len(time),
@@ -134,7 +134,7 @@ class _Samples:
 
     effort: Floats
     torque: Floats
-    lever: Floats
+    torque_gradient: Floats
     rate: Floats
     clipped: NDArray[np.bool_]
     slow: NDArray[np.bool_]
@@ -174,14 +174,18 @@ def _rest(s: _Samples) -> Json:
     rest = s.rest()
     if rest.sum() < LEAST:
         return {'bias': None, 'scale': None, 'sign': 'unknown', 'payload_kg': None}
-    difference, torque, lever = s.difference[rest], s.torque[rest], s.lever[rest]
+    difference, torque, torque_gradient = (
+        s.difference[rest],
+        s.torque[rest],
+        s.torque_gradient[rest],
+    )
     ones = np.ones((len(difference), 1))
     scale = None
     if torque.std() > SPREAD:
         scale = least_squares(np.column_stack((torque, ones)), s.effort[rest])
     payload = None
-    if np.sqrt((lever**2).mean()) > LEVER:
-        payload = least_squares(lever[:, None], difference)
+    if np.sqrt((torque_gradient**2).mean()) > LEVER:
+        payload = least_squares(torque_gradient[:, None], difference)
     return {
         'bias': _interval(least_squares(ones, difference)),
         'rms': float(np.sqrt((difference**2).mean())),
@@ -251,10 +255,10 @@ def _pooled_payload(samples: list[_Samples]) -> Json | None:
     columns, y = [], []
     for s in samples:
         rest = s.rest()
-        if rest.sum() < LEAST or np.sqrt((s.lever[rest] ** 2).mean()) <= LEVER:
+        if rest.sum() < LEAST or np.sqrt((s.torque_gradient[rest] ** 2).mean()) <= LEVER:
             continue
         spread = float(np.std(s.difference[rest])) or 1e-6
-        columns.append(s.lever[rest] / spread)
+        columns.append(s.torque_gradient[rest] / spread)
         y.append(s.difference[rest] / spread)
     if not columns:
         return None

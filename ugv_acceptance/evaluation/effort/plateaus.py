@@ -1,4 +1,4 @@
-"""Measured effort beside static torque at rest: where they differ, what payload that would be."""
+"""Measured effort beside static torque where joints rest, and the payload it tells of."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""IMU messages to the gravity vector in `base_link`, and what is wrong with them.
+"""IMU messages to gravity in `base_link`, and what is wrong with them.
 
 The orientation is used where the message claims it and it is a rotation that says something; else
 the low-passed accelerometer, and unless the message says that it has none, that is a fault.

@@ -1,4 +1,4 @@
-"""Joint states to the robot's joints: names matched, signs undone, partial messages merged.
+"""Joint states to the robot's joints: names, signs, offsets, partial messages merged.
 
 Once a second every joint's position is compared with that of the second before: what moves faster
 than the joint can is another unit or another joint, and counts for nothing. So does what jumps to
@@ -54,7 +54,7 @@ class JointRows:
 
 @dataclass(slots=True)
 class Layout:
-    """The robot's joints in messages of some names, and the second last looked at for leaps.
+    """The robot's joints in messages of some names, and the second last looked at for jumps.
 
     `pairs` are (joint number, place in the message).
     """
@@ -67,11 +67,12 @@ class Layout:
 class JointMerger:
     """Holds the newest position, rate and effort of every joint, in robot convention.
 
-    `leaps` are the signals of the joints; while one has an alert its joint's position is unknown.
+    `jump_signals` are those of the joints for implausible jumps; while one has an alert, the
+    position of its joint is unknown.
     """
 
     settings: Settings
-    leaps: Sequence[Signal] = ()
+    jump_signals: Sequence[Signal] = ()
     q: list[float] = field(init=False)
     qd: list[float] = field(init=False)
     effort: list[float] = field(init=False)
@@ -83,7 +84,7 @@ class JointMerger:
     _jumps: list[int] = field(init=False)
     _most: list[float] = field(init=False)
     _turn: list[float] = field(init=False)
-    _leapt: bool = False
+    _has_jumped: bool = False
 
     def __post_init__(self) -> None:
         n = len(self.settings.joints)
@@ -95,7 +96,7 @@ class JointMerger:
         self._before = [(NEVER, math.nan)] * n
         self._told, self._jumps = [math.nan] * n, [0] * n
         # What a joint can move by between two messages that come at once.
-        self._most = [s.rule.on * SHORTEST / SECOND for s in self.leaps] or [math.inf] * n
+        self._most = [s.rule.on * SHORTEST / SECOND for s in self.jump_signals] or [math.inf] * n
         self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
 
     def layout(self, names: tuple[str, ...]) -> Layout:
@@ -143,7 +144,7 @@ class JointMerger:
             self.qd[j] = qd if -ABSURD <= qd <= ABSURD else math.nan
             scale = joint.effort_sign * joint.effort_scale
             self.effort[j] = scale * effort[k] if efforts else math.nan
-        if now // SECOND != layout.second or self._leapt:
+        if now // SECOND != layout.second or self._has_jumped:
             self._look(now, layout)
         return True
 
@@ -154,23 +155,25 @@ class JointMerger:
             for j, _ in layout.pairs:
                 self._compare(j, now, self.q[j])
         for j, _ in layout.pairs:
-            if self.leaps:
-                self.leaps[j].advance(now)
-                if self.leaps[j].alert is not None:
+            if self.jump_signals:
+                self.jump_signals[j].advance(now)
+                if self.jump_signals[j].alert is not None:
                     self.q[j] = math.nan
-        self._leapt = not all(signal.quiet for signal in self.leaps)
+        self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
 
     def _compare(self, j: int, now: int, q: float) -> None:
         """Compare joint number j's position with the one before; a turn of it may be wrapped."""
         then, before = self._before[j]
-        if not self.leaps or math.isnan(q) or (then != NEVER and now - then < APART):
+        if not self.jump_signals or math.isnan(q) or (then != NEVER and now - then < APART):
             return
         self._before[j] = now, q
         jumps, self._jumps[j] = self._jumps[j], 0
         if then != NEVER:
             way = abs(q - before)
             rate = min(way, abs(way - self._turn[j])) / (now - then) * SECOND
-            self.leaps[j].step(now, max(rate, self.leaps[j].on if jumps >= MANY else 0.0))
+            self.jump_signals[j].step(
+                now, max(rate, self.jump_signals[j].on if jumps >= MANY else 0.0)
+            )
 
     def _jumped(self, j: int, way: Values, apart: Values) -> Values:
         """Return whether joint number j cannot have moved so far in so long (ns), nor turned."""
@@ -198,7 +201,7 @@ class JointMerger:
             order = np.argsort(time, kind='stable')
             time, stamp = time[order], stamp[order]
             tables, named, of = tables[:, :, order], named[:, order], of[order]
-        if self.leaps and n:
+        if self.jump_signals and n:
             rows_of = [(self.layout(x), np.flatnonzero(of == k)) for x, k in numbers.items()]
             self._look_at(time, tables[0], named, rows_of)
         return self._carry(time, stamp, tables, named)
@@ -207,7 +210,7 @@ class JointMerger:
         self, time: Times, q: Floats, named: Mask, rows_of: Sequence[tuple[Layout, Indices]]
     ) -> None:
         """Look for leaps in the positions (j, n) that messages name, as `_look` at each of them."""
-        before, seen = [signal.alert for signal in self.leaps], len(self.leaps[0].log)
+        before, seen = [signal.alert for signal in self.jump_signals], len(self.jump_signals[0].log)
         looks: list[tuple[int, int]] = []
         for layout, rows in rows_of:
             seconds = time[rows] // SECOND
@@ -220,14 +223,14 @@ class JointMerger:
                 count = int(np.searchsorted(jumps[j], row, 'right'))
                 self._jumps[j], jumps[j] = self._jumps[j] + count, jumps[j][count:]
             self._compare(j, int(time[row]), float(q[j, row]))
-        for j, signal in enumerate(self.leaps):
+        for j, signal in enumerate(self.jump_signals):
             self._jumps[j] += len(jumps[j])
             signal.advance(int(time[-1]))
             for alert in [before[j], *signal.log[seen:]]:
                 if alert is not None and alert.rule is signal.rule:
                     end = np.inf if alert.end is None else alert.end
                     q[j, (time >= alert.start) & (time < end)] = np.nan
-        self._leapt = not all(signal.quiet for signal in self.leaps)
+        self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
 
     def _jump_rows(self, j: int, time: Times, q: Floats, named: Mask) -> Indices:
         """Return the rows at which joint number j jumps, as `merge` finds them."""

@@ -1,4 +1,4 @@
-"""The low-passed accelerometer: one message at a time, and the same in closed form for columns."""
+"""Low-pass filter of the accelerometer, message by message and for whole columns."""
 
 import math
 from collections.abc import Sequence

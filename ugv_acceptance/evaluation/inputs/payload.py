@@ -1,4 +1,4 @@
-"""What is carried: a declared payload where it can be believed, and which was declared when."""
+"""The declared payload: which messages can be believed, and what held at which time."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Is an input alive? Judged by when its messages were received, never by their header stamps."""
+"""Timeouts of inputs, by the time of receipt, and doubts about header stamps."""
 
 import math
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ STANDSTILL = 500_000_000
 
 
 @dataclass(slots=True)
-class Freshness:
+class InputTimeout:
     """Learns an input's period (median of each WINDOW intervals) and how long it may be silent.
 
     `started` is when listening began (ns), `last` when the newest message was received (None: none

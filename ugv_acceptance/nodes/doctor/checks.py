@@ -1,4 +1,4 @@
-"""What a doctor says: findings from what was heard of a robot, each with what to do."""
+"""Checks of a set-up: findings from what was heard, each with what to do."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What can be heard of a robot in a few seconds: who publishes what, and samples of it."""
+"""Listens to a robot for a few seconds: who publishes what, and samples of it."""
 
 import os
 import time

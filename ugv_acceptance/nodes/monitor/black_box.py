@@ -1,4 +1,4 @@
-"""The black box: the seconds before and after each critical alert, saved as a small recording.
+"""The black box: saves the seconds around each critical alert as a small recording.
 
 Messages are kept as they came, in memory. On a critical alert what is kept goes to the file at
 once, what follows is written as it comes: a process that is killed later loses half a second.

@@ -1,4 +1,4 @@
-"""`acceptance_monitor`: the lifecycle node that watches a robot's margins. docs/ros_interface.md.
+"""Node `acceptance_monitor`, a lifecycle node: docs/ros_interface.md.
 
 It advises; it is not a safety function. It brings itself up unless `autostart` is false. Inputs are
 subscribed as raw bytes on activation, so an inactive monitor costs nothing.
@@ -44,7 +44,7 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
 )
 from ugv_acceptance.nodes.monitor.parameters import (
     FREE,
-    Knob,
+    TunableParameter,
     changed,
     check_at_rest,
     check_locked,
@@ -71,7 +71,7 @@ class Monitor(LifecycleNode):
         self.session: Session | None = None
         self.problem = ''
         self._settings: Settings | None = None
-        self.knobs: tuple[Knob, ...] = ()
+        self.tunables: tuple[TunableParameter, ...] = ()
         self._inputs: Inputs | None = None
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
@@ -135,15 +135,15 @@ class Monitor(LifecycleNode):
         urdf = self._value('urdf')
         self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
         defaults = self.config.settings
-        knobs = knobs_of(defaults)
-        for knob in knobs:
-            if not self.has_parameter(knob.name):
-                self.declare_parameter(knob.name, knob.get(defaults), knob.descriptor())
+        tunables = knobs_of(defaults)
+        for tunable in tunables:
+            if not self.has_parameter(tunable.name):
+                self.declare_parameter(tunable.name, tunable.get(defaults), tunable.descriptor())
         given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
-        for warning in [*self.config.warnings, *unknown(given, knobs)]:
+        for warning in [*self.config.warnings, *unknown(given, tunables)]:
             self.get_logger().warning(warning)
-        values = {knob.name: self._value(knob.name) for knob in knobs}
-        self._settings, self.knobs = changed(defaults, knobs, values), knobs
+        values = {tunable.name: self._value(tunable.name) for tunable in tunables}
+        self._settings, self.tunables = changed(defaults, tunables, values), tunables
         self.output.hardware_id = self.config.serial or self.config.name
         self._margins = MarginOutput(self, self._settings)
 
@@ -169,7 +169,7 @@ class Monitor(LifecycleNode):
     def _deactivate(self) -> None:
         if self.session is not None:
             self._tell(all_reset(self.session))
-            self.session.counsel.close()
+            self.session.advisory.close()
         if self._box is not None:
             self._box.close()
         if self._inputs is not None:
@@ -179,11 +179,11 @@ class Monitor(LifecycleNode):
         self._inputs = self._tick = self.session = self._box = None
 
     def _clean_up(self) -> None:
-        for knob in self.knobs:
-            self.undeclare_parameter(knob.name)
+        for tunable in self.tunables:
+            self.undeclare_parameter(tunable.name)
         if self._margins is not None:
             self._margins.destroy()
-        self.knobs, self._margins, self.config, self._settings = (), None, None, None
+        self.tunables, self._margins, self.config, self._settings = (), None, None, None
 
     # Time
 
@@ -194,11 +194,11 @@ class Monitor(LifecycleNode):
             session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
         self._tell_load()
-        self._tell(session.follower.alarms.advance(now := session.clock.now()))
+        self._tell(session.alarm_tracker.alarms.advance(now := session.clock.now()))
         if self._box is not None:
             self._box.advance(now)
-        session.counsel.renew(now, session.active)
-        if session.counsel.arrived() or session.counsel.urgent(now):
+        session.advisory.renew(now, session.active)
+        if session.advisory.arrived() or session.advisory.urgent(now):
             self.say()
 
     def _every_second(self) -> None:
@@ -226,7 +226,7 @@ class Monitor(LifecycleNode):
 
     def _on_change(self) -> None:
         if self.session is not None:
-            self._tell(self.session.follower.take())
+            self._tell(self.session.alarm_tracker.take())
             self.say()
 
     def _tell(self, changes: list[Change]) -> None:
@@ -282,9 +282,9 @@ class Monitor(LifecycleNode):
             if self.session is not None:
                 check_at_rest(values)
                 if self._value('lock_parameters'):
-                    check_locked(values, self.knobs)
+                    check_locked(values, self.tunables)
             if self._settings is not None:
-                changed(self._in_force(self._settings), self.knobs, values)
+                changed(self._in_force(self._settings), self.tunables, values)
         except (BadConfig, TypeError, ValueError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -292,7 +292,7 @@ class Monitor(LifecycleNode):
     def _take_parameters(self, parameters: list[Parameter]) -> None:
         values = {parameter.name: parameter.value for parameter in parameters}
         if self._settings is not None:
-            self._settings = changed(self._in_force(self._settings), self.knobs, values)
+            self._settings = changed(self._in_force(self._settings), self.tunables, values)
             if self.session is not None:
                 self.session.adopt(self._settings)
         self._take_rates()
@@ -308,7 +308,7 @@ class Monitor(LifecycleNode):
             return
         self._settings = self._in_force(self._settings)
         told = [
-            Parameter(k.name, value=k.get(self._settings)) for k in self.knobs if k.name in FREE
+            Parameter(k.name, value=k.get(self._settings)) for k in self.tunables if k.name in FREE
         ]
         self.set_parameters_atomically(told)
 

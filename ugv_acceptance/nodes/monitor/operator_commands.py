@@ -1,4 +1,4 @@
-"""What a person does about alerts: acknowledge, shelve, unshelve, reset; who, and with what note.
+"""Commands of the operator: acknowledge, shelve, unshelve, reset; with name and note.
 
 On `~/operator` as a DiagnosticStatus: `name` is what to do, `hardware_id` who, `message` the note,
 `values` the alert: code, subject, level, and for shelve seconds. No alert named: all of them.
@@ -59,12 +59,12 @@ def operation_from(message: DiagnosticStatus) -> Operation:
 
 def by_service(session: Session) -> list[Change]:
     """Acknowledge all; a service of type Trigger does not say who it was."""
-    return session.follower.alarms.acknowledge(session.clock.now(), SERVICE)
+    return session.alarm_tracker.alarms.acknowledge(session.clock.now(), SERVICE)
 
 
 def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
     """Do what a message asks; return what changed. AcceptanceError where it is refused."""
-    alarms, now, o = session.follower.alarms, session.clock.now(), operation_from(message)
+    alarms, now, o = session.alarm_tracker.alarms, session.clock.now(), operation_from(message)
     if o.do == 'acknowledge':
         return alarms.acknowledge(now, o.who, o.note, o.key)
     if o.do == 'reset':
@@ -78,7 +78,7 @@ def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
 
 def all_reset(session: Session) -> list[Change]:
     """Return what is told of all alarms when an evaluation ends."""
-    now, table = session.clock.now(), session.follower.alarms.table
+    now, table = session.clock.now(), session.alarm_tracker.alarms.table
     return [Change(now, alarm.alert, 'reset', State.NORMAL) for alarm in table.values()]
 
 

@@ -1,4 +1,4 @@
-"""Parameters: what can be set while the monitor runs, its ranges, and how it changes the settings.
+"""Parameters of the monitor: which can change while it runs, and their ranges.
 
 Names are those of the YAML file, units included. A set is checked as a whole and is wholly taken
 or wholly refused; several values that belong together go into one set_parameters_atomically.
@@ -31,7 +31,7 @@ NOT_JUDGED = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Knob:
+class TunableParameter:
     """A parameter: how it is read from settings and put into them; its range.
 
     `permitted` is what is expected without a reason, and with one; such a range is checked by
@@ -83,9 +83,9 @@ def check_at_rest(values: Mapping[str, Any]) -> None:
         raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
 
 
-def check_locked(values: Mapping[str, Any], knobs: Sequence[Knob]) -> None:
+def check_locked(values: Mapping[str, Any], tunables: Sequence[TunableParameter]) -> None:
     """Raise BadConfig where one of these parameters decides what is told: all but the load."""
-    locked = {knob.name for knob in knobs if knob.name not in FREE} | {ALLOWED}
+    locked = {tunable.name for tunable in tunables if tunable.name not in FREE} | {ALLOWED}
     found = [name for name in values if name in locked]
     if found:
         raise BadConfig(f'{found[0]}: locked by lock_parameters while active: deactivate first')
@@ -110,23 +110,23 @@ def declare_all(node: Node) -> None:
     declare('lock_parameters', False, described(what))
 
 
-def knobs_of(settings: Settings) -> tuple[Knob, ...]:
+def knobs_of(settings: Settings) -> tuple[TunableParameter, ...]:
     """Return the parameters of a robot."""
     torque = tuple(_torque_knob(settings, j) for j in range(len(settings.robot.joint_names)))
     return (*(_field_knob(of) for of in RANGES if of.live), *torque, *_CHOICES)
 
 
-def _field_knob(of: Permitted) -> Knob:
+def _field_knob(of: Permitted) -> TunableParameter:
     def put(settings: Settings, value: float) -> Settings:
         section = getattr(settings, of.part)
         part = replace(section, **{of.key: value * of.factor})
         changed: Settings = replace(settings, **{of.part: part})
         return changed
 
-    return Knob(of.name, of.what, of.value, put, of.floor, of.ceiling, of.words)
+    return TunableParameter(of.name, of.what, of.value, put, of.floor, of.ceiling, of.words)
 
 
-def _torque_knob(settings: Settings, j: int) -> Knob:
+def _torque_knob(settings: Settings, j: int) -> TunableParameter:
 
     def get(current: Settings) -> float:
         limit = current.limits.torque[j]
@@ -140,7 +140,7 @@ def _torque_knob(settings: Settings, j: int) -> Knob:
     name = torque_name(settings, j)
     unit = 'N' if name.endswith('_n') else 'N m'
     what = f'limit, {unit}; 0: not known, so not judged'
-    return Knob(name, what, get, put, 0.0, 1e9)
+    return TunableParameter(name, what, get, put, 0.0, 1e9)
 
 
 def _with_payload(settings: Settings, mass: float, cog: Sequence[float]) -> Settings:
@@ -164,13 +164,13 @@ def _with_reason(settings: Settings, value: str) -> Settings:
 
 
 _CHOICES = (
-    Knob(
+    TunableParameter(
         UNSAFE,
         'why limits may be wider than permitted; empty: they may not',
         lambda s: s.unsafe,
         _with_reason,
     ),
-    Knob(
+    TunableParameter(
         'payload.mass_kg',
         'mass of the load carried, kg, until the payload topic says otherwise',
         lambda s: float(s.robot.payload.mass),
@@ -178,19 +178,19 @@ _CHOICES = (
         0.0,
         1e6,
     ),
-    Knob(
+    TunableParameter(
         'payload.cog_m',
         'centre of gravity of the load in the axes of the payload link, m',
         lambda s: list(s.robot.payload.cog),
         lambda s, v: _with_payload(s, s.robot.payload.mass, v),
     ),
-    Knob(
+    TunableParameter(
         'imu.attitude',
         f'where gravity comes from: {", ".join(ATTITUDES)}',
         lambda s: s.imu.attitude,
         _with_attitude,
     ),
-    Knob(
+    TunableParameter(
         'imu.specific_force',
         'the accelerometer takes the place of gravity in every margin',
         lambda s: s.imu.specific_force,
@@ -199,32 +199,34 @@ _CHOICES = (
 )
 
 
-def unknown(names: Sequence[str], knobs: Sequence[Knob]) -> list[str]:
+def unknown(names: Sequence[str], tunables: Sequence[TunableParameter]) -> list[str]:
     """Return a warning for each given parameter that the node does not have."""
     found = []
     for name in sorted(names):
-        near = get_close_matches(name, [knob.name for knob in knobs], 1)
+        near = get_close_matches(name, [tunable.name for tunable in tunables], 1)
         hint = f'; did you mean {near[0]}?' if near else ''
         found.append(f'parameter {name} is not known and not used{hint}')
     return found
 
 
-def changed(settings: Settings, knobs: Sequence[Knob], values: Mapping[str, Any]) -> Settings:
+def changed(
+    settings: Settings, tunables: Sequence[TunableParameter], values: Mapping[str, Any]
+) -> Settings:
     """Return settings with parameters changed; BadConfig names the one that cannot be taken.
 
     A value that is what it was changes nothing, so that no digit is lost in a unit's conversion.
     """
-    for knob in knobs:
-        value = values.get(knob.name, knob.get(settings))
-        if value == knob.get(settings) or list_of(value) == list_of(knob.get(settings)):
+    for tunable in tunables:
+        value = values.get(tunable.name, tunable.get(settings))
+        if value == tunable.get(settings) or list_of(value) == list_of(tunable.get(settings)):
             continue
         if isinstance(value, float) and not math.isfinite(value):
-            raise BadConfig(f'{knob.name}: expected a finite number, got {value}')
-        lower, upper = knob.lower, knob.upper
-        ranged = lower is not None and upper is not None and not knob.permitted
+            raise BadConfig(f'{tunable.name}: expected a finite number, got {value}')
+        lower, upper = tunable.lower, tunable.upper
+        ranged = lower is not None and upper is not None and not tunable.permitted
         if ranged and not lower <= value <= upper:
-            raise BadConfig(f'{knob.name}: expected {lower:g} to {upper:g}, got {value}')
-        settings = knob.put(settings, value)
+            raise BadConfig(f'{tunable.name}: expected {lower:g} to {upper:g}, got {value}')
+        settings = tunable.put(settings, value)
     _check(settings)
     return settings
 

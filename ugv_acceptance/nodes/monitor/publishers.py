@@ -1,4 +1,4 @@
-"""What the monitor publishes: margins for those who listen, verdict, alerts and diagnostics."""
+"""The monitor's publishers, conversions to messages, and markers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The monitor's subscriptions: raw bytes into the session, and who publishes on the topics."""
+"""The monitor's subscriptions: serialised messages into the session, and who publishes."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence

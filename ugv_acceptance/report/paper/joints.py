@@ -1,4 +1,4 @@
-"""Which joints of a robot play the parts of the paper's: shoulder, elbow, turret, flippers."""
+"""Which joints of a robot stand for the paper's: shoulder, elbow, turret, flippers."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A page of sections - text, rows, tables, pictures - as one self-contained HTML file."""
+"""A self-contained HTML page of sections: text, rows, tables, pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

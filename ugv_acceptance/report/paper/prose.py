@@ -1,4 +1,4 @@
-"""What the page of the paper says between its tables and pictures; braces are filled in."""
+"""The text of the paper's page, between its tables and pictures."""
 
 
 def _paragraphs(text: str) -> tuple[str, ...]:

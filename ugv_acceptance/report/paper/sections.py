@@ -1,4 +1,4 @@
-"""The sections of the page that computes the paper again, in the paper's order."""
+"""The sections of the paper's page, in the paper's order."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Ways of the arm that pass no limit: which postures can be reached from home, and how."""
+"""Paths of the arm that pass no limit: which postures can be reached from home, and how."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _NOWHERE = -9999
 
 
 @dataclass(frozen=True)
-class Ways:
+class ArmPaths:
     """The safe postures of a grid `q` (n, j) around `home` (j,), step by step to the next.
 
     `ground` is orientation and tilt (rad), `load` in kg. `home` need not be in the grid.
@@ -83,12 +83,12 @@ class Ways:
         return kept[:-1]
 
     def _straight(self, start: Floats, end: Floats) -> bool:
-        return safe_way(self.arm, (start, end), self.ground, self.load)
+        return safe_path(self.arm, (start, end), self.ground, self.load)
 
 
-def safe_way(arm: Arm, ways: Sequence[Floats], ground: tuple[str, float], load: float) -> bool:
+def safe_path(arm: Arm, paths: Sequence[Floats], ground: tuple[str, float], load: float) -> bool:
     """Return whether straight motions through these postures pass no ERROR limit and keep clear."""
-    for start, end in pairwise(ways):
+    for start, end in pairwise(paths):
         path = start + np.linspace(0.0, 1.0, PATH)[:, None] * (end - start)
         if not (safe(arm, look(arm, path, ground, load)).all() and arm.clear(path).all()):
             return False
@@ -113,14 +113,14 @@ class Routes:
 
     arm: Arm
     home: Floats
-    _known: dict[tuple[tuple[str, float], float, float], Ways] = field(default_factory=dict)
+    _known: dict[tuple[tuple[str, float], float, float], ArmPaths] = field(default_factory=dict)
 
-    def ways(self, ground: tuple[str, float], load: float, turret: float = 0.0) -> Ways:
+    def paths(self, ground: tuple[str, float], load: float, turret: float = 0.0) -> ArmPaths:
         """Return the safe postures of the grid with the turret at an angle (rad)."""
         key = (ground, load, turret)
         if key not in self._known:
             q, home = (self.arm.turned(x, turret) for x in (self.arm.grid, self.home))
-            self._known[key] = Ways(self.arm, q[self.arm.clear(q)], home, ground, load)
+            self._known[key] = ArmPaths(self.arm, q[self.arm.clear(q)], home, ground, load)
         return self._known[key]
 
     def between(
@@ -128,11 +128,11 @@ class Routes:
     ) -> list[Floats] | None:
         """Return postures on a safe way from `start` to `end` (j,), as few as are found."""
         for middle in detours(self.arm, start, self.home, end):
-            if safe_way(self.arm, [start, *middle, end], ground, load):
+            if safe_path(self.arm, [start, *middle, end], ground, load):
                 return middle
-        ways = self.ways(ground, load, self.arm.turret(end))
-        found = ways.to(end)
-        for middle in ([self.home, ways.home, *found], [ways.home, *found]):
-            if found and safe_way(self.arm, [start, *middle, end], ground, load):
+        paths = self.paths(ground, load, self.arm.turret(end))
+        found = paths.to(end)
+        for middle in ([self.home, paths.home, *found], [paths.home, *found]):
+            if found and safe_path(self.arm, [start, *middle, end], ground, load):
                 return middle
         return None

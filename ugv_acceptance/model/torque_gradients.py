@@ -1,4 +1,4 @@
-"""What gravity does to a posture: the lever of every joint, and the whole robot's mass moment.
+"""Gravity torque gradients of the joints in a posture, and the mass moment of the robot.
 
 The torque that holds a joint is linear in gravity: torque = lever . g, where the lever is the mass
 moment S (kg m, sum of mass times position from the joint) of all that the joint carries, crossed
@@ -35,7 +35,7 @@ class Step:
 class Carried:
     """Levers of the moving bodies (m kg; kg where prismatic), total mass and moment: base axes."""
 
-    levers: list[Vec]
+    torque_gradients: list[Vec]
     mass: Scalar
     moment: Vec
 
@@ -67,16 +67,18 @@ def carried_by(tree: Tree, steps: Sequence[Step], loads: Sequence[PointLoad]) ->
     for load in loads:
         masses[load.body] = masses[load.body] + load.mass
         moments[load.body] = add(moments[load.body], scale(load.point, load.mass))
-    levers: list[Vec] = [ZERO] * len(tree.bodies)
+    torque_gradients: list[Vec] = [ZERO] * len(tree.bodies)
     above: list[list[int]] = [[] for _ in tree.bodies]
     for k in range(len(tree.bodies) - 1, 0, -1):
         body, step = tree.bodies[k], steps[k]
         moment = rotate(step.turn, moments[k])
         for j in above[k]:
-            levers[j] = rotate(step.turn, levers[j])
-        levers[k] = scale(body.axis, -masses[k]) if body.prismatic else cross(moment, body.axis)
+            torque_gradients[j] = rotate(step.turn, torque_gradients[j])
+        torque_gradients[k] = (
+            scale(body.axis, -masses[k]) if body.prismatic else cross(moment, body.axis)
+        )
         above[body.parent] += [*above[k], k]
         moment = add(moment, scale(step.shift, masses[k]))
         masses[body.parent] = masses[body.parent] + masses[k]
         moments[body.parent] = add(moments[body.parent], moment)
-    return Carried(levers[1:], masses[0], moments[0])
+    return Carried(torque_gradients[1:], masses[0], moments[0])
