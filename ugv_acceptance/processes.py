@@ -5,11 +5,14 @@ prints how it was broken off: this process hears it, and ends them.
 """
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
 from typing import Any
+
+_ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
 class Workers(ProcessPoolExecutor):
@@ -17,7 +20,7 @@ class Workers(ProcessPoolExecutor):
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:  # noqa: ANN401 - as its base says
         """Give work to a process, which may be started for it."""
-        with _deaf():
+        with _uninterrupted(), _deaf():
             return super().submit(fn, *args, **kwargs)
 
     def __exit__(self, kind: type[BaseException] | None, *rest: Any) -> None:  # noqa: ANN401, PYI036 - its base
@@ -25,6 +28,23 @@ class Workers(ProcessPoolExecutor):
             for process in list((self._processes or {}).values()):
                 process.kill()
         super().__exit__(kind, *rest)
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hear signals only after the block: a process broken off while it starts would say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {n: signal.signal(n, lambda number, _: came.append(number)) for n in _ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 @contextmanager
