@@ -48,6 +48,7 @@ TEST = [
 ]
 # Extras that the tests try too.
 TESTED = ('cluster', 'console', 'foxglove', 'pdf', 'sim', 'table')
+DOCS = ['furo', 'myst-parser', 'sphinx']
 LINT = [
     'mypy',
     'pre-commit',
@@ -69,7 +70,7 @@ def version() -> str:
 
 
 def extras() -> dict[str, list[str]]:
-    """Return the extras by name: the table EXTRAS of the package's __init__.py, test and lint."""
+    """Return the extras by name: the table EXTRAS of the package's __init__.py, and ours."""
     (table,) = (
         node.value
         for node in ast.parse(TOP).body
@@ -77,7 +78,7 @@ def extras() -> dict[str, list[str]]:
     )
     told = {extra: list(needed) for extra, needed in ast.literal_eval(table).items()}
     tested = [name for extra in TESTED for name in told[extra]]
-    return told | {'test': TEST + tested, 'lint': LINT}
+    return told | {'test': TEST + tested, 'lint': LINT, 'docs': DOCS}
 
 
 def commands() -> dict[str, Any]:

@@ -19,7 +19,8 @@ BELOW_OFFLINE = {'model', 'studies', 'evaluation', 'config', 'bag', 'monitoring'
 BELOW_RUN = BELOW_OFFLINE | {'offline', 'simulation', 'plan', 'campaign', 'processes'}
 BELOW_NODES = BELOW_RUN | {'run', 'console'}
 MAY_IMPORT: dict[str, set[str]] = {
-    '__init__': set(),
+    # The front door: for types, and when a name is first used.
+    '__init__': {'bag', 'config', 'model', 'monitoring', 'offline'},
     'type_aliases': set(),
     'processes': set(),
     'model': set(),

@@ -34,7 +34,7 @@ ASKS_FOR: dict[str, tuple[list[str], str]] = {
     'sim': (['mujoco'], 'from ugv_acceptance.nodes.packbot_simulator import main; main([])'),
     'table': (
         ['pyarrow'],
-        'from ugv_acceptance.offline.parquet import ParquetSink as P; P("m.parquet", None, 0)',
+        'from ugv_acceptance.offline.output import ParquetSink as P; P("m.parquet", None, 0)',
     ),
 }
 

@@ -12,9 +12,9 @@ def main() -> None:
     for reason in result.reasons:
         print(f'  {reason}')
     margins = result.margins
-    row, side = np.unravel_index(np.nanargmin(margins.tip_angle), margins.tip_angle.shape)
-    least = float(np.degrees(margins.tip_angle[row, side]))
-    print(f'least tilt left: {least:.1f} deg to the {margins.sides[side]}')
+    least = np.degrees(np.nanmin(margins.tip_angle, axis=0))
+    for k, side in enumerate(margins.sides):
+        print(f'least tilt left to the {side}: {least[k]:.1f} deg')
     for alert in result.alerts:
         if alert.level == 'ERROR':
             print(f'{alert.start_s:6.2f} s  {alert.message}: {alert.advice}')

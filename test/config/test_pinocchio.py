@@ -52,7 +52,7 @@ def of_pinocchio(text: str, robot: Robot, q: np.ndarray) -> tuple[np.ndarray, np
     moving, fixed = pinocchio.centerOfMass(model, data, theirs), model.inertias[0]
     mass = sum(inertia.mass for inertia in model.inertias[1:])
     # What is fixed to the world is no part of Pinocchio's centre of gravity.
-    centre = (mass * moving + fixed.mass * fixed.torque_gradient) / (mass + fixed.mass)
+    centre = (mass * moving + fixed.mass * fixed.lever) / (mass + fixed.mass)
     return torque, centre
 
 

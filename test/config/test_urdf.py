@@ -58,7 +58,7 @@ def test_the_inertia_is_turned_with_its_origin() -> None:
     )
     link, other = read(text).links[1], pinocchio.buildModelFromXML(text).inertias[1]
     np.testing.assert_allclose(link.inertia, other.inertia, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(link.cog, other.torque_gradient, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(link.cog, other.lever, rtol=0, atol=1e-12)
 
 
 def test_roll_pitch_yaw_turn_about_fixed_axes() -> None:

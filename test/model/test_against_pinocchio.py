@@ -66,7 +66,7 @@ class Twin:
         moving = pin.centerOfMass(self.model, self.data, self.ordered(q))
         base = self.model.inertias[0]
         mass = sum(inertia.mass for inertia in self.model.inertias[1:])
-        whole: np.ndarray = (mass * moving + base.mass * base.torque_gradient) / (mass + base.mass)
+        whole: np.ndarray = (mass * moving + base.mass * base.lever) / (mass + base.mass)
         return whole
 
 

@@ -104,8 +104,8 @@ def moment_on(robot: Robot, name: str, q: np.ndarray, gravity: np.ndarray) -> fl
     axis = found[joint.child][:3, :3] @ np.asarray(joint.axis)
     if joint.kind == 'prismatic':
         return float(-mass[on].sum() * axis @ gravity)
-    torque_gradient = points[on] - at(found[joint.child], (0.0, 0.0, 0.0))
-    return float(-axis @ np.cross(torque_gradient, mass[on, None] * gravity).sum(axis=0))
+    arm = points[on] - at(found[joint.child], (0.0, 0.0, 0.0))
+    return float(-axis @ np.cross(arm, mass[on, None] * gravity).sum(axis=0))
 
 
 def test_inverse_dynamics_at_rest_is_the_static_torque() -> None:

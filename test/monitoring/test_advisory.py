@@ -184,7 +184,7 @@ def test_every_fault_of_the_node_says_what_to_do_and_where_to_look() -> None:
         assert ' / ' in suspect_of(code)
 
 
-def message(name: str, **values: str) -> DiagnosticStatus:
+def message(name: str, /, **values: str) -> DiagnosticStatus:
     """Return an operator's message."""
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticStatus(name=name, hardware_id='Ada', message='seen', values=pairs)

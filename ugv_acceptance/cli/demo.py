@@ -100,7 +100,7 @@ def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
     """
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    code = 'from ugv_acceptance.nodes import child; child.end_with_parent()'
+    code = 'from ugv_acceptance.nodes.subprocess_node import end_with_parent; end_with_parent()'
     code += '; from ugv_acceptance.cli import main; main()'
     command, pipe = [sys.executable, '-u', '-c', code, *words], subprocess.PIPE
     with subprocess.Popen(  # noqa: S603 - our own command
