@@ -5,7 +5,6 @@
 itself costs next to nothing.
 """
 
-import shlex
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -73,6 +72,8 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 
 def pip_install(extra: str) -> str:
     """Return the command that installs what an extra needs."""
+    import shlex  # noqa: PLC0415 - only errors need it: the import of the package stays cheap
+
     return f'pip install {shlex.join(EXTRAS[extra])}'
 
 
