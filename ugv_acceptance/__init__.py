@@ -6,8 +6,9 @@ itself costs next to nothing.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+# What typing's own is to type checkers; importing that takes longer than all of this file.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from ugv_acceptance.bag.recording import Recording as Recording
     from ugv_acceptance.bag.recording import Sample as Sample
