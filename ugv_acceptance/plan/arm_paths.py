@@ -1,4 +1,4 @@
-"""Paths of the arm that pass no limit: which postures can be reached from home, and how."""
+"""Safe paths of the arm: which postures it can reach from home without passing a limit, and how."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ _NOWHERE = -9999
 
 @dataclass(frozen=True)
 class ArmPaths:
-    """The safe postures of a grid `q` (n, j) around `home` (j,), step by step to the next.
+    """The safe postures `q` (n, j) of a grid, linked by safe motions, starting from `home` (j,).
 
     `ground` is orientation and tilt (rad), `load` in kg. `home` need not be in the grid.
     """
@@ -33,7 +33,7 @@ class ArmPaths:
 
     @cached_property
     def _tree(self) -> NDArray[np.intp]:
-        """For each posture the one before it on the shortest way from home (n,)."""
+        """Return the row before each posture on the shortest safe path from home (n,)."""
         good = safe(self.arm, look(self.arm, self.q, self.ground, self.load))
         names = [self.arm.robot.joint_names.index(n) for n in self.arm.roles.axes]
         cell = np.round(np.degrees(self.q[:, names]) / STEP_DEG).astype(int)
@@ -55,12 +55,12 @@ class ArmPaths:
 
     @property
     def reachable(self) -> Mask:
-        """Which postures can be reached from home without passing a limit (n,)."""
+        """Return which postures (n,) can be reached from home without passing a limit."""
         found: Mask = self._tree != _NOWHERE
         return found
 
     def to(self, end: Floats) -> list[Floats]:
-        """Return the few postures (j,) between home and `end`; empty: there is no safe way."""
+        """Return the few postures (j,) between home and `end`; empty if there is no safe path."""
         k = int(np.abs(self.q - end).max(axis=1).argmin())
         if np.abs(self.q[k] - end).max() > 1e-6 or not self.reachable[k]:
             return []
@@ -70,7 +70,7 @@ class ArmPaths:
         return self._shortened([self.home, *(self.q[i] for i in reversed(trail))])
 
     def _shortened(self, way: list[Floats]) -> list[Floats]:
-        """Leave out what a straight motion can skip; empty where the first leg is not safe."""
+        """Leave out what a straight motion can skip; empty where the first motion is not safe."""
         kept, at = [], 0
         while at < len(way) - 1:
             farthest = next(
@@ -87,7 +87,7 @@ class ArmPaths:
 
 
 def safe_path(arm: Arm, paths: Sequence[Floats], ground: tuple[str, float], load: float) -> bool:
-    """Return whether straight motions through these postures pass no ERROR limit and keep clear."""
+    """Return whether straight motions through the postures pass no ERROR limit and hit nothing."""
     for start, end in pairwise(paths):
         path = start + np.linspace(0.0, 1.0, PATH)[:, None] * (end - start)
         if not (safe(arm, look(arm, path, ground, load)).all() and arm.clear(path).all()):
@@ -96,7 +96,7 @@ def safe_path(arm: Arm, paths: Sequence[Floats], ground: tuple[str, float], load
 
 
 def detours(arm: Arm, start: Floats, home: Floats, end: Floats) -> Iterator[list[Floats]]:
-    """Yield postures between two: none; home; one joint of the end's, the others as before."""
+    """Yield postures to try between two: none; home; the start with one joint as at the end."""
     yield []
     yield [home]
     for name in (*arm.roles.axes, *([arm.roles.turret] if arm.roles.turret else [])):
@@ -109,14 +109,14 @@ def detours(arm: Arm, start: Floats, home: Floats, end: Floats) -> Iterator[list
 
 @dataclass(slots=True)
 class Routes:
-    """Finds ways from `home` (j,), remembering what was found for a ground, load and turret."""
+    """Finds safe paths from `home` (j,); keeps those of each ground, load and turret angle."""
 
     arm: Arm
     home: Floats
     _known: dict[tuple[tuple[str, float], float, float], ArmPaths] = field(default_factory=dict)
 
     def paths(self, ground: tuple[str, float], load: float, turret: float = 0.0) -> ArmPaths:
-        """Return the safe postures of the grid with the turret at an angle (rad)."""
+        """Return the safe paths on a ground with a load (kg), the turret at an angle (rad)."""
         key = (ground, load, turret)
         if key not in self._known:
             q, home = (self.arm.turned(x, turret) for x in (self.arm.grid, self.home))
@@ -126,7 +126,7 @@ class Routes:
     def between(
         self, start: Floats, end: Floats, ground: tuple[str, float], load: float
     ) -> list[Floats] | None:
-        """Return postures on a safe way from `start` to `end` (j,), as few as are found."""
+        """Return few postures on a safe path from `start` to `end` (j,); None if none is found."""
         for middle in detours(self.arm, start, self.home, end):
             if safe_path(self.arm, [start, *middle, end], ground, load):
                 return middle

@@ -37,7 +37,10 @@ STEEPER = (math.radians(32.0), math.radians(37.0))
 
 
 def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iterator[Step]:
-    """Yield postures around each joint's limit, pushing either way, with each load (kg)."""
+    """Yield steps that hold postures below and above each joint's torque limit, for each load (kg).
+
+    Each joint is tested pushing either way.
+    """
     arm, level = routes.arm, ('level', 0.0)
     for load in loads:
         found = look(arm, arm.grid, level, load)
@@ -61,7 +64,7 @@ def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iter
 def tip_boundary(
     routes: Routes, points: int, loads: Sequence[float], tilts: tuple[float, float]
 ) -> Iterator[Step]:
-    """Yield postures around each side's tilt limits, the arm turned to the low side."""
+    """Yield steps that hold postures on either side of each tilt limit, the arm turned downhill."""
     low, high = tilts
     gentle = (low, (low + high) / 2.0, high)
     for name in SIDES:
@@ -87,9 +90,10 @@ def _richest(
     *,
     reached: bool,
 ) -> tuple[float, float, Found, Mask] | None:
-    """Return load, tilt, margins and rows for which most postures lie in the band (deg left).
+    """Return load, tilt, margins and rows of the set-up with most postures in the band (deg left).
 
-    The first group of ramps (rad) that has any is taken; `reached`: only postures with a safe way.
+    The first group of ramps (rad) with any such posture is taken; `reached`: only postures with a
+    safe path count. None where there is none.
     """
     name, turret = side
     arm = routes.arm

@@ -1,4 +1,4 @@
-"""The operator's card: a printable page a group of steps, with alerts and the safe map."""
+"""The operator's card: a printable page for each group of steps, with alerts and the safe map."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -62,7 +62,7 @@ GROUND_AND_LOAD = 2
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A step as the card shows it, all texts; what its whole group has is left out."""
+    """A step as texts for the card; what its whole group has in common is left out."""
 
     step: Step
     number: str
@@ -77,7 +77,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A page of the card: the steps of a group, and what all of them have."""
+    """One page of the card: the steps of a group, and the texts that hold for all of them."""
 
     name: str
     where: str

@@ -1,7 +1,7 @@
-"""Derives a test plan from the model: worst postures, boundaries, loads, speeds.
+"""Derives a test plan from the model: worst postures, boundaries, loads, speeds, endurance.
 
-What would fail is left to the simulation, as the paper proposes; what is run on the robot is
-reached by ways that pass no limit either.
+A step in which the robot would fail is done in simulation only, as the paper proposes. The steps
+for the real robot are reached by paths on which no limit is passed either.
 """
 
 import math
@@ -36,7 +36,11 @@ SHORT: dict[tuple[str, str, str], dict[str, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a plan is asked for: tilt of the ramp (rad), loads (kg), points a boundary."""
+    """The options of a plan: angles of its ramps (rad), tests per boundary, endurance (s).
+
+    `steep` is used where no posture at `tilt` comes near a tilt limit. `short` asks for a
+    demonstration of minutes: one step of each kind.
+    """
 
     tilt: float = math.radians(10.0)
     steep: float = math.radians(25.0)
@@ -78,7 +82,7 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
 
 
 def home_of(arm: Arm, wanted: Wanted, load: float) -> Floats:
-    """Return the posture (j,) from which all starts: most tilt left with torques below half."""
+    """Return the posture (j,) where every step begins: most tilt left with torques below half."""
     worst = np.full(len(arm.grid), np.inf)
     for name in ORIENTATIONS:
         found = look(arm, arm.grid, (name, 0.0 if name == 'level' else wanted.tilt), load)
@@ -88,7 +92,7 @@ def home_of(arm: Arm, wanted: Wanted, load: float) -> Floats:
 
 
 def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
-    """Table 1 of the paper for this robot: the posture that asks most of each joint."""
+    """Yield the steps of the paper's Table 1 for this robot: each joint at its largest torque."""
     arm, load, level = routes.arm, loads[-1], ('level', 0.0)
     found = look(arm, arm.grid, level, load)
     for joint in arm.roles.axes:
@@ -107,7 +111,7 @@ def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
 
 
 def _orientations(routes: Routes, tilt: float, loads: Sequence[float]) -> Iterator[Step]:
-    """Each orientation of Figure 6: the posture that leaves least of any margin, within limits."""
+    """Yield a step for each orientation of Figure 6: the least margin within the limits."""
     arm, load = routes.arm, loads[len(loads) // 2]
     for name, orientation in ORIENTATIONS.items():
         if name == 'level':
@@ -123,7 +127,7 @@ def _orientations(routes: Routes, tilt: float, loads: Sequence[float]) -> Iterat
 
 
 def _refused(arm: Arm, step: Step) -> Step:
-    """Return the step, left to the simulation if it would pass a limit on the robot."""
+    """Return the step, marked for simulation only if it would pass a limit on the robot."""
     if step.where == SIMULATION or step.action in {'drive', 'pull', 'cycle'}:
         return step
     limits = arm.settings.limits
@@ -134,7 +138,7 @@ def _refused(arm: Arm, step: Step) -> Step:
 
 
 def _routed(routes: Routes, steps: Sequence[Step]) -> list[Step]:
-    """Return the steps with the postures on the way; unreachable ones go to the simulation."""
+    """Return the steps with the postures on the way; without a safe path: for simulation only."""
     found: list[Step] = []
     home = routes.home
     before, setup = home, None
@@ -169,7 +173,7 @@ def _vector(arm: Arm, home: Floats, posture: Posture) -> Floats:
 
 
 def _few(routes: Routes, steps: Sequence[Step]) -> list[Step]:
-    """Return one step of each kind, the quickest from home, as a demonstration wants it."""
+    """Return one step of each kind, the quickest from home: enough for a demonstration."""
     home = posture_deg(routes.arm, routes.home)
     found = []
     for kind, change in SHORT.items():

@@ -1,4 +1,4 @@
-"""The failure map for a plan: tip-over and torque over both arm joints."""
+"""The safe maps printed with a plan: tilt left and torque used over both arm joints."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
 def safe_maps(
     arm: Arm, plan: Plan, visited: Mapping[str, Sequence[float]] | None = None
 ) -> list[dict[str, str]]:
-    """Return the maps of tilt left and torque used over both arm joints, a page's row a load.
+    """Return the maps of tilt left and torque used over both arm joints, a page's row per load.
 
     The numbers on them are the plan's steps on level ground with that load; H is home. `visited`
     are the cells of a run's coverage: first joint (deg) -> second joint (deg).
@@ -44,7 +44,7 @@ def safe_maps(
 
 
 def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
-    """Return shoulder and elbow (deg) of home and of the steps on level ground with a load."""
+    """Return positions (deg) of both joints and a label, for home and each step on level ground."""
     first, second = arm.roles.axes
     held = [
         s

@@ -1,4 +1,4 @@
-"""Steps with motion: lifting, pulling, speeds, driving, endurance."""
+"""Steps with motion or force: lifting, pulling, joint speeds, driving, endurance."""
 
 import math
 from collections.abc import Iterator
@@ -70,7 +70,7 @@ def capacity_steps(arm: Arm, home: Floats) -> Iterator[Step]:
 
 
 def _reach(arm: Arm) -> Floats:
-    """Return the posture that reaches forward and low: the arm as a person lifts with it."""
+    """Return the posture (j,) that reaches forward and low, as an operator lifts an object."""
     q = arm.folded.copy()
     names = arm.robot.joint_names
     q[names.index(arm.roles.axes[0])] = math.radians(55.0)
@@ -91,7 +91,7 @@ def _down(arm: Arm, q: Floats) -> Floats | None:
 
 
 def speed_steps(arm: Arm, home: Floats) -> Iterator[Step]:
-    """Yield motions slower and faster than the rate to which the static model was shown to hold."""
+    """Yield motions slower and faster than the joint speed up to which the static model holds."""
     limits, names = arm.settings.limits, arm.robot.joint_names
     for joint in arm.roles.axes:
         k = names.index(joint)
@@ -137,7 +137,7 @@ def _swing(arm: Arm, home: Floats, k: int) -> tuple[Floats, Floats]:
 
 
 def drive_steps(arm: Arm, home: Floats) -> Iterator[Step]:
-    """Yield driving with the arm folded: nothing may be wrong."""
+    """Yield the steps that drive with the arm folded, during which no alert may come."""
     for title, drive in (
         ('drive forward', (0.25, 0.0)),
         ('drive backward', (-0.25, 0.0)),
@@ -160,7 +160,7 @@ def drive_steps(arm: Arm, home: Floats) -> Iterator[Step]:
 
 
 def endurance_steps(arm: Arm, home: Floats, seconds: float) -> Iterator[Step]:
-    """Yield the long test: safe postures again and again, as in the paper's reference [6]."""
+    """Yield the endurance test (s): safe postures repeated, as in the paper's reference [6]."""
     load = arm.robot.payload.mass / 2.0
     found: Found = look(arm, arm.grid, ('level', 0.0), load)
     rows = np.flatnonzero(safe(arm, found, 0.25))

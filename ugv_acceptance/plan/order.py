@@ -9,7 +9,7 @@ from ugv_acceptance.plan.plan import SIMULATION, Plan, Posture, Step
 
 
 def ordered(steps: Sequence[Step], home: Posture) -> list[Step]:
-    """Return the steps: robot's before simulation's, one set-up after the other, greedy in each.
+    """Return the steps sorted: first the robot's, then the simulation's, by set-up and nearness.
 
     Steps that end with the robot on its side, and cycles, come last of their kind.
     """
@@ -37,18 +37,18 @@ def _setup(step: Step) -> tuple[object, ...]:
 
 
 def _setups(steps: Sequence[Step]) -> list[tuple[object, ...]]:
-    """Return the set-ups: level first, then as they were thought of."""
+    """Return the different set-ups of the steps: level ground first, then in the steps' order."""
     seen = list(dict.fromkeys(_setup(s) for s in steps))
     return sorted(seen, key=lambda s: (s[0], s[1], s[2] != 'level', s[3], str(s[2]), s[4]))
 
 
 def distance(start: Posture, end: Posture) -> float:
-    """Return the largest way of a joint (deg) from one posture to another."""
+    """Return the largest change of any joint (deg) between two postures."""
     return max((abs(angle - start.get(name, angle)) for name, angle in end.items()), default=0.0)
 
 
 def way(steps: Sequence[Step], home: Posture) -> float:
-    """Return the way (deg) of the joint that moves most, summed over all steps."""
+    """Return the sum over all steps of the largest joint change (deg) each one needs."""
     places = [home, *({**home, **s.posture_deg} for s in steps)]
     return float(np.sum([distance(a, b) for a, b in pairwise(places)]))
 

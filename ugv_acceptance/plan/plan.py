@@ -1,6 +1,6 @@
 """A test plan as data: steps that people read and edit in YAML, and its hash.
 
-Angles are in degrees here, as they stand in the file; `radians_of` is where they turn into radians.
+Angles are in degrees here, as in the file; `radians_of` converts them to radians.
 """
 
 import hashlib
@@ -50,21 +50,21 @@ class _Part(BaseModel):
 
 
 class Ground(_Part):
-    """What the robot stands on: an orientation of the paper's Figure 6 and its tilt."""
+    """The ground of a step: one of the orientations of the paper's Figure 6, and its tilt (deg)."""
 
     orientation: Annotated[str, AfterValidator(_orientation)] = 'level'
     tilt_deg: Annotated[Finite, Field(ge=0, le=60)] = 0.0
 
 
 class Alerts(_Part):
-    """Alerts that a step must raise and those it must not: LEVEL, LEVEL CODE or with SUBJECT."""
+    """Alerts a step must raise and those it must not, written LEVEL, LEVEL CODE or with SUBJECT."""
 
     must: tuple[AlertPattern, ...] = ()
     must_not: tuple[AlertPattern, ...] = ('ERROR', 'STALE')
 
 
 class Step(_Part):
-    """One step of a plan, with all that a person needs to know before it.
+    """One step of a plan, with all that the operator needs to know before it.
 
     `action` is hold: go to the posture and hold it. tip: the same, and the robot is expected to
     tip over. sweep: move on from `via_deg` at `speed_degps`. drive: m/s and deg/s for `hold_s`.
@@ -127,7 +127,7 @@ class Plan(_Part):
 
     @property
     def sha256(self) -> str:
-        """Hash of everything the plan says; comments and the order of keys do not count."""
+        """SHA-256 of the plan's content; comments and the order of keys do not change it."""
         text = json.dumps(self.model_dump(mode='json'), sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -144,14 +144,14 @@ def vector_of(robot: Robot, home: Posture, posture: Posture) -> list[float]:
 
 
 def matches(pattern: str, level: str, code: str, subject: str) -> bool:
-    """Return whether an alert is one of LEVEL, LEVEL CODE or LEVEL CODE SUBJECT."""
+    """Return whether an alert fits a pattern: LEVEL, LEVEL CODE or LEVEL CODE SUBJECT."""
     return all(a == b for a, b in zip(pattern.split(), (level, code, subject), strict=False))
 
 
 def read_plan(path: Path, robot: Robot | None = None) -> Plan:
     """Return the plan in a YAML file. Raises BadConfig with file, line and field.
 
-    With `robot`, the joints of all postures have to be joints of it.
+    With `robot`, every joint named in a posture must be one of this robot's.
     """
     try:
         text = path.read_text('utf-8')
@@ -173,7 +173,7 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
 
 
 def plan_text(plan: Plan) -> str:
-    """Return a plan as YAML: a head that says how to read it, a last line that tells of edits."""
+    """Return a plan as YAML: a header that explains it, a last line with a hash to detect edits."""
     data = plan.model_dump(mode='json', exclude_defaults=True)
     for step, whole in zip(data['steps'], plan.steps, strict=True):
         step['alerts'] = whole.alerts.model_dump(mode='json')

@@ -1,4 +1,4 @@
-"""Searches postures of the arm's two axes by what the model says of each."""
+"""Postures of the arm's two main joints, and the margins that the model gives for them."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ PATH = 25
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """Which joint does what: the arm's two axes, a turret under them or none, flippers or none."""
+    """Which joints have which role: the arm's two axes, a turret under them, flippers (or none)."""
 
     axes: tuple[str, str]
     turret: str | None
@@ -34,7 +34,7 @@ class Roles:
 
 
 def roles_of(settings: Settings) -> Roles:
-    """Return the roles of a robot's joints. Raises BadConfig unless two joints have a limit."""
+    """Return the roles of a robot's joints. Raises BadConfig unless two have a torque limit."""
     robot, limits = settings.robot, settings.limits.torque
     pairs = zip(robot.joint_names, limits, strict=True)
     limited = [name for name, limit in pairs if math.isfinite(limit)]
@@ -60,14 +60,14 @@ def _chain(robot: Robot, link: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Arm:
-    """The postures of a robot's two axes, all other joints folded away. Angles in rad."""
+    """The arm as two joints that are varied, all other joints folded away. Angles in rad."""
 
     settings: Settings
     roles: Roles
 
     @property
     def robot(self) -> Robot:
-        """The robot."""
+        """The robot that the arm belongs to."""
         return self.settings.robot
 
     @cached_property
@@ -86,7 +86,7 @@ class Arm:
 
     @cached_property
     def grid(self) -> Floats:
-        """Postures (n, j) of both axes that keep clear of ground and deck, the turret ahead."""
+        """Postures (n, j) of both axes that touch neither ground nor deck, the turret ahead."""
         columns = []
         for name in self.roles.axes:
             joint = self.robot.joint(name)
@@ -100,7 +100,7 @@ class Arm:
         return q[self.clear(q)]
 
     def turned(self, q: Floats, turret: float) -> Floats:
-        """Return postures with the turret at an angle (rad); without a turret they stay."""
+        """Return postures with the turret at an angle (rad); unchanged without a turret."""
         if self.roles.turret is None:
             return q
         turned = q.copy()
@@ -113,7 +113,7 @@ class Arm:
         return 0.0 if name is None else float(q[self.robot.joint_names.index(name)])
 
     def clear(self, q: Floats) -> Mask:
-        """Return whether arm and load stay above the ground and off the deck, q (..., j)."""
+        """Return whether arm and load touch neither ground nor deck (...,), for `q` (..., j)."""
         points = self._points(q)
         feet = np.array([c.position for c in self.robot.contacts if c.link == self.robot.root])
         low, high = feet.min(axis=0) - AROUND, feet.max(axis=0) + AROUND
@@ -125,12 +125,12 @@ class Arm:
         return good
 
     def chain(self, q: Floats) -> Floats:
-        """Return the arm's joints and the load's place (k, 3) in m, base, of a posture (j,)."""
+        """Return the arm's joints and the load as points (k, 3) in m, `base_link`, for `q` (j,)."""
         found: Floats = self._points(q)[: len(self.roles.axes) + 1]
         return found
 
     def _points(self, q: Floats) -> Floats:
-        """Return the shoulder, then points along the arm up to the load (..., k, 3) m, base."""
+        """Return points along the arm from shoulder to load (..., k, 3) in m, `base_link`."""
         chain = _chain(self.robot, self.robot.payload_link or self.robot.root)[::-1]
         ends = [c for c in chain if c in (*self.roles.axes,)]
         places = [Contact(n, self.robot.joint(n).child, (0.0, 0.0, 0.0)) for n in ends]
@@ -149,9 +149,9 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What the model says of postures `q` (n, j).
+    """The model's margins for postures `q` (n, j).
 
-    `share` (n, j) is the torque over its limit with its sign, `tilt` (n,) what is left (rad).
+    `share` (n, j) is the torque over its limit with its sign, `tilt` (n,) the tilt left (rad).
     """
 
     q: Floats
@@ -175,7 +175,7 @@ def look(arm: Arm, q: Floats, ground: tuple[str, float], load: float) -> Found:
 
 
 def safe(arm: Arm, found: Found, spare: float = 0.0) -> Mask:
-    """Return where no ERROR limit is passed; `spare` (share; times 20 deg) keeps away from them."""
+    """Return where no ERROR limit is passed (n,), with `spare` (share; times 20 deg) to it."""
     limits = arm.settings.limits
     use, tilt = limits.torque_error - spare, limits.tip_error + spare * math.radians(20.0)
     good: Mask = (found.most < use) & (found.tilt > tilt)

@@ -51,7 +51,7 @@ def sketch(arm: Arm, q: Floats, step: Step) -> str:
 
 
 def _lean(step: Step, *, aside: bool) -> float:
-    """Return by how much (deg) the ground leans clockwise in the picture."""
+    """Return how far (deg) the ground is turned clockwise in the picture."""
     heading = ORIENTATIONS[step.ground.orientation].heading
     if heading is None or not step.ground.tilt_deg:
         return 0.0

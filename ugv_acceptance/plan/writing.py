@@ -1,4 +1,4 @@
-"""The words and numbers of a step: preparation, limits, expected margins and alerts."""
+"""Fills in the texts and numbers of a step: preparation, limits, expected margins and alerts."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ NEAR_USE, NEAR_TILT = 0.03, 0.7
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What steps share: group, load (kg), ground (orientation, tilt in rad), where, action."""
+    """The set-up of a step: group, load (kg), ground (orientation, tilt in rad), where, action."""
 
     group: str
     load: float = 0.0
@@ -36,7 +36,7 @@ def posture_deg(arm: Arm, q: Floats) -> Posture:
 
 
 def hold_step(arm: Arm, setup: Setup, found: Found, k: int, title: str, purpose: str) -> Step:
-    """Return the step that holds row `k` of what was found."""
+    """Return the step that holds the posture in row `k` of `found`."""
     tilt = math.degrees(float(found.tilt[k]))
     use = float(found.most[k])
     tips = setup.action == 'tip'
@@ -67,7 +67,7 @@ def _slug(title: str, setup: Setup) -> str:
 
 
 def preparation(setup: Setup) -> tuple[str, ...]:
-    """Return what a person does before a step, one sentence each."""
+    """Return the operator's tasks before a step, one sentence each."""
     name, tilt = setup.ground
     words = ORIENTATIONS[name].words
     ground = (
@@ -81,7 +81,7 @@ def preparation(setup: Setup) -> tuple[str, ...]:
 
 
 def limits_of(settings: Settings) -> dict[str, float]:
-    """Return the limits a step is judged by, as people read them."""
+    """Return the limits a step is judged by, with names and units for the reader."""
     limits = settings.limits
     pairs = zip(settings.robot.joint_names, limits.torque, strict=True)
     found = {f'{name}_nm': limit for name, limit in pairs if math.isfinite(limit)}
@@ -89,9 +89,9 @@ def limits_of(settings: Settings) -> dict[str, float]:
 
 
 def alerts_of(settings: Settings, use: float, tilt: float, *, tips: bool = False) -> Alerts:
-    """Return what a posture must raise and must not, by its torque use and tilt left (deg).
+    """Return the alerts a posture must and must not raise, by its torque use and tilt left (deg).
 
-    Where it lies so near a limit that either can happen, neither is asked.
+    Where it is so near a limit that an alert may come or not, neither is demanded.
     """
     limits = settings.limits
     must: list[str] = []
