@@ -1,4 +1,4 @@
-"""What moves the robot and sets it up: a simulator, an arm controller, or a person."""
+"""Moves and sets up the robot: by a simulator, by an arm controller, or by asking a person."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -20,9 +20,9 @@ Ask = Callable[[str, Callable[[], bool]], bool]
 
 @dataclass(slots=True)
 class Hands:
-    """Moves and sets up the robot in one of the modes sim, robot, operator.
+    """Moves and sets up the robot in one of three modes: sim, robot or operator.
 
-    `going()` says whether anything goes on; `refused` whether a person would not do a thing.
+    `going()` says whether the step may still go on; `refused` is set once a person declines a task.
     """
 
     world: World
@@ -33,13 +33,13 @@ class Hands:
     _tilt: float = 0.0
 
     def told(self, text: str) -> bool:
-        """Ask a person for something and return whether it was done."""
+        """Ask a person to do something and return whether it was done."""
         done = self.ask(text, self.going)
         self.refused = self.refused or (not done and self.going())
         return done
 
     def set_up(self, step: Step) -> bool:
-        """Bring ground and load to what a step needs, and declare the load; False: refused."""
+        """Set up ground and load for a step and declare the load; False: a person declined."""
         commands, wait = self.world.commands, self.world.wait
         if self.mode == SIM:
             heading = ORIENTATIONS[step.ground.orientation].heading
@@ -59,7 +59,7 @@ class Hands:
         return True
 
     def move(self, posture: Mapping[str, float], speed: float) -> float:
-        """Start a motion to `posture` (rad) at a peak `speed` (rad/s); return its length (s)."""
+        """Start a motion to `posture` (rad) at a peak `speed` (rad/s); return its duration (s)."""
         now = self.world.positions.now
         way = max((abs(a - now.get(n, a)) for n, a in posture.items()), default=0.0)
         seconds = max(way * math.pi / (2.0 * speed), 0.05)
@@ -67,7 +67,7 @@ class Hands:
         return seconds
 
     def drive(self, step: Step, forward: float, yaw: float, seconds: float) -> None:
-        """Drive at m/s and rad/s for so many seconds, unless stopped, then stand still."""
+        """Drive at m/s and rad/s for `seconds`, or until stopped, then stand still."""
         if self.mode == OPERATOR:
             turn = f'turn at {math.degrees(yaw):g} deg/s' if yaw else f'drive at {forward:g} m/s'
             self.told(f'{step.id}: {turn} for {seconds:g} s, then stand still')
@@ -79,7 +79,7 @@ class Hands:
         self.world.commands.drive(0.0, 0.0)
 
     def pull(self, step: Step) -> None:
-        """Pull with the step's force for its time, then let go."""
+        """Pull with the step's force (N) for its hold time, then let go."""
         force = step.force_n or 0.0
         if self.mode != SIM:
             self.told(f'{step.id}: pull with {force:g} N for {step.hold_s:g} s, then let go')
@@ -91,7 +91,7 @@ class Hands:
         self.world.commands.pull(0.0)
 
     def stand_up(self) -> bool:
-        """Bring a robot that tipped over, or whose arm gave way, back to its start."""
+        """Return a robot that tipped over, or whose arm gave way, to its start; False: declined."""
         if self.mode == SIM:
             self.world.commands.stand_up()
             self.world.commands.load(0.0)

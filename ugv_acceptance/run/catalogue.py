@@ -1,4 +1,4 @@
-"""The runs `simulate` knows by name: fixed, random with a seed, and one for every fault."""
+"""The named runs of `simulate`: fixed ones, random ones with a seed, and one for every fault."""
 
 from dataclasses import dataclass, replace
 
@@ -19,14 +19,14 @@ FAULT_PREFIX = 'fault-'
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A scenario with the faults it is run with."""
+    """A simulated run: its scenario and the faults injected into it."""
 
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
 
 
 def names() -> dict[str, str]:
-    """Return every name with what happens, in the order in which people should read them."""
+    """Return the name of every run with a description, in the order of the help text."""
     fixed = {name: _sentence(make.__doc__) for name, make in SCENARIOS.items()}
     drawn = {name: f'{_sentence(make.__doc__)} (drawn by --seed)' for name, make in KINDS.items()}
     faulty = {
@@ -41,7 +41,7 @@ def names() -> dict[str, str]:
 def case_of(
     name: str, robot: Robot, seed: int, seconds: float | None, faults: tuple[Fault, ...] = ()
 ) -> Case:
-    """Return a run by its name, `seconds` long if given. Raises BadConfig for an unknown name."""
+    """Return a run by name, cut to `seconds` if given. Raises BadConfig for an unknown name."""
     if seconds is not None and not 0.0 < seconds < 1e6:
         raise BadConfig(f'seconds: expected a number above 0 and below a million, got {seconds:g}')
     known = names()
@@ -58,7 +58,7 @@ def case_of(
 
 
 def _usual(kind: str, robot: Robot) -> Fault:
-    """Return a fault of this kind as a run named after it has: at the last driven joint."""
+    """Return the fault of the run `fault-KIND`: at the last driven joint where it needs a joint."""
     start = 0.0 if kind in PHYSICAL else SETS_IN
     joint = next(
         (n for n in reversed(robot.joint_names) if np.isfinite(robot.joint(n).effort)),

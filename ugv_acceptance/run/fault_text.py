@@ -1,4 +1,4 @@
-"""Reads the faults of a simulated robot as they are written on a command line.
+"""Parses the faults of a simulated robot as they are written on a command line.
 
 A fault is written KIND[:SUBJECT][=AMOUNT][@START[-END]]: frozen-encoder:shoulder_joint@5-9,
 imu-bias=2, dropped:imu=0.3, wrong-mounting=30deg. Times in seconds; without them it lasts the
@@ -20,7 +20,7 @@ _FORM = re.compile(
 
 
 def fault_from(text: str, robot: Robot) -> Fault:
-    """Return the fault a person wrote. Raises BadConfig with what was expected."""
+    """Return the fault that a text describes. Raises BadConfig with what was expected."""
     match = _FORM.fullmatch(text)
     if match is None:
         raise BadConfig(f'fault {text!r}: expected KIND[:SUBJECT][=AMOUNT][@START[-END]]')
@@ -53,7 +53,7 @@ def _number(text: str, part: str | None, default: float) -> float:
 
 
 def _amount(text: str, part: str | None, kind: Kind) -> float:
-    """Return how much, an angle in degrees as KINDS has it."""
+    """Return the amount of a fault as a number; an angle in degrees. Raises BadConfig."""
     if part is None or not kind.angle:
         return _number(text, part, kind.amount)
     return math.degrees(quantity(part, 'angle', f'fault {text!r}'))

@@ -1,11 +1,11 @@
-"""The folder of a run: which steps are done, a recording and a result a step, the report.
+"""The folder of a run: a recording and a result for each step, the journal, and the report.
 
     plan.yaml  run.json  journal.jsonl  result.json  report.txt  report.html
     steps/ID/{ID_0.mcap,metadata.yaml}  steps/ID.json
 
-A step counts as done once its JSON is there; what was recorded before an interruption, or in an
-attempt that showed nothing, is kept under another name, never written over. The journal has a line
-for whatever began or ended, written at once.
+A step counts as done once its JSON is there. A recording made before an interruption, or in an
+attempt that showed nothing, is kept under another name and never overwritten. The journal gets a
+line as soon as anything begins or ends.
 """
 
 import json
@@ -34,7 +34,7 @@ class RunFolder:
     mode: str
 
     def recording(self, step: Step, before: str = 'interrupted') -> Path:
-        """Return the folder to record a step into; what is there moves aside as ID.BEFORE-1."""
+        """Return the folder to record a step into; an older recording moves to ID.BEFORE-1."""
         folder = self.path / 'steps' / step.id
         if folder.exists():
             number = 1
@@ -44,7 +44,7 @@ class RunFolder:
         return folder
 
     def note(self, event: str, **values: object) -> None:
-        """Add a line to the journal: the time, what happened, and more."""
+        """Append an event to the journal: the time, what happened, and further fields."""
         now = datetime.now(timezone.utc).isoformat(timespec='milliseconds')
         line = json.dumps({'time': now, 'event': event, **values}, default=str)
         # One write of a whole line: a killed process leaves no half of it.
@@ -52,11 +52,11 @@ class RunFolder:
             file.write(f'{line}\n'.encode())
 
     def result_path(self, step: Step) -> Path:
-        """Return where a step's result is."""
+        """Return the path of a step's result."""
         return self.path / 'steps' / f'{step.id}.json'
 
     def done(self, step: Step) -> dict[str, Any] | None:
-        """Return the result of a step that was done, None if it was not."""
+        """Return the stored result of a step, None if it is not done."""
         path = self.result_path(step)
         if not path.is_file():
             return None
@@ -64,11 +64,11 @@ class RunFolder:
         return found
 
     def finish_step(self, step: Step, result: dict[str, Any]) -> None:
-        """Write a step's result, whole or not at all."""
+        """Write a step's result, complete or not at all."""
         write_json(self.result_path(step), {'plan_sha256': self.plan.sha256, **result})
 
     def finish(self, config: Config, coverage: dict[str, Any]) -> dict[str, Any]:
-        """Write result.json and report.txt from the steps that were done; return the result."""
+        """Write result.json and report.txt from the steps' results; return the run's result."""
         results = [
             self.done(s) or {'id': s.id, 'title': s.title, 'verdict': 'SKIPPED', 'reasons': []}
             for s in self.plan.steps
@@ -134,7 +134,7 @@ def open_folder(
 
 
 def _unborn(path: Path) -> bool:
-    """Return whether a folder is empty or holds what a run killed while it made it has left.
+    """Return whether a folder is empty, or holds only what a run killed at its start left there.
 
     `steps` is made first: without it, a plan in the folder is somebody's own.
     """

@@ -1,4 +1,4 @@
-"""A simulated run as the messages a driver would publish, faults of sensors included."""
+"""Converts a simulated run to the messages a robot's driver would publish, with sensor faults."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Driver:
     epoch: int = EPOCH
 
     def joint_states(self, log: JointLog) -> Iterator[tuple[float, bytes]]:
-        """Yield the time (s) and content of a JointState for every row: sign and offset undone."""
+        """Yield time (s) and CDR bytes of a JointState for every row of a log."""
         log = self.corruption.joints(log)
         joints = self.config.settings.joints
         sign, offset = np.array([(j.sign, j.offset) for j in joints]).T
@@ -47,7 +47,7 @@ class Driver:
             yield time, joint_state_cdr(stamp, '', *told)
 
     def imu(self, log: ImuLog) -> Iterator[tuple[float, bytes]]:
-        """Yield the time (s) and content of an Imu for every row."""
+        """Yield time (s) and CDR bytes of an Imu for every row of a log."""
         log = self.corruption.imu(log)
         frame = self.config.topics.imu.frame_id or 'imu_link'
         covariances = imu_covariances(self.noise)
@@ -58,12 +58,12 @@ class Driver:
             yield time, imu_cdr(stamp, frame, orientation[k], rate[k], force[k], covariances)
 
     def nanoseconds(self, time: float) -> int:
-        """Return the stamp (ns) of a simulated time (s)."""
+        """Return the header stamp (ns) of a simulated time (s)."""
         return self.epoch + round(time * 1e9)
 
 
 def imu_covariances(noise: Noise) -> tuple[list[float], list[float], list[float]]:
-    """Return the covariances (row by row) that a sensor of this noise states."""
+    """Return the covariances (row by row) that a sensor with this noise reports."""
     orientation, gyro, acceleration = (
         np.diag([deviation**2] * 3).ravel().tolist()
         for deviation in (noise.orientation, noise.gyro, noise.acceleration)
@@ -74,7 +74,7 @@ def imu_covariances(noise: Noise) -> tuple[list[float], list[float], list[float]
 def messages(
     config: Config, recording: Recording, corruption: Corruption, seed: int, factor: float = 1.0
 ) -> list[Message]:
-    """Return all messages of a run as a recorder receives them, in that order.
+    """Return all messages of a run in the order in which a recorder receives them.
 
     Declared payloads are lighter than the real ones by `factor`.
     """
@@ -97,7 +97,7 @@ def messages(
 def payload_messages(
     driver: Driver, recording: Recording, factor: float
 ) -> Iterator[tuple[float, bytes]]:
-    """Yield the payload declared whenever it changes and once a period."""
+    """Yield time (s) and CDR bytes of each payload declaration: at a change, and once a period."""
     frame = driver.config.topics.payload.frame_id or ''
     changes = recording.payload
     ends = [time for time, _ in changes[1:]] + [recording.scenario.duration]

@@ -1,7 +1,7 @@
-"""Moves the arm and waits for it by the robot's own messages.
+"""Moves the arm and waits until the robot's own joint states show that it has arrived.
 
-On a slow machine a motion goes on while the arm still comes closer, and a hold lasts while joint
-states keep coming.
+Waiting depends on messages, not on a clock, so that a slow machine changes nothing: a motion goes
+on while the arm comes closer, and a hold lasts while joint states keep coming.
 """
 
 import math
@@ -21,9 +21,9 @@ REFUSED = 'the operator did not do what was asked'
 
 @dataclass(slots=True)
 class Moves:
-    """Brings the arm from posture to posture until `asked()` or the brake ends it.
+    """Moves the arm from posture to posture until `asked()` or the brake ends it.
 
-    `trail` are the postures since home. What is returned says what was wrong; empty: nothing.
+    `trail` are the postures since home. Methods return what was wrong as text; empty: nothing.
     """
 
     world: World
@@ -34,12 +34,12 @@ class Moves:
 
     @property
     def going(self) -> bool:
-        """Whether nothing has stopped the step in hand."""
+        """Whether the step may go on: neither the user nor the brake has stopped it."""
         brake = self.world.brake
         return not (self.asked() or (brake.armed and brake.stopped))
 
     def go(self, posture: Posture, speed: float, step: Step | None = None) -> str:
-        """Move to a posture (deg) at a peak speed (rad/s)."""
+        """Move to a posture (deg) at a peak speed (rad/s); return what was wrong."""
         if not self.going:
             return self.world.brake.stopped
         self.trail.append(posture)
@@ -54,7 +54,7 @@ class Moves:
         return self._arrive(target)
 
     def hold(self, step: Step) -> str:
-        """Hold for the step's time."""
+        """Hold the posture for the step's time; return what was wrong."""
         target, furthest = radians_of(step.posture_deg), (0.0, '')
         end = self.world.fed() + step.hold_s
         while self.world.fed() < end and self.going:
@@ -64,7 +64,7 @@ class Moves:
         return '' if kept else f'the posture was not held: {_told(furthest)}'
 
     def cycle(self, step: Step) -> str:
-        """Go from posture to posture of a step, again and again, for its time."""
+        """Repeat the postures of a step for its time; return what was wrong."""
         end, before = self.world.fed() + step.hold_s, len(self.trail)
         while self.world.fed() < end and self.going:
             for posture in step.via_deg:
@@ -75,7 +75,7 @@ class Moves:
         return ''
 
     def _told_to_go(self, target: dict[str, float], what: str) -> str:
-        """Have a person bring the arm to `target` (rad), again until joint states show it."""
+        """Ask a person to bring the arm to `target` (rad) until joint states show it is there."""
         wanted = ', '.join(f'{n} {math.degrees(a):.0f} deg' for n, a in target.items())
         wrong = ''
         while self.going:
@@ -88,7 +88,7 @@ class Moves:
         return self.world.brake.stopped
 
     def _arrive(self, target: dict[str, float]) -> str:
-        """Wait while the arm comes closer to `target` (rad); return what is off when it stops."""
+        """Wait while the arm comes closer to `target` (rad); return which joint missed it."""
         best, since = math.inf, self.world.fed()
         while self.going:
             off = self._off(target)
@@ -102,12 +102,12 @@ class Moves:
         return self.world.brake.stopped
 
     def _off(self, target: dict[str, float]) -> tuple[float, str]:
-        """Return the joint that is furthest from `target` (rad), its distance first."""
+        """Return the largest distance (rad) of a joint from `target` (rad), and that joint."""
         now = self.world.positions.now
         return max((abs(now.get(n, math.inf) - a), n) for n, a in target.items())
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
-        """Wait for a condition, at most so long; return whether it came true."""
+        """Wait for a condition, for `seconds` at most; return whether it came true."""
         end = self.world.now() + seconds
         while not condition():
             if self.world.now() > end or self.asked():
@@ -116,7 +116,7 @@ class Moves:
         return True
 
     def pause(self, seconds: float) -> None:
-        """Let seconds pass in which joint states come, fewer when something stops the step."""
+        """Wait until joint states came for `seconds`, less if something stops the step."""
         end = self.world.fed() + seconds
         while self.world.fed() < end and self.going:
             self.world.wait(LOOK)
@@ -127,7 +127,7 @@ def _told(off: tuple[float, str]) -> str:
 
 
 def holds(step: Step) -> bool:
-    """Return whether the posture of a step can be held: the robot stands, the motors bear it."""
+    """Return whether the robot can hold a step's posture: it does not tip, no motor gives way."""
     return (
         step.action != 'tip'
         and step.expected.get('use', 0.0) < 0.995

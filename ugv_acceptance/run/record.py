@@ -33,10 +33,10 @@ TOPICS = (
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of a run: messages written, and the truth that no message tells.
+    """The result of recording a simulated run: its messages, and when it tipped or saturated.
 
-    `tipped_at` (s) is when it had leant too far, `saturated_at` (s) when each joint's motor first
-    gave all it had; infinite and left out where that never was.
+    `tipped_at` (s) is when it had leant too far (infinite: never); `saturated_at` (s) is when a
+    joint's motor first gave all it had, for joints where that happened. No sensor measures these.
     """
 
     messages: int = 0
@@ -46,13 +46,13 @@ class Outcome:
 
 
 def build_of(config: Config) -> Build:
-    """Return how the simulated robot is built: its IMU where the configuration says it is."""
+    """Return how to build the simulated robot, with its IMU placed as the configuration says."""
     imu = config.settings.imu
     return replace(BUILD, imu_position=imu.position, imu_rotation=imu.mounting)
 
 
 def play(config: Config, case: Case, seed: int, length: float = STRETCH) -> Iterator[Recording]:
-    """Yield the run of a case in stretches: the robot and loads as faults leave them."""
+    """Yield a simulated run in parts of `length` (s), with weak motors and overloads applied."""
     scenario = overloaded(case.scenario, overload(case.faults))
     robot = weakened(config.settings.robot, case.faults)
     return stretches(robot, scenario, seed, length, build_of(config))
@@ -65,7 +65,7 @@ def record(
     folder: Path,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Outcome:
-    """Simulate a case and record it; `progress` takes the simulated time (s) reached.
+    """Simulate a case and record it; `progress` is called with the simulated time (s) reached.
 
     Raises BadBag where the folder holds something already.
     """
@@ -101,7 +101,7 @@ def _write(bag: BagWriter, due: list[Message], outcome: Outcome) -> None:
 
 
 def _note(outcome: Outcome, part: Recording, names: tuple[str, ...]) -> None:
-    """Add a stretch's truth; what saturates across two stretches counts from the second."""
+    """Add what really happened in a part; a saturation across two parts counts from the second."""
     truth = part.truth
     outcome.seconds = float(part.imu.stamp[-1])
     over = truth.lean > TIPPED
@@ -114,7 +114,7 @@ def _note(outcome: Outcome, part: Recording, names: tuple[str, ...]) -> None:
 
 
 def lasting(rows: NDArray[np.bool_], stamp: Floats, least: float) -> float:
-    """Return from when (s) `rows` (n,) hold for `least` (s) on end; infinite: never."""
+    """Return the time (s) from which `rows` (n,) hold for `least` (s) on end; infinite: never."""
     edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
         if stamp[last - 1] - stamp[first] >= least:

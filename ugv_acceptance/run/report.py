@@ -1,4 +1,4 @@
-"""The report of a run: outcomes of its steps, and how much of the failure map it visited."""
+"""The report of a run: the verdict of each step, and how much of the safe map was visited."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +31,7 @@ held on level ground with that load; H: home.</p>
 
 
 def html_of(text: str, plan: Plan, config: Config, coverage: Mapping[str, Any]) -> str:
-    """Return a run's report, its text and the maps of its coverage, as one HTML page."""
+    """Return a run's report as one HTML page: its text and the maps with the visited cells."""
     arm = Arm(config.settings, roles_of(config.settings))
     figures = [
         f'<figure>{m["svg"]}<figcaption>{escape(m["caption"])}</figcaption></figure>'
@@ -64,7 +64,7 @@ def report_of(result: dict[str, Any]) -> str:
 
 
 def counts_of(result: Mapping[str, Any]) -> str:
-    """Return how many steps came to what, and how many were asked of nobody."""
+    """Return how many steps had each verdict, and how many were only for the simulation."""
     counts = ', '.join(f'{count} {verdict}' for verdict, count in result['counts'].items() if count)
     steps, spared = len(result['steps']), len(result['steps']) - result['asked']
     text = f'{steps} steps: {counts}'
@@ -74,7 +74,7 @@ def counts_of(result: Mapping[str, Any]) -> str:
 
 
 def approaches(coverage: Mapping[str, Any]) -> list[str]:
-    """Return how close a run came to each limit on either side, a line each."""
+    """Return how close a run came to each limit from either side, one line of text each."""
     kinds = (('torque limit', 'torque_limit', 100.0, '%'), ('tilt', 'tip_limit_deg', 1.0, ' deg'))
     return [
         _approach_line(f'{what}, {name}', found, scale, unit)
@@ -104,7 +104,7 @@ def _approach_line(what: str, found: dict[str, float | None], scale: float, unit
 
 
 def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
-    """Return the coverage of the arm's postures by what was recorded, for JSON.
+    """Return which of the arm's postures were visited by the recorded margins `seen`, for JSON.
 
     Cells are squares of the two arm joints' positions, `visited_deg` their lower corners (first
     joint -> second); only those that keep clear of ground and deck count. `inside` and `outside`
@@ -142,7 +142,7 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
 
 
 def cells(q: Floats) -> set[tuple[int, int]]:
-    """Return the cells that positions (n, 2) in rad lie in, whole turns taken off."""
+    """Return the map cells that positions (n, 2) in rad lie in, modulo full turns."""
     turned = (np.degrees(q) + 180.0) % 360.0
     turned = turned[np.isfinite(turned).all(axis=1)]
     return {(int(a), int(b)) for a, b in np.unique(np.floor(turned / STEP_DEG + 1e-6), axis=0)}

@@ -1,6 +1,7 @@
-"""Runs a plan step by step: set up, move, hold, record; judged from the recording.
+"""Runs a plan step by step: set up, move, hold, record, and judge the step by its recording.
 
-A step's recording begins before its set-up and ends after what it is for: all that moves is in it.
+A step's recording begins before its set-up and ends after its action, so that it contains every
+motion of the robot.
 """
 
 import math
@@ -33,9 +34,9 @@ HOME_SPEED = math.radians(35.0)
 
 @dataclass(slots=True)
 class Runner:
-    """Does the steps of a plan one after the other; `asked()` says when to freeze and end.
+    """Carries out the steps of a plan one after the other; `asked()` says when to freeze and end.
 
-    `over` says why no further step can be done; empty: they can.
+    `over` is the reason why no further step can be done; empty: they can.
     """
 
     config: Config
@@ -56,14 +57,14 @@ class Runner:
 
     @property
     def brake(self) -> Brake:
-        """The brake of the world."""
+        """The brake that freezes motion at an unexpected alert."""
         return self.world.brake
 
     def run(self, step: Step) -> dict[str, Any] | None:
-        """Do one step and return its result, which is written; None if the run was interrupted.
+        """Do one step, write its result and return it; None if the run was interrupted.
 
-        A step that showed nothing because messages were missing is done again; the result tells
-        how often and why.
+        A step that showed nothing because messages were missing is done again; the result says how
+        often and why.
         """
         refused = self._refused(step)
         if refused:
@@ -121,19 +122,19 @@ class Runner:
     # Before a step
 
     def wait_for_all(self, seconds: float) -> None:
-        """Wait until robot and monitor are there; BadConfig says which of them was not."""
+        """Wait up to `seconds` for robot and monitor. Raises BadConfig naming what is missing."""
         if not self.moves.until(lambda: not self.world.missing(), seconds) and not self.asked():
             raise BadConfig(f'expected {self.world.missing()} within {seconds:g} s, got nothing')
 
     def _alive(self) -> dict[str, Any] | None:
-        """Return the result of a step that nobody would watch; None: the monitor is there."""
+        """Return an INCONCLUSIVE result where the monitor is silent, None where it watches."""
         if self.moves.until(lambda: not self.world.dead(), CALM) or self.asked():
             return None
         self.over = 'the monitor says nothing'
         return {'verdict': INCONCLUSIVE, 'reasons': [self.over]}
 
     def _prepare(self, step: Step) -> str:
-        """Bring the robot home and set it up where anything changes; return what was wrong."""
+        """Bring the robot home and set it up where a step needs it; return what was wrong."""
         setup = (step.ground, step.payload_kg)
         # What is only simulated begins at the start, where no way home has to be safe.
         if self._lying or (step.where == SIMULATION and setup != self._setup):
@@ -155,7 +156,7 @@ class Runner:
         return '' if calm else f'active before it began: {", ".join(self.brake.trouble)}'
 
     def _go_home(self) -> str:
-        """Go home straight where that is safe, else the way the arm came; return what is wrong."""
+        """Go home, straight where that is safe, else back as it came; return what was wrong."""
         self.brake.arm(ALWAYS)
         home, paths = self.folder.plan.home_deg, self.moves.trail[-2::-1]
         robot = self.config.settings.robot
@@ -200,7 +201,7 @@ class Runner:
         return done
 
     def _act(self, step: Step) -> str:
-        """Do what the step is for; return what was wrong."""
+        """Do the action of a step: hold, drive, pull, cycle or wait; return what was wrong."""
         if step.action == 'drive' and step.drive is not None:
             self.hands.drive(step, step.drive[0], math.radians(step.drive[1]), step.hold_s)
         elif step.action == 'pull':
@@ -222,6 +223,6 @@ class Runner:
 
     @property
     def _settle(self) -> float:
-        """Seconds after which alerts of the way are over."""
+        """Seconds after which the alerts raised on the way to a posture have ended."""
         delays = self.config.settings.delays
         return max(delays.off, delays.tip_off) + max(delays.tip_on, delays.torque_on) + 0.2

@@ -1,4 +1,7 @@
-"""A simulated robot that publishes and obeys as a real one does; no clock, no ROS."""
+"""A simulated robot with the interface of a real one: it obeys commands and sends messages.
+
+Free of clocks and ROS: the caller advances the time.
+"""
 
 import heapq
 import math
@@ -24,7 +27,7 @@ Sent = tuple[str, bytes]
 
 @dataclass(slots=True)
 class VirtualRobot:
-    """The robot, its sensors, its driver and the faults in them; `step` is one period of the IMU.
+    """A simulated robot with sensors, driver and faults; `step` simulates one IMU period.
 
     `home` are positions (rad) at the start in the order of the configuration, none: stowed. Stamps
     begin at `epoch` (ns). Raises BadConfig where rates or positions do not fit.
@@ -71,7 +74,7 @@ class VirtualRobot:
         return self.remote.elapsed
 
     def shift(self, nanoseconds: int) -> None:
-        """Move the stamps of all that follows, as time that slipped away."""
+        """Move all later stamps by an offset (ns): real time the simulation could not follow."""
         self.epoch += nanoseconds
         self._driver = replace(self._driver, epoch=self.epoch)
 
@@ -83,7 +86,7 @@ class VirtualRobot:
         self.remote.tilt(tilt, heading + self._yaw(), rate)
 
     def pull(self, force: float, height: float) -> None:
-        """Pull backwards (N) at a hitch in the middle of the base, at a height (m) above it."""
+        """Pull backwards with a force (N) at a hitch, `height` (m) above the middle of the base."""
         simulation, yaw = self.remote.simulation, self._yaw()
         back = (-force * math.cos(yaw), -force * math.sin(yaw), 0.0)
         base = simulation.data.body(self.config.settings.robot.root)
@@ -91,12 +94,12 @@ class VirtualRobot:
         base.xfrc_applied[:] = (*back, *np.cross(arm, back))
 
     def _yaw(self) -> float:
-        """Return where the robot's front points (rad)."""
+        """Return the direction (rad) of the robot's front on the ground."""
         x, y, z, w = self.remote.simulation.imu()[0]
         return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
     def step(self) -> None:
-        """Simulate one period of the IMU; what is sent waits until it is due."""
+        """Simulate one period of the IMU; its messages are kept until they are due."""
         self.remote.advance(self.tick)
         simulation, now = self.remote.simulation, self.remote.elapsed
         rows = Rows(imu=[(now, *simulation.imu())])
@@ -114,7 +117,7 @@ class VirtualRobot:
                 heapq.heappush(self._waiting, (when, self._count, source, data))
 
     def due(self, now: float = math.inf) -> Iterator[Sent]:
-        """Yield what arrives until `now` (s, simulated)."""
+        """Yield the messages that arrive until `now` (s, simulated)."""
         while self._waiting and self._waiting[0][0] <= now:
             _, _, source, data = heapq.heappop(self._waiting)
             yield source, data

@@ -1,7 +1,7 @@
-"""The world of `run` without ROS, as fast as it goes: robot, evaluation and recording.
+"""The runner's `World` without ROS: simulated robot, evaluation and recording in one process.
 
-Nothing here depends on the speed of the machine: the same seed gives the same recordings, bit for
-bit, and the same verdicts. What is judged, and by what, is the same as over ROS.
+It runs as fast as the machine allows, yet nothing depends on its speed: the same seed gives the
+same recordings, bit for bit, and the same verdicts. Steps are judged as over ROS.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,9 +30,9 @@ from ugv_acceptance.run.world import Brake, Commands, Positions
 
 @dataclass(slots=True)
 class Offline:
-    """The world of a runner in simulated time; `progress` takes the time (s) reached.
+    """A runner's world in simulated time; `progress` is called with the time (s) reached.
 
-    `asked()` ends a wait early: a run of hours hears Ctrl-C.
+    `asked()` ends a wait early, so that Ctrl-C ends a run of hours.
     """
 
     virtual: VirtualRobot
@@ -66,11 +66,11 @@ class Offline:
     # The world of a runner
 
     def missing(self) -> str:
-        """Return who was not heard yet: nobody."""
+        """Return what is not yet connected: always empty, all is in this process."""
         return ''
 
     def dead(self) -> bool:
-        """Return whether the monitor has fallen silent: it is in here."""
+        """Return whether the monitor is silent: never, it is in this process."""
         return False
 
     def now(self) -> float:
@@ -78,15 +78,15 @@ class Offline:
         return self.virtual.elapsed
 
     def fed(self) -> float:
-        """Return the simulated time (s): joint states are waited for."""
+        """Return for how long (s) joint states came: the simulated time, they never pause."""
         return self.virtual.elapsed
 
     def stamp(self) -> int:
-        """Return the time (ns) that recordings carry."""
+        """Return the simulated time as recordings carry it (ns)."""
         return self.virtual.epoch + round(self.virtual.elapsed * 1e9)
 
     def wait(self, seconds: float) -> None:
-        """Simulate so many seconds."""
+        """Simulate `seconds`, or less when asked to end."""
         end = self.virtual.elapsed + seconds - self.virtual.tick / 2.0
         while self.virtual.elapsed < end and not self.asked():
             self.virtual.step()
@@ -99,7 +99,7 @@ class Offline:
         self.progress(self.virtual.elapsed)
 
     def record(self, folder: Path) -> None:
-        """Record into a new folder from now on."""
+        """Begin to record all messages into a new folder."""
         self.bag = BagWriter(folder)
         sensor = Qos(reliability='best_effort')
         for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
@@ -140,7 +140,7 @@ class Offline:
         self._look()
 
     def _look(self) -> None:
-        """Pass on which alerts were raised or cleared since the last look."""
+        """Pass alerts raised or cleared since the last call to the brake."""
         log = self.evaluator.watch.log
         for alert in log[self._seen :]:
             self._open.append(alert)
@@ -151,7 +151,7 @@ class Offline:
             self.brake.active.discard(_key(alert))
 
     def declare(self, mass: float) -> None:
-        """Take a declared load (kg), as the monitor does, and record it."""
+        """Declare a load (kg) to the evaluation, as to the monitor, and record it."""
         topics, cog = self.config.topics, self.config.settings.robot.payload.cog
         frame, now = topics.payload.frame_id or '', self.stamp()
         if self.bag is not None:
@@ -161,7 +161,7 @@ class Offline:
 
 @dataclass(frozen=True, slots=True)
 class OfflineCommands:
-    """The commands of `run.world.Commands`, obeyed at once by the simulated robot."""
+    """The `Commands` of a runner, obeyed at once by the simulated robot."""
 
     world: Offline
 
@@ -171,15 +171,15 @@ class OfflineCommands:
         self.world.virtual.remote.follow(list(posture), [point])
 
     def freeze(self) -> None:
-        """Hold arm and tracks still."""
+        """Stop arm and tracks and hold them still."""
         self.world.virtual.remote.freeze()
 
     def drive(self, forward: float, yaw: float) -> None:
-        """Drive at m/s and rad/s."""
+        """Drive at `forward` (m/s) and `yaw` (rad/s)."""
         self.world.virtual.remote.drive(forward, yaw)
 
     def declare(self, mass: float) -> None:
-        """Tell the monitor what is carried (kg)."""
+        """Declare to the evaluation what is carried (kg)."""
         self.world.declare(mass)
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
@@ -187,16 +187,16 @@ class OfflineCommands:
         self.world.virtual.tilt(tilt, heading, rate)
 
     def load(self, mass: float) -> None:
-        """Put a load (kg) into the hand."""
+        """Put a load (kg) into the gripper."""
         cog = self.world.config.settings.robot.payload.cog
         self.world.virtual.remote.take(Payload(mass, cog))
 
     def pull(self, force: float) -> None:
-        """Pull backwards at the hitch (N), until told otherwise."""
+        """Pull backwards at the hitch (N) until told otherwise."""
         self.world.virtual.pull(force, HITCH)
 
     def stand_up(self) -> None:
-        """Put the robot on level ground as at the start, its hand empty."""
+        """Reset the robot to its start: on level ground, the gripper empty."""
         self.world.virtual.remote.reset()
 
 

@@ -1,4 +1,4 @@
-"""Judges a step of a plan by the recording made of it."""
+"""Judges a step of a plan by its recording: the alerts it raised, and whether it tipped or held."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -26,7 +26,7 @@ FALLEN = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What the runner saw of a step; times are ns of the recording's clock.
+    """The runner's record of a step it did; times are ns of the recording's clock.
 
     `begin` is when the motion began, `hold` and `end` bound the time in which nothing unwanted may
     be active. `wrong` says how the posture was not reached or held, `stopped` why the motion was
@@ -43,7 +43,7 @@ class Done:
 
 @dataclass(slots=True)
 class Seen:
-    """Margins of a recording, gathered stretch by stretch.
+    """The margins of a recording, collected part by part.
 
     Times (n,) in ns, positions `q` (n, j), shares `use` (n, j) of the torque limits, tilt left
     (n, 4) in rad towards each of SIDES.
@@ -56,7 +56,7 @@ class Seen:
     tilt: list[Floats] = field(default_factory=list)
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch; rows without margins are left out."""
+        """Add the margins of the next part; rows without margins are left out."""
         known = rows.known
         self.time.append(rows.time[known])
         self.q.append(rows.q[known])
@@ -73,7 +73,7 @@ class Seen:
 
 
 def judge_step(step: Step, folder: Path, config: Config, done: Done) -> dict[str, Any]:
-    """Return the result of a step for JSON. Raises BadBag where the recording cannot be read."""
+    """Return a step's result for JSON. Raises BadBag where its recording cannot be read."""
     start, result, seen = _judged(folder, config)
     window = tuple((t - start) / 1e9 for t in (done.begin, done.hold, done.end))
     found = {
@@ -98,7 +98,7 @@ def seen_in(folder: Path, config: Config) -> Seen:
 
 
 def _judged(folder: Path, config: Config) -> tuple[int, dict[str, Any], Seen]:
-    """Return a recording's first time (ns), its result and its margins."""
+    """Return a recording's first time (ns), its evaluation result and its margins."""
     seen = Seen(np.array(config.settings.limits.torque))
     found = evaluate(folder, config=config, options=Options(takers=(seen.add,)))
     return found.recording.start_ns, found.result, seen
@@ -111,7 +111,7 @@ def decide(
     done: Done,
     share: float,
 ) -> tuple[str, list[str]]:
-    """Return the verdict on a step and its reasons."""
+    """Return the verdict on a step (PASS, FAIL, INCONCLUSIVE) and its reasons."""
     begin, hold, end = window
     alerts = list(alerts)
     missing = [
@@ -156,7 +156,7 @@ def _active(alert: Mapping[str, Any], begin: float, end: float) -> bool:
 
 
 def measured(seen: Seen, done: Done) -> dict[str, float]:
-    """Return the median margins of the hold, in the units of `expected`."""
+    """Return the median margins during the hold, with the keys and units of `expected`."""
     time, _, use, tilt = seen.joined()
     rows = (time >= done.hold) & (time <= done.end)
     if not rows.any():
@@ -168,7 +168,7 @@ def measured(seen: Seen, done: Done) -> dict[str, float]:
 
 
 def stood(seen: Seen, done: Done) -> str:
-    """Return that a robot did not tip over though it should have; empty: it did."""
+    """Return why the robot counts as not tipped over, as text; empty if it tipped over."""
     time, _, _, tilt = seen.joined()
     rows = tilt[(time >= done.begin) & (time <= done.end)]
     least = math.degrees(rows.min()) if rows.size else math.inf
@@ -176,7 +176,7 @@ def stood(seen: Seen, done: Done) -> str:
 
 
 def covered(seen: Seen, done: Done) -> float:
-    """Return the share of the hold with margins: the time between rows under 0.2 s apart."""
+    """Return the share of the hold for which margins are known: rows less than 0.2 s apart."""
     time = seen.joined()[0]
     inside = time[(time >= done.hold) & (time <= done.end)]
     edges = np.concatenate(([done.hold], inside, [done.end]))
@@ -186,7 +186,7 @@ def covered(seen: Seen, done: Done) -> float:
 
 
 def whole(results: Iterable[Mapping[str, Any]]) -> str:
-    """Return the verdict on a run: the worst of its steps; skipped steps leave it inconclusive."""
+    """Return the verdict on a run: FAIL if a step failed, PASS if all passed, else INCONCLUSIVE."""
     found = {str(r['verdict']) for r in results}
     if FAIL in found:
         return FAIL

@@ -1,4 +1,4 @@
-"""What a runner needs of its world: messages heard, time that passes, stopping motion."""
+"""The interface between a runner and a robot with its monitor; the brake on unexpected alerts."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -15,11 +15,11 @@ Active = tuple[str, str, str]
 
 @dataclass(slots=True)
 class Brake:
-    """Freezes motion at an alert that is not wanted now, and says why.
+    """Freezes all motion at an alert the current step does not expect, and keeps the reason.
 
-    `unwanted` are alert patterns, `stopped` is the first reason since the brake was armed; empty:
-    nothing stopped it; `blind` says that something was missing then, so that nothing was shown.
-    `freeze()` holds the robot still, `on_stop(reason)` tells people.
+    `unwanted` are alert patterns. `stopped` is the first reason since the brake was armed; empty:
+    nothing stopped it. `blind` says that data was missing then, so that nothing was shown.
+    `freeze()` holds the robot still, `on_stop(reason)` informs people.
     """
 
     freeze: Callable[[], None]
@@ -31,46 +31,46 @@ class Brake:
     active: set[Active] = field(default_factory=set)
 
     def arm(self, unwanted: tuple[str, ...]) -> None:
-        """Watch from now on; what freezes is named by alert patterns."""
+        """Watch from now on, and freeze motion at alerts that match a pattern in `unwanted`."""
         self.unwanted, self.stopped, self.blind, self.armed = unwanted, '', False, True
 
     def disarm(self) -> None:
-        """Let everything pass, as while a person changes the set-up."""
+        """Ignore all alerts, as while a person changes the set-up."""
         self.armed = False
 
     def stop(self, reason: str, *, blind: bool = False) -> None:
-        """Freeze all motion now; `blind`: because something is missing, as at a STALE alert."""
+        """Freeze all motion now; `blind`: because data is missing, as at a STALE alert."""
         self.freeze()
         if not self.stopped:
             self.stopped, self.blind = reason, blind or reason.startswith('STALE')
             self.on_stop(reason)
 
     def raised(self, alert: Active, text: str) -> None:
-        """Take an alert that was raised; `text` says it in words."""
+        """Take an alert that was raised, and freeze where it is unwanted; `text` describes it."""
         self.active.add(alert)
         if self.armed and self.stops(alert):
             self.stop(f'{" ".join(alert)}: {text}')
 
     def stops(self, alert: Active) -> bool:
-        """Return whether an alert stops the step in hand: ERROR or STALE, and not expected."""
+        """Return whether an alert stops the current step: ERROR or STALE, and not expected."""
         level = alert[0]
         return level in {'ERROR', 'STALE'} and any(matches(p, *alert) for p in self.unwanted)
 
     @property
     def trouble(self) -> list[str]:
-        """The alerts that are active and would stop the step in hand."""
+        """The active alerts that would stop the current step."""
         return sorted(' '.join(alert) for alert in list(self.active) if self.stops(alert))
 
 
 @dataclass(slots=True)
 class Positions:
-    """The newest joint positions (rad) by the robot's joint names, from what a driver publishes."""
+    """The newest position (rad) of each of the robot's joints, from a driver's joint states."""
 
     config: Config
     now: dict[str, float] = field(default_factory=dict)
 
     def take(self, names: Sequence[str], position: Sequence[float]) -> None:
-        """Take a message; joints that are not the robot's, and not-a-number, are left out."""
+        """Take a message; joints that are not the robot's, and NaN, are left out."""
         settings = self.config.settings
         for joint, name in zip(settings.joints, settings.robot.joint_names, strict=True):
             if joint.topic_name in names:
@@ -81,31 +81,31 @@ class Positions:
 
 
 class Commands(Protocol):
-    """What a robot, and the test ground of a simulated one, can be told."""
+    """The commands a runner gives: to the robot, and to the test ground of a simulated one."""
 
     def move(self, posture: Mapping[str, float], seconds: float) -> None:
         """Start a motion to `posture` (rad) that takes `seconds`."""
 
     def freeze(self) -> None:
-        """Hold arm and tracks still."""
+        """Stop arm and tracks and hold them still."""
 
     def drive(self, forward: float, yaw: float) -> None:
-        """Drive at m/s and rad/s, for half a second unless told again."""
+        """Drive at `forward` (m/s) and `yaw` (rad/s) for half a second unless told again."""
 
     def declare(self, mass: float) -> None:
-        """Tell the monitor what is carried (kg)."""
+        """Declare to the monitor what is carried (kg)."""
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
 
     def load(self, mass: float) -> None:
-        """Put a load (kg) into the hand."""
+        """Put a load (kg) into the gripper."""
 
     def pull(self, force: float) -> None:
-        """Pull backwards at the hitch (N), until told otherwise."""
+        """Pull backwards at the hitch (N) until told otherwise."""
 
     def stand_up(self) -> None:
-        """Put the robot on level ground as at the start, its hand empty."""
+        """Reset the robot to its start: on level ground, the gripper empty."""
 
 
 class World(Protocol):
@@ -116,25 +116,25 @@ class World(Protocol):
     positions: Positions
 
     def missing(self) -> str:
-        """Return who was not heard, or does not listen, yet; empty when everything is there."""
+        """Return what has not been heard, or does not listen, yet; empty when all is there."""
 
     def dead(self) -> bool:
         """Return whether the monitor has fallen silent."""
 
     def now(self) -> float:
-        """Return the time that passes here (s)."""
+        """Return the time (s) of this world's clock, real or simulated."""
 
     def fed(self) -> float:
-        """Return for how long (s) joint states kept coming: it stands still while they do not."""
+        """Return for how long (s) joint states kept coming; stands still while they do not."""
 
     def stamp(self) -> int:
-        """Return the time (ns) that recordings carry."""
+        """Return the time (ns) that a message recorded now carries."""
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Wait `seconds` of this world's time."""
 
     def record(self, folder: Path) -> None:
-        """Record into a new folder from now on."""
+        """Begin to record all messages into a new folder."""
 
     def stop_recording(self) -> None:
         """Close the recording, if there is one."""
