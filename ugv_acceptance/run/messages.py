@@ -21,7 +21,7 @@ Message = tuple[str, int, bytes]
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """The robot's driver: numbers of the model to messages, as `config` says they are counted."""
+    """Converts model values to messages with the names, signs and offsets of the driver."""
 
     config: Config
     corruption: Corruption

@@ -79,9 +79,9 @@ class VirtualRobot:
         self._driver = replace(self._driver, epoch=self.epoch)
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
-        """Tilt the ground: rad, down towards `heading` (rad from the robot's front), at a rate.
+        """Tilt the ground (rad) down towards `heading` (rad from the robot's front), at a rate.
 
-        A robot that has turned is put onto the ramp as a person puts it there.
+        `rate` is the peak in rad/s. A robot that has turned is put onto the ramp as a person would.
         """
         self.remote.tilt(tilt, heading + self._yaw(), rate)
 

@@ -1,6 +1,6 @@
-"""Applies faults to a robot, to its sensors' readings and to how messages arrive.
+"""Applies faults to a robot, to its sensors' readings and to the arrival of its messages.
 
-The functions of logs take any number of rows, so a live simulator hands in one row at a time.
+The functions on logs take any number of rows, so that a live simulator can pass one at a time.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ BEHIND = 0.001
 
 
 def weakened(robot: Robot, faults: Sequence[Fault]) -> Robot:
-    """Return the robot with the motors that faults leave it."""
+    """Return the robot with its motors' effort limits reduced by the faults."""
     share = {f.subject: f.amount for f in faults if f.kind == 'weak-motor'}
     joints = tuple(
         replace(joint, effort=joint.effort * share.get(joint.name, 1.0)) for joint in robot.joints
@@ -31,7 +31,7 @@ def weakened(robot: Robot, faults: Sequence[Fault]) -> Robot:
 
 
 def overload(faults: Sequence[Fault]) -> float:
-    """Return by which factor loads are heavier than declared."""
+    """Return the factor by which real loads exceed the declared ones."""
     return float(np.prod([f.amount for f in faults if f.kind == 'heavy-payload']))
 
 
@@ -50,7 +50,7 @@ def overloaded(scenario: Scenario, factor: float) -> Scenario:
 
 @dataclass(slots=True)
 class Corruption:
-    """Faults at work; it remembers what a frozen encoder told last, and where others stand."""
+    """The faults of one run; keeps the frozen encoders' last values and other robots' positions."""
 
     faults: tuple[Fault, ...]
     joint_names: tuple[str, ...]
@@ -58,7 +58,7 @@ class Corruption:
     _others: dict[tuple[Fault, str], tuple[Floats, ...]] = field(default_factory=dict)
 
     def joints(self, log: JointLog) -> JointLog:
-        """Return what the encoders say, those of another robot included."""
+        """Return the log as faulty encoders report it, with a second publisher's messages."""
         position, velocity = log.position.copy(), log.velocity.copy()
         for fault in self.faults:
             rows = _during(fault, log.stamp)
@@ -72,7 +72,7 @@ class Corruption:
         return JointLog(*told)
 
     def imu(self, log: ImuLog) -> ImuLog:
-        """Return what the IMU says, that of another robot included."""
+        """Return the log as a faulty IMU reports it, with a second publisher's messages."""
         orientation, rate = log.orientation.copy(), log.angular_velocity.copy()
         force = log.linear_acceleration.copy()
         for fault in self.faults:
@@ -92,7 +92,7 @@ class Corruption:
     def _joined(
         self, source: str, stamp: Floats, columns: tuple[Floats, ...]
     ) -> tuple[Floats, ...]:
-        """Return stamps and columns with the messages of another robot, each just behind ours."""
+        """Return stamps and columns with a second publisher's messages just after ours."""
         for fault in self.faults:
             rows = _during(fault, stamp)
             if fault.kind != 'second-publisher' or not fault.hits(source) or not rows.any():
@@ -115,11 +115,11 @@ class Corruption:
         return joints, any(f.kind == 'effort-missing' for f in now)
 
     def shift(self, source: str, time: float) -> float:
-        """Return by how much (s) the header stamps of an input are off at `time` (s)."""
+        """Return the error (s) of an input's header stamps at `time` (s)."""
         return sum(f.amount for f in self._of('clock-jump', source, time))
 
     def arrivals(self, source: str, time: float, rng: np.random.Generator) -> list[float]:
-        """Return when (s) a message of an input sent at `time` comes: never, once or twice."""
+        """Return when (s) a message sent at `time` arrives: empty if lost, twice if duplicated."""
         if not self.faults:
             return [time + DELAY + JITTER * rng.random()]
         if self._of('dead', source, time):
@@ -148,7 +148,7 @@ def _during(fault: Fault, stamp: Floats) -> np.ndarray[tuple[int, ...], np.dtype
 
 
 def _seen_turned(vectors: Floats, angle: float) -> Floats:
-    """Return vectors (n, 3) in axes turned by `angle` (rad) about z."""
+    """Return vectors (n, 3) as seen in axes turned by `angle` (rad) about z."""
     c, s = np.cos(angle), np.sin(angle)
     turned: Floats = vectors @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return turned

@@ -1,4 +1,4 @@
-"""A simulated robot under live commands: joint trajectories, a drive that times out, a reset."""
+"""A simulated robot under live commands: joint trajectories, a drive with a time-out, a reset."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ _PEAK = math.pi / 2.0  # peak rate of a smooth motion over its mean rate
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point of a trajectory: joint targets (rad, m) to be reached `time` (s) after its start."""
+    """A point of a trajectory: joint targets (rad, m), due `time` (s) after its start."""
 
     time: float
     targets: tuple[tuple[str, float], ...]
@@ -28,7 +28,7 @@ class Point:
 
 @dataclass(slots=True)
 class RemoteRobot:
-    """A simulated robot that takes commands as they come; times are those of its simulation.
+    """A simulated robot that takes commands while it runs; times (s) are those of its simulation.
 
     `start` pairs joint names with positions; `factor` is how much heavier loads are than declared.
     """
@@ -56,9 +56,9 @@ class RemoteRobot:
         self._drive_until = math.inf
 
     def follow(self, names: Sequence[str], points: Sequence[tuple[float, Sequence[float]]]) -> None:
-        """Move through `points` (time after now in s, a position a name); none: hold still.
+        """Move through trajectory `points` (s from now; a position per name); none: hold still.
 
-        It takes the place of any trajectory under way. BadSample: it cannot be followed.
+        It replaces a trajectory under way. Raises BadSample where it cannot be followed.
         """
         unknown = [n for n in names if n not in self.robot.joint_names]
         if unknown:
@@ -90,14 +90,14 @@ class RemoteRobot:
         self._drive_until = math.inf
 
     def drive(self, forward: float, yaw: float) -> None:
-        """Drive at `forward` (m/s) and `yaw` (rad/s) until told otherwise or the time-out."""
+        """Drive at `forward` (m/s) and `yaw` (rad/s) until told otherwise or until the time-out."""
         if not (math.isfinite(forward) and math.isfinite(yaw)):
             raise BadSample(f'cmd_vel: expected finite speeds, got {forward}, {yaw}')
         self.simulation.apply(Command(self.simulation.time, drive=(forward, yaw)))
         self._drive_until = self.simulation.time + DRIVE_TIMEOUT
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
-        """Tilt the ground: rad down towards `heading` (rad), reached at a peak `rate` (rad/s)."""
+        """Tilt the ground to `tilt` (rad), down towards `heading` (rad), at a peak rate (rad/s)."""
         if not (abs(tilt) <= math.pi / 2.0 and math.isfinite(heading) and rate > 0.0):
             raise BadSample(
                 f'ground: expected a tilt up to pi/2 and a rate above 0, got {tilt}, {rate}'
@@ -105,7 +105,7 @@ class RemoteRobot:
         self.simulation.apply(Command(self.simulation.time, slope=(tilt, heading), slope_rate=rate))
 
     def take(self, payload: Payload) -> None:
-        """Have a load in the hand from now on: the declared one times the overload."""
+        """Put a load into the gripper: the declared one, times the overload of the faults."""
         numbers = (payload.mass, *payload.cog)
         if not all(map(math.isfinite, numbers)) or payload.mass < 0.0:
             raise BadSample(f'load: expected a mass of at least 0 kg and its place, got {numbers}')
@@ -113,7 +113,7 @@ class RemoteRobot:
         self.simulation.apply(Command(self.simulation.time, payload=load))
 
     def advance(self, duration: float) -> None:
-        """Move on by `duration` (s)."""
+        """Simulate `duration` (s)."""
         self._begin_segments()
         if self.simulation.time >= self._drive_until:
             self.simulation.apply(Command(self.simulation.time, drive=(0.0, 0.0)))
@@ -134,7 +134,7 @@ class RemoteRobot:
                 self.simulation.apply(Command(now, ((name, target),), speed))
 
     def _speed(self, name: str, way: float, length: float) -> float:
-        """Return the peak speed for a way within `length` (s), bounded by what the joint can."""
+        """Return the peak speed that covers a distance within `length` (s), at most the joint's."""
         limit = self.robot.joint(name).velocity
         fastest = limit if math.isfinite(limit) else FASTEST
         wanted = _PEAK * way / length if length > 0.0 else fastest

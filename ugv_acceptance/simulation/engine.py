@@ -1,4 +1,4 @@
-"""Imports MuJoCo, or says how to install it."""
+"""Imports MuJoCo; AcceptanceError says how to install it where it is missing."""
 
 from ugv_acceptance import AcceptanceError, pip_install
 

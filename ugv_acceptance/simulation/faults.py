@@ -1,4 +1,4 @@
-"""The faults a simulated run can have: names, effects, how they are written."""
+"""The faults a simulated run can have: their names, effects and amounts."""
 
 import math
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ INPUTS = ('joint_states', 'imu')
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of fault: what it does, whether to a joint, an input or neither, and how much.
+    """A kind of fault: its effect, whether it hits a joint, an input or neither, and its amounts.
 
     `subject` is joint, input or empty; `low` to `high` bound the amount, which stands for {} in
     `text`; where it is an `angle`, in degrees.
@@ -23,7 +23,7 @@ class Kind:
 
     @property
     def words(self) -> str:
-        """Return what it does, with the usual amount."""
+        """Return the effect as text, with the usual amount."""
         return self.text.format(f'{self.amount:g}')
 
 
@@ -55,9 +55,9 @@ PHYSICAL = ('heavy-payload', 'weak-motor')
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A fault from `start` until before `end` (s); `subject` is empty where the kind has none.
+    """A fault that is active from `start` until before `end` (s); `subject` is a joint or input.
 
-    A fault of the inputs without a subject is one of both.
+    `subject` is empty where the kind has none. A fault of the inputs without a subject hits both.
     """
 
     kind: str
@@ -67,7 +67,7 @@ class Fault:
     end: float = math.inf
 
     def hits(self, subject: str) -> bool:
-        """Return whether the fault is one of this input or joint."""
+        """Return whether the fault applies to this input or joint."""
         return self.subject in ('', subject)
 
 

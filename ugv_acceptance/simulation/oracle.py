@@ -1,4 +1,4 @@
-"""Does it tip? Decided by MuJoCo on a slowly tilting plane with rigid joints.
+"""Decides whether a posture tips: MuJoCo, a slowly tilting plane, all joints rigid.
 
 The plane tilts by turning gravity; friction is so high that nothing slides. The robot has tipped
 when it has turned by TIPPED against the plane on which it had come to rest.
@@ -33,7 +33,7 @@ BUILD = Build(motors=False, friction=20.0, timestep=0.00125, contact_time=0.0026
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What the simulated robot did on the tilting plane.
+    """The simulated robot's behaviour on the tilting plane: when it tipped, and how far.
 
     `tilt` (rad) at which it tipped: 0 where it does not stand on the level as expected, infinite
     where it stood to the last. `over`: it then turned over, nothing caught it.
@@ -58,7 +58,7 @@ def tip_truth(
     rest: ArrayLike = IDENTITY,
     last: float = LAST,
 ) -> Truth:
-    """Tilt the plane down towards `heading` (rad) until the robot tips, at most to `last` (rad).
+    """Tilt the plane down towards `heading` (rad) until the robot tips, up to `last` (rad).
 
     `rest` (3, 3) is the attitude in which it is put on the level plane and should stay.
     """
@@ -95,7 +95,7 @@ def _tilt(
 
 
 def _falls_over(vehicle: Vehicle, data: mujoco.MjData, rest: Floats) -> bool:
-    """Return whether the robot that has begun to tip turns over, the plane held as it is."""
+    """Return whether a robot that has begun to tip turns over, with the plane held still."""
     for _ in range(round(SETTLE / (STRIDE * vehicle.model.opt.timestep))):
         mujoco.mj_step(vehicle.model, data, nstep=STRIDE)
         if turn(attitude(vehicle, data), rest) > OVER:
@@ -104,12 +104,12 @@ def _falls_over(vehicle: Vehicle, data: mujoco.MjData, rest: Floats) -> bool:
 
 
 def turn(a: Floats, b: Floats) -> float:
-    """Return the angle (rad) between the ground's normals in two attitudes (3, 3): no yaw."""
+    """Return the angle (rad) between two attitudes (3, 3), yaw ignored."""
     return float(np.arccos(np.clip(a[2] @ b[2], -1.0, 1.0)))
 
 
 def settled(vehicle: Vehicle, rest: Floats) -> mujoco.MjData:
-    """Return the robot after it was put on the level plane in attitude `rest` (3, 3)."""
+    """Return the simulated state after the robot settled on the level, put in attitude `rest`."""
     model = vehicle.model
     data = mujoco.MjData(model)
     model.opt.gravity[:] = gravity_on_slope(vehicle.robot.gravity, 0.0, 0.0)
@@ -123,7 +123,7 @@ def settled(vehicle: Vehicle, rest: Floats) -> mujoco.MjData:
 
 
 def _calm(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Let the robot come to rest on dampers, so that nothing bounces."""
+    """Let the robot come to rest on dampers, so that it does not bounce."""
     model.dof_damping[:6] = DAMPER
     mujoco.mj_step(model, data, nstep=round(CALM / model.opt.timestep))
     model.dof_damping[:6] = 0.0

@@ -1,7 +1,7 @@
-"""Random runs with a seed, of every kind an acceptance test meets.
+"""Random runs with a seed: quiet work, and every kind of motion that may tip or saturate.
 
-Each kind is a function of robot, random numbers and length. Nothing here says what will happen: the
-simulation's truth does.
+Each kind is a function of robot, random numbers and length (s). None says what will happen: that
+is found by simulating it.
 """
 
 from collections.abc import Callable
@@ -32,9 +32,9 @@ Kind = Callable[[Robot, Rng, float], Scenario]
 
 @dataclass(frozen=True, slots=True)
 class Poses:
-    """Draws postures (name, rad) of the arm; the flippers stay folded back.
+    """Draws random postures of the arm as (name, rad) pairs; the flippers stay folded back.
 
-    The grip stays `lowest` (m) above the ground.
+    The gripper stays `lowest` (m) above the ground.
     """
 
     robot: Robot
@@ -42,7 +42,7 @@ class Poses:
     lowest: float = LOWEST
 
     def anywhere(self) -> Floats:
-        """Return a posture (j,) whose grip is above the ground and clear of the deck."""
+        """Return a random posture (j,) with the gripper above the ground and clear of the deck."""
         while True:
             q = self.vector(
                 turret_joint=self.rng.uniform(-pi, pi),
@@ -53,16 +53,16 @@ class Poses:
                 return q
 
     def vector(self, **angles: float) -> Floats:
-        """Return a posture (j,) from joint angles (rad): the stowed one but for these."""
+        """Return the stowed posture (j,) with the given joint angles (rad) put in."""
         known = dict(STOWED) | angles
         return np.array([known.get(name, 0.0) for name in self.robot.joint_names])
 
     def named(self, q: Floats) -> tuple[tuple[str, float], ...]:
-        """Return a posture as a command's targets."""
+        """Return a posture (j,) as the joint targets of a command."""
         return tuple(zip(self.robot.joint_names, q.tolist(), strict=True))
 
     def calm(self, start: Floats, load: Payload, tilt: float) -> Floats | None:
-        """Return a posture to which the way from `start` keeps large margins; None: none found."""
+        """Return a posture (j,) reached from `start` with large margins; None: none was found."""
         for _ in range(40):
             end = self.anywhere()
             path = _way(start, end)
@@ -73,7 +73,7 @@ class Poses:
         return None
 
     def keeps(self, path: Floats, load: Payload, tilt: float) -> bool:
-        """Return whether postures (n, j) keep large margins on a slope to whatever side."""
+        """Return whether postures (n, j) keep large margins on a slope (rad) to any side."""
         heads = np.array([gravity_on_slope(self.robot.gravity, tilt, h) for h in _headings()])
         limit = np.array([self.robot.joint(n).effort for n in self.robot.joint_names])
         found = margins(self.robot, path[:, None, :], heads, load)
@@ -82,7 +82,7 @@ class Poses:
 
 
 def _way(start: Floats, end: Floats) -> Floats:
-    """Return postures (n, j) of the motion: no straight line, each joint takes its own time."""
+    """Return postures (n, j) of a motion in which each joint takes its own time."""
     change = end - start
     took = np.maximum(np.abs(change), 1e-9)
     phase = np.pi * np.minimum(np.linspace(0.0, took.max(), _PATH)[:, None] / took, 1.0)
@@ -95,7 +95,7 @@ def _headings() -> Floats:
 
 
 def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """Arm, tracks, load and ground change as in a quiet shift: every margin stays large."""
+    """A quiet shift: arm, tracks, load and ground change, and every margin stays large."""
     blocks, lean = _obstacle(robot, rng, 0.03) if rng.random() < _UNEVEN else ((), 0.0)
     poses = Poses(robot, rng, LOWEST + (_TOP if blocks else 0.0))
     full = Payload(float(rng.uniform(0.0, 1.5)), robot.payload.cog)
@@ -130,7 +130,7 @@ def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def _obstacle(robot: Robot, rng: Rng, height: float) -> tuple[tuple[Block, ...], float]:
-    """Return a step, stairs or a ramp ahead, up to `height` (m) a stair, and the lean it gives."""
+    """Return a step, stairs or a ramp up to `height` (m) a stair, and the lean (rad) it causes."""
     half = max(c.position[0] for c in wheel_contacts(robot))
     rise, at = float(rng.uniform(0.5, 1.0)) * height, float(rng.uniform(0.5, 0.8))
     lean = atan(rise / half) + radians(1.0)
@@ -139,7 +139,7 @@ def _obstacle(robot: Robot, rng: Rng, height: float) -> tuple[tuple[Block, ...],
 
 
 def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm is up with a load; the ground tilts until something gives, or it nearly slides."""
+    """Holds a load up while the ground tilts until something fails or the robot nearly slides."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
     q = poses.vector(
         turret_joint=rng.uniform(-pi, pi),
@@ -153,7 +153,7 @@ def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def swing(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """On a slope the arm swings a load downhill and out."""
+    """Swings a load downhill and outwards with the arm, on a slope."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 4.5)
     heading = float(rng.uniform(-pi, pi))
     q = poses.vector(
@@ -170,7 +170,7 @@ def swing(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def reach(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """On level ground the arm stretches forward with a load until a motor gives all it has."""
+    """Stretches the arm forward with a load on level ground until a motor is saturated."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.5, 5.0)
     q = poses.vector(shoulder_joint=radians(rng.uniform(75, 110)), elbow_joint=radians(-120))
     out = poses.vector(
@@ -181,12 +181,12 @@ def reach(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def grasp(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm is stretched out over the side; it lifts a load, declared when it is gripped."""
+    """Lifts a load with the arm stretched out to the side; the load is declared when gripped."""
     return _grasp(robot, rng, seconds, float(rng.uniform(0.5, 1.5)))
 
 
 def snatch(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm is stretched out over the side; a load is in the hand all at once."""
+    """Holds the arm stretched out to the side; suddenly a load is in the gripper."""
     return _grasp(robot, rng, seconds, 0.0)
 
 
@@ -204,7 +204,7 @@ def _grasp(robot: Robot, rng: Rng, seconds: float, lifting: float) -> Scenario:
 
 
 def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """On a slope, the arm up with a load, it drives fast and stops dead, again and again."""
+    """Drives fast and stops dead, again and again, on a slope with a load held up."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
     q = poses.vector(
         shoulder_joint=radians(rng.uniform(70, 90)), elbow_joint=radians(rng.uniform(-40, 0))
@@ -219,7 +219,7 @@ def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 
 def climb(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """The arm back or to a side with a load, it climbs a step, stairs or a ramp."""
+    """Climbs a step, stairs or a ramp with a load held back or to a side."""
     poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 6.0)
     q = poses.vector(
         turret_joint=rng.uniform(radians(90), radians(270)),

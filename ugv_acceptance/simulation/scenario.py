@@ -1,4 +1,4 @@
-"""A scenario of a simulated run: commands at times, and how the sensors read."""
+"""The input and output of a simulated run: commands at times, sensor noise, and the recording."""
 
 from dataclasses import dataclass
 
@@ -16,13 +16,13 @@ LIFTED, TIPPED = 0.035, 0.262
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is asked from `time` (s) on; what is None or not named stays as it was.
+    """A command given at `time` (s); a part that is None or not named stays as it was.
 
     `joints` pairs joint names with targets (rad, m), reached smoothly at a peak rate of `speed`
     (rad/s, m/s). `drive` is forward speed (m/s) and yaw rate (rad/s), reached at a peak of
     `drive_rate` (m/s2, rad/s2). `slope` is tilt and heading (rad) of the ground, reached at
-    `slope_rate` (rad/s). `payload` is declared at `time` and in the hand `payload_time` (s) later:
-    until then the arm takes more and more of its weight, as off the ground; 0: all at once.
+    `slope_rate` (rad/s). `payload` is declared at `time` and in the gripper `payload_time` (s)
+    later: until then the arm takes more and more of its weight, as off the ground; 0: all at once.
     """
 
     time: float
@@ -38,7 +38,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Errors of the sensors: standard deviations and constant biases a sample, and resolutions.
+    """Errors of the sensors: standard deviations of each sample, constant biases, resolutions.
 
     Units: rad, rad/s, N m (N where prismatic), m/s2. The orientation's error is a small rotation.
     Resolutions are powers of two, as those of converters.
@@ -104,12 +104,12 @@ class ImuLog:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What really happened, at the stamps of the joints: no sensor tells it.
+    """What really happened to the robot, at the joints' stamps; no sensor measures it.
 
     `lean` (n,) is the angle (rad) between the robot's z axis and the ground's normal at the start,
     less what its blocks explain; `saturated` (n, j) says which motors gave all they had; `position`
     (n, 3) is `base_link` in the ground's axes (m); `slope` (n,) the ground's tilt (rad); `load`
-    (n,) the mass (kg) that the hand bears.
+    (n,) the mass (kg) that the gripper bears.
     """
 
     stamp: Floats
@@ -121,7 +121,7 @@ class Truth:
 
     @property
     def tipped_at(self) -> float:
-        """Time (s) at which the robot that tipped left its stance; infinite if none did."""
+        """Time (s) at which a robot that tipped left its stance; infinite if it did not tip."""
         over = self.lean > TIPPED
         if not over.any():
             return float('inf')
@@ -131,7 +131,7 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A simulated run: what its topics would say, and the truth.
+    """A simulated run: the readings of its joints and IMU, its payloads, and what really happened.
 
     `payload` lists the times (s) from which each payload was declared, the first at 0.
     """

@@ -1,4 +1,4 @@
-"""The named scenarios of the PackBot that ships."""
+"""The fixed scenarios of the PackBot that ships."""
 
 from collections.abc import Callable
 from math import pi, radians
@@ -17,7 +17,7 @@ def _arm(shoulder_deg: float, elbow_deg: float) -> tuple[tuple[str, float], ...]
 
 
 def gentle() -> Scenario:
-    """On level ground with 1 kg: lift, look around, drive, fold again. Nothing is wrong."""
+    """On level ground with 1 kg: lift, look around, drive, fold again. No alert is due."""
     return Scenario(
         'gentle',
         28.0,
@@ -37,7 +37,7 @@ def gentle() -> Scenario:
 
 
 def overreach() -> Scenario:
-    """On a side slope with 4 kg: the shoulder gives all it has, then the arm turns downhill."""
+    """On a side slope with 4 kg: the shoulder saturates, then the arm turns downhill."""
     return Scenario(
         'overreach',
         29.0,

@@ -1,4 +1,4 @@
-"""Geometry for contact: spheres, wheels, the body after a tip-over, obstacles."""
+"""Contact geometry in MJCF: contact spheres, wheels, the body's hull, obstacles."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ BRAKE = (0.02, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A box on the ground: its middle and half its size (m), turned by `pitch` (rad) about y."""
+    """A box on the ground: centre and half size (m), turned by `pitch` (rad) about y."""
 
     middle: Vector
     half: Vector
@@ -35,17 +35,17 @@ class Block:
 
 
 def step(at: float, height: float, length: float = 4.0) -> Block:
-    """Return a step up of `height` (m) that begins `at` x (m) and goes on for `length` (m)."""
+    """Return a step of `height` (m) that begins at x = `at` (m) and is `length` (m) deep."""
     return Block((at + length / 2.0, 0.0, 0.0), (length / 2.0, 2.0, height))
 
 
 def stairs(at: float, rise: float, run: float, count: int) -> tuple[Block, ...]:
-    """Return `count` stairs up from `at` x (m), each `rise` high and `run` deep (m)."""
+    """Return `count` stairs that begin at x = `at` (m), each `rise` high and `run` deep (m)."""
     return tuple(step(at + k * run, (k + 1) * rise) for k in range(count))
 
 
 def ramp(at: float, angle: float, length: float = 3.0) -> tuple[Block, Block]:
-    """Return a ramp up by `angle` (rad) from `at` x (m), `length` (m) along it, and level then."""
+    """Return a ramp from x = `at` (m), `length` (m) long at `angle` (rad), and a level end."""
     s, c = math.sin(angle), math.cos(angle)
     depth = length / 2.0
     # The upper face goes through (at, 0): half a length along it, then `depth` down its normal.
@@ -54,12 +54,12 @@ def ramp(at: float, angle: float, length: float = 3.0) -> tuple[Block, Block]:
 
 
 def numbers(values: Iterable[float]) -> str:
-    """Return numbers as MJCF wants them, to the last digit."""
+    """Return numbers as text for MJCF, with all their digits."""
     return ' '.join(repr(float(x)) for x in values)
 
 
 def lowest_contact(robot: Robot) -> float:
-    """Return the height (m, `base_link`) of the root link's lowest contact, or the ground's."""
+    """Return the height (m, `base_link`) of the root link's lowest contact; without: the ground."""
     heights = [c.position[2] for c in robot.contacts if c.link == robot.root]
     return min(heights, default=robot.ground)
 
@@ -74,7 +74,7 @@ def wheel_contacts(robot: Robot) -> tuple[Contact, ...]:
 
 
 def track_wheels(robot: Robot, *, whole: bool) -> tuple[Contact, ...]:
-    """Return `wheel_contacts`, and with `whole` tracks what bears between the ends of each side."""
+    """Return `wheel_contacts`; with `whole`, also wheels between the ends of each track."""
     ends = wheel_contacts(robot)
     between = []
     for side in sorted({c.position[1] for c in ends}) if whole else ():
@@ -96,7 +96,7 @@ def add_contacts(
     wheels: tuple[Contact, ...],
     wheel_radius: float,
 ) -> None:
-    """Add a sphere at every contact that is no wheel, and the `wheels`."""
+    """Add a sphere at every contact that is not a wheel, and the wheels (radius in m)."""
     for contact in robot.contacts:
         if contact not in wheels:
             ET.SubElement(
@@ -112,7 +112,7 @@ def add_contacts(
 
 
 def add_blocks(world: ET.Element, blocks: Iterable[Block]) -> None:
-    """Add what lies on the ground."""
+    """Add the obstacles on the ground."""
     for k, block in enumerate(blocks):
         ET.SubElement(
             world,
@@ -134,7 +134,7 @@ def add_pairs(
     friction: float,
     contact_time: float,
 ) -> None:
-    """Let wheels and contact points slip on the ground and the blocks without hopping."""
+    """Let wheels and contact points slip on ground and obstacles without bouncing."""
     contact = ET.SubElement(root, 'contact')
     for touching in dict.fromkeys((*robot.contacts, *wheels)):
         name = f'{"wheel" if touching in wheels else "contact"}:{touching.name}'
@@ -153,7 +153,7 @@ def add_pairs(
 
 
 def _add_wheel(body: ET.Element, contact: Contact, radius: float) -> None:
-    """Add a wheel that stands on `contact`; it carries next to no mass: the link has it already."""
+    """Add a wheel below `contact`; it has almost no mass, for the link's mass includes it."""
     x, y, z = contact.position
     name = f'wheel:{contact.name}'
     axle = numbers((x, y, z - CONTACT_RADIUS + radius))
@@ -167,7 +167,7 @@ def _add_wheel(body: ET.Element, contact: Contact, radius: float) -> None:
 
 
 def add_bulk(bodies: Mapping[str, ET.Element], robot: Robot) -> None:
-    """Add a hull over the root link's contacts and spheres at the joints and the payload."""
+    """Add shapes that touch the ground after a tip-over: a hull, spheres at joints and payload."""
     on_root = [c.position for c in robot.contacts if c.link == robot.root]
     decks = [j.xyz[2] for j in robot.joints if j.parent == robot.root]
     if on_root and decks:

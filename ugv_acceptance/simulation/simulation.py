@@ -2,7 +2,7 @@
 
 The ground is the plane z = 0 of the simulation; a slope is a change of gravity's direction, so the
 attitude a gravity-aligned world would see is the ground's own times the robot's on it. The ground
-tilts slowly: what its turning adds to accelerations is left out.
+tilts slowly: the accelerations that its turning causes are left out.
 """
 
 import math
@@ -45,7 +45,10 @@ _EARLY = 1e-9
 
 @dataclass(slots=True)
 class _Move:
-    """A smooth motion of a value from `start` at time `begin`, `length` seconds long."""
+    """A smooth change of a value by `change` from `start`, beginning at `begin` (s).
+
+    It takes `length` (s).
+    """
 
     start: float
     change: float = 0.0
@@ -53,7 +56,7 @@ class _Move:
     length: float = 0.0
 
     def at(self, time: float) -> tuple[float, float]:
-        """Return value and rate: a cosine ramp, whose peak rate is pi / 2 of the mean."""
+        """Return value and rate at a time: a cosine ramp, whose peak rate is pi / 2 of the mean."""
         if time >= self.begin + self.length:
             return self.start + self.change, 0.0
         phase = math.pi * max((time - self.begin) / self.length, 0.0)
@@ -67,9 +70,9 @@ def _move(start: float, target: float, speed: float, time: float) -> _Move:
 
 
 class Simulation:
-    """One robot on its ground. `advance` moves it on; the read functions tell its state.
+    """One robot on its ground: `advance` moves it on; the other functions read its state.
 
-    `payload` is in the hand from the start. Raises BadConfig where the robot cannot be simulated.
+    `payload` is in the gripper from the start. Raises BadConfig where a robot cannot be simulated.
     """
 
     def __init__(
@@ -100,7 +103,7 @@ class Simulation:
         self._settle()
 
     def _settle(self) -> None:
-        """Come to rest, so that the run starts without a drop; then time is 0."""
+        """Let the robot come to rest, so that a run starts without a drop, and set time to 0."""
         data, vehicle = self.data, self.vehicle
         data.qpos[vehicle.position] = [move.start for move in self._moves]
         self._steer(0.0)
@@ -118,7 +121,7 @@ class Simulation:
         return float(self.data.time)
 
     def apply(self, command: Command) -> None:
-        """Take a command now. Raises BadConfig where it names a joint the robot does not move."""
+        """Carry out a command now. Raises BadConfig for a joint that the robot does not move."""
         targets = dict(command.joints)
         _check_joints(self.robot, targets)
         now = self.time
@@ -139,7 +142,7 @@ class Simulation:
             self._take(command.payload, command.payload_time)
 
     def _take(self, payload: Payload, length: float) -> None:
-        """Take a load off the ground within `length` (s); what is set down goes at once."""
+        """Lift a load off the ground within `length` (s); a load set down is gone at once."""
         before = self.load
         if length <= 0.0 or payload.mass <= before:
             before, length = payload.mass, 0.0
@@ -149,11 +152,11 @@ class Simulation:
 
     @property
     def load(self) -> float:
-        """Return the mass (kg) that the hand bears now."""
+        """Return the mass (kg) that the gripper bears now."""
         return self._mass.at(self.time)[0]
 
     def advance(self, duration: float) -> None:
-        """Move on by `duration` (s), a multiple of the time step."""
+        """Simulate `duration` (s), a multiple of the time step."""
         model, data = self.vehicle.model, self.data
         count = round(duration / model.opt.timestep)
         felt = np.zeros(3)
@@ -165,7 +168,7 @@ class Simulation:
         self._felt = felt / count
 
     def _steer(self, time: float) -> None:
-        """Set the servos' targets and gravity for `time`; they last until a motion goes on."""
+        """Set the servos' targets and gravity for `time` (s); unchanged while nothing moves."""
         moves = (*self._moves, *self._slope, *self._drive, self._mass)
         over = all(m.begin + m.length <= time for m in moves)
         self._steered_until = math.inf if over else time - _EARLY
@@ -207,7 +210,7 @@ class Simulation:
     def imu(self) -> tuple[Floats, Floats, Floats]:
         """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2.
 
-        The force is the mean over the last `advance`: an IMU has no aliases of a rattle either.
+        The force is the mean over the last `advance`: a real IMU filters vibration likewise.
         """
         orientation, gyro, _ = self._sensors
         tilt, heading = self.slope()
@@ -226,7 +229,7 @@ class Simulation:
 
 
 def _parts(tilt: float, heading: float) -> tuple[float, float]:
-    """Return a slope as a tilt along x and one along y (rad): it can turn without a jump."""
+    """Return a slope as tilts along x and y (rad), in which it can change direction smoothly."""
     return tilt * math.cos(heading), tilt * math.sin(heading)
 
 

@@ -1,4 +1,4 @@
-"""Simulates a scenario part by part, so that runs can be of any length."""
+"""Simulates a scenario in consecutive parts, so that a run can be of any length."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ _UNSTABLE = tuple(
 
 @dataclass(slots=True)
 class Rows:
-    """Samples as they come, each led by its time (s); arrays when the stretch is over.
+    """Samples collected during one part, each led by its time (s), made arrays at its end.
 
     A joint sample goes on with position, rate, effort; one of the IMU with orientation, rate,
     specific force; one of the base with position, z axis, the ground's tilt and the load.
@@ -43,11 +43,11 @@ class Rows:
 def stretches(
     robot: Robot, scenario: Scenario, seed: int, length: float, build: Build = BUILD
 ) -> Iterator[Recording]:
-    """Yield the run of `scenario` in stretches of `length` (s); the same seed gives the same bits.
+    """Yield the run of `scenario` in parts of `length` (s); the same seed gives the same bits.
 
-    Payloads are those from the stretch's start on; stamps count from the run's start. Raises
-    BadConfig where the scenario and the robot do not fit, AcceptanceError where the simulation
-    becomes unstable.
+    Payloads are those from the part's start on; stamps count from the run's start. Raises BadConfig
+    where the scenario and the robot do not fit, AcceptanceError where the simulation becomes
+    unstable.
     """
     stride = stride_of(scenario, build)
     built = replace(build, blocks=scenario.blocks)
@@ -79,7 +79,7 @@ def stretches(
 
 
 def _check_stable(scenario: Scenario, simulation: Simulation) -> None:
-    """Raise AcceptanceError where MuJoCo gave up and began anew: what follows means nothing."""
+    """Raise AcceptanceError where MuJoCo became unstable and reset itself: the rest is invalid."""
     if any(simulation.data.warning[kind].number for kind in _UNSTABLE):
         raise AcceptanceError(
             f'{scenario.name}: the simulation became unstable before {simulation.time:.1f} s'
@@ -104,7 +104,7 @@ def _recording(
 
 
 def stride_of(scenario: Scenario, build: Build) -> int:
-    """Return how many IMU samples come for one of the joints. Raises BadConfig if none fits."""
+    """Return the number of IMU samples per joint sample. Raises BadConfig if it is not whole."""
     steps = 1.0 / (scenario.imu_rate * build.timestep)
     if abs(steps - round(steps)) > 1e-9 or round(steps) < 1:
         raise BadConfig(
@@ -122,14 +122,14 @@ def stride_of(scenario: Scenario, build: Build) -> int:
 
 @dataclass(slots=True)
 class Sensors:
-    """The sensors of one run: their biases are drawn once, their noise for every sample."""
+    """The sensors of one run: biases are drawn once, noise for every sample."""
 
     noise: Noise
     rng: np.random.Generator
     _bias: tuple[Floats, Floats] | None = None
 
     def joints(self, rows: Rows) -> JointLog:
-        """Return what the encoders and drives say."""
+        """Return the joint states as encoders and drives measure them."""
         stamp, position, velocity, effort = (np.array(c) for c in zip(*rows.joints, strict=True))
         noise = self.noise
         return JointLog(
@@ -140,7 +140,7 @@ class Sensors:
         )
 
     def imu(self, rows: Rows) -> ImuLog:
-        """Return what the IMU says."""
+        """Return the IMU's measurements."""
         stamp, orientation, rate, force = (np.array(c) for c in zip(*rows.imu, strict=True))
         noise = self.noise
         if self._bias is None:
@@ -154,7 +154,7 @@ class Sensors:
         )
 
     def _read(self, value: Floats, deviation: float, step: float) -> Floats:
-        """Return what a converter of resolution `step` makes of a noisy value."""
+        """Return values with noise of a standard deviation, rounded to the resolution `step`."""
         noisy = value + deviation * self.rng.standard_normal(value.shape)
         result: Floats = np.round(noisy / step) * step + 0.0  # no -0.0
         return result
@@ -176,7 +176,7 @@ class Sensors:
 
 
 def run(robot: Robot, scenario: Scenario, seed: int, build: Build = BUILD) -> Recording:
-    """Simulate `scenario` in one stretch; the same seed gives the same bits.
+    """Simulate `scenario` in one part; the same seed gives the same bits.
 
     Raises as `stretches` does.
     """

@@ -99,9 +99,9 @@ def _follow(vehicle: Vehicle, start: Floats, rate: Floats, times: Floats) -> Swe
 
 
 def _target(time: float) -> float:
-    """Return the servos' target (s) for unit speed from time 0 on, smoothly reached before.
+    """Return the servos' target (s) for unit speed from time 0 on, with a smooth run-up before.
 
-    It runs ahead of the way by what the servos' damper would otherwise hold back.
+    It runs ahead of the motion to make up for the lag that the servos' damping would cause.
     """
     phase = np.pi * min(time + LEAD, LEAD) / LEAD
     way = (phase - np.sin(phase)) * LEAD / (2.0 * np.pi) - LEAD / 2.0 + max(time, 0.0)
@@ -109,7 +109,7 @@ def _target(time: float) -> float:
 
 
 def _strong(robot: Robot) -> Vehicle:
-    """Return the vehicle on wheels with servos so stiff that they prescribe the motion."""
+    """Return the vehicle on wheels, its servos so stiff that the joints follow exactly."""
     joints = tuple(replace(joint, effort=float('inf')) for joint in robot.joints)
     vehicle = vehicle_of(replace(robot, joints=joints), FREE)
     tune(vehicle, STIFF)

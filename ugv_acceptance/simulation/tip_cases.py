@@ -1,4 +1,4 @@
-"""Compares the tip-over margin with simulated truth over random cases."""
+"""Compares the model's tip-over margin with simulated tip-overs in random cases."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ GRID = np.radians(0.1)
 
 @dataclass(frozen=True, slots=True)
 class TipCase:
-    """A posture `q` (rad, m), a payload, and a slope of `tilt` down towards `heading` (rad)."""
+    """A case: posture `q` (rad, m), payload, and a slope of `tilt` down towards `heading` (rad)."""
 
     q: tuple[float, ...]
     payload: Payload
@@ -33,7 +33,7 @@ class TipCase:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A case with the tilt (rad) at which the model and the simulation say that it tips.
+    """A case with the tilt (rad) at which the robot tips by the model and by the simulation.
 
     0: it does not stand on the level; infinite: it stands at any tilt looked at; NaN: the model
     gives no margin. `margin` (rad) is the model's margin on the slope of the case; `left` (rad)
@@ -48,7 +48,7 @@ class Judged:
 
     @property
     def error(self) -> float:
-        """Tilt of the model less that of the simulation (rad); NaN unless both tip on a slope.
+        """Tilt of the model minus that of the simulation (rad); NaN unless both tip on a slope.
 
         Where the slope runs along the edge, a small error of the margin is a large one of the tilt.
         """
@@ -59,7 +59,7 @@ class Judged:
 def random_cases(
     robot: Robot, count: int, seed: int, heaviest: float = 6.0, steepest: float = 1.2
 ) -> list[TipCase]:
-    """Return random cases: all joints in their range (a full turn at most), all headings.
+    """Return random cases: joints anywhere in their range (a full turn at most), any heading.
 
     No arm or load reaches below the ground of the level robot; flippers may: they raise it.
     """
@@ -90,7 +90,7 @@ def clear_of_ground(vehicle: Vehicle, q: Floats) -> bool:
 
 
 def judge(robot: Robot, case: TipCase) -> Judged:
-    """Return what the model and the simulation say about one case."""
+    """Return the results of the model and of the simulation for one case."""
     rest = expected_rest(robot, case)
     model, margin = model_tilt(robot, case, rest)
     truth = tip_truth(robot, case.q, case.payload, case.heading, rest)
@@ -102,13 +102,13 @@ def judge(robot: Robot, case: TipCase) -> Judged:
 
 
 def judge_all(robot: Robot, cases: Sequence[TipCase], workers: int = 2) -> list[Judged]:
-    """Return the judged `cases`, in their order, worked on by `workers` processes."""
+    """Return the results for all cases, in their order, computed by `workers` processes."""
     with Workers(workers, mp_context=get_context('spawn')) as pool:
         return list(pool.map(judge, [robot] * len(cases), cases, chunksize=8))
 
 
 def expected_rest(robot: Robot, case: TipCase) -> Floats:
-    """Return the attitude (3, 3) in which the model says that the robot stands on the level."""
+    """Return the attitude (3, 3) in which the robot stands on the level by the model."""
     load = case.payload
     posture = posture_of(mechanics_of(robot), case.q, load.mass, load.cog)
     support = support_of(robot, posture.contacts, posture.cog)  # type: ignore[arg-type]  # floats
@@ -125,14 +125,14 @@ def expected_rest(robot: Robot, case: TipCase) -> Floats:
 def least_angle(
     robot: Robot, q: ArrayLike, gravity: ArrayLike, payload: Payload | None = None
 ) -> Floats:
-    """Return the force-angle (rad) of the weakest side, shape (...), for `q` (..., j)."""
+    """Return the least force-angle (rad) over all edges, shape (...), for `q` (..., j)."""
     angles = stability(robot, q, gravity, payload).angle
     least: Floats = np.min(np.array(angles, dtype=np.float64), axis=0)
     return least
 
 
 def model_tilt(robot: Robot, case: TipCase, rest: Floats) -> tuple[float, float]:
-    """Return the tilt (rad) at which the model says that it tips, and its margin on the slope."""
+    """Return the tilt (rad) at which it tips by the model, and its margin (rad) on the slope."""
     tilts = np.append(np.arange(0.0, LAST, GRID), case.tilt)
     down = np.array([gravity_on_slope(robot.gravity, t, case.heading) for t in tilts]) @ rest
     least = least_angle(robot, np.tile(case.q, (len(tilts), 1)), down, case.payload)
@@ -149,7 +149,7 @@ def model_tilt(robot: Robot, case: TipCase, rest: Floats) -> tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """How often the model and the simulation say that a robot tips on the slope of its case.
+    """Confusion matrix: does a robot tip on the slope of its case, by model and by simulation.
 
     `far` counts the disagreements further than `band` (rad) from the boundary that the simulation
     found and from the model's own: those that no inaccuracy of the boundary explains.

@@ -29,7 +29,7 @@ WHEEL_GAIN, WHEEL_TORQUE = 20.0, 40.0
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """How a robot is put into MuJoCo.
+    """The choices in making a MuJoCo model of a robot: base, wheels, motors, contacts, obstacles.
 
     `base` is free or fixed (no ground then). `wheels` puts a wheel of `wheel_radius` (m) at every
     contact of the root link, else a small sphere stands at each contact point, as it does at the
@@ -57,7 +57,7 @@ class Build:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """A compiled model and where its parts are; joints in the order of `robot.joint_names`.
+    """A compiled MuJoCo model with the indices of its parts; joints as in `robot.joint_names`.
 
     `model` is an mujoco.MjModel. `position`, `rate` and `motor` index qpos, qvel and ctrl; `wheels`
     pairs the control index of each wheel with the wheel's y (m, `base_link`).
@@ -75,7 +75,7 @@ class Vehicle:
 
 
 def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
-    """Compile `robot` for MuJoCo, standing level on the lowest of its contacts."""
+    """Return the MuJoCo model of a robot, standing level on the lowest of its contacts."""
     model = mujoco.MjModel.from_xml_string(mjcf_of(robot, build))
     joints = [model.joint(name) for name in robot.joint_names]
     motors = [model.actuator(name).id for name in robot.joint_names] if build.motors else []
@@ -97,7 +97,7 @@ def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
 
 
 def tune(vehicle: Vehicle, frequency: float) -> None:
-    """Make the motors critically damped servos of this own frequency (rad/s)."""
+    """Make the motors critically damped servos with this natural frequency (rad/s)."""
     model = vehicle.model
     inertia = np.maximum(model.dof_M0[vehicle.rate], SERVO_INERTIA)
     model.actuator_gainprm[vehicle.motor, 0] = inertia * frequency**2
@@ -106,7 +106,7 @@ def tune(vehicle: Vehicle, frequency: float) -> None:
 
 
 def _wheels(robot: Robot, build: Build) -> tuple[Contact, ...]:
-    """Return where wheels are; only what may climb needs whole tracks."""
+    """Return the contacts that get a wheel; with obstacles, also wheels along the tracks."""
     return shape.track_wheels(robot, whole=bool(build.blocks)) if build.wheels else ()
 
 
@@ -168,7 +168,7 @@ def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
 
 
 def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> ET.Element:
-    """Add the child link of `joint`; a joint whose position is not given is built in as held."""
+    """Add the child link of `joint`; a joint that no message reports is rigid, as held."""
     moving = joint.name in robot.joint_names
     held = 0.0 if moving else dict(robot.held).get(joint.name, 0.0)
     rotation, shift = np.array(joint.rotation), np.array(joint.xyz)
@@ -243,14 +243,14 @@ def _add_sensors(root: ET.Element, robot: Robot) -> None:
 
 
 def set_brakes(vehicle: Vehicle, *, on: bool) -> None:
-    """Put the wheels' brakes on or take them off."""
+    """Apply the wheels' brakes or release them."""
     model = vehicle.model
     joints = model.actuator_trnid[[k for k, _ in vehicle.wheels], 0]
     model.dof_frictionloss[model.jnt_dofadr[joints]] = WHEEL_TORQUE if on else 0.0
 
 
 def set_payload(vehicle: Vehicle, payload: Payload) -> None:
-    """Put `payload` in the robot's hand from now on: the model's masses change at once."""
+    """Replace the payload in the gripper now: the masses of the MuJoCo model change at once."""
     model = vehicle.model
     model.body_mass[vehicle.payload] = payload.mass
     model.body_pos[vehicle.payload] = payload.cog
