@@ -109,7 +109,7 @@ class Corruption:
         return (stamp, *columns)
 
     def missing(self, time: float) -> tuple[tuple[str, ...], bool]:
-        """Return the joints missing from a message at `time` (s), and whether efforts are."""
+        """Return the joints left out of a message at `time` (s), and whether efforts are absent."""
         now = [f for f in self.faults if f.start <= time < f.end]
         joints = tuple(f.subject for f in now if f.kind == 'dead-encoder')
         return joints, any(f.kind == 'effort-missing' for f in now)

@@ -24,13 +24,13 @@ SETTLE, LEAD = 1.0, 0.5
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Joints in the order of `robot.joint_names`; axes of `base_link`: x forward, y left, z up.
+    """Motion and forces of all joints during a sweep; joints in the order of `robot.joint_names`.
 
-    `position`, `rate` and `acceleration` (n, j) of each joint: rad, rad/s, rad/s2. `force` (N) and
-    `torque` (N m), both (n, j, 3), are what the parent link exerts on the child at the joint;
-    `effort` (n, j) is the torque's part about the joint's axis (the force's along it where
-    prismatic): what the motor gives. `lean` (n,) is the angle (rad) of the base's z axis to the
-    ground's normal.
+    Axes are those of `base_link`: x forward, y left, z up. `position`, `rate` and `acceleration`
+    (n, j) of each joint: rad, rad/s, rad/s2. `force` (N) and `torque` (N m), both (n, j, 3), are
+    what the parent link exerts on the child at the joint; `effort` (n, j) is the torque's part
+    about the joint's axis (the force's along it where prismatic): what the motor gives. `lean` (n,)
+    is the angle (rad) of the base's z axis to the ground's normal.
     """
 
     position: Floats
