@@ -1,4 +1,4 @@
-"""Batches of runs as they are given to workers, in processes here or on a cluster."""
+"""Splits the runs into batches for the workers, in processes here or on a cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ Runs = list[Source]
 
 
 def batches(sources: Sequence[Source], workers: int) -> Iterator[Runs]:
-    """Yield the sources in batches, small enough for all workers to have some until the end."""
+    """Yield the sources in batches, small enough to keep all workers busy until the end."""
     most = max(1, min(_BATCH, len(sources) // (8 * workers)))
     batch: Runs = []
     size = 0
@@ -36,5 +36,5 @@ def _bytes(source: Source) -> int:
 
 
 def each(work: Work, batch: Runs) -> list[Done]:
-    """Return the outcome of every run of a batch: what a worker carries out."""
+    """Return the outcome of every run of a batch; a worker calls this."""
     return [work(source) for source in batch]

@@ -1,4 +1,4 @@
-"""Carries a campaign out: judges every run not judged before, gathers runs and failures."""
+"""Carries out a campaign: judges the runs that have no result yet, collects runs and failures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -24,9 +24,9 @@ from ugv_acceptance.campaign.work import Brief, Done, judge_source
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a campaign is worked out: processes of this machine, or a dask scheduler's address.
+    """Where a campaign is computed: processes of this machine, or a dask scheduler's address.
 
-    `wait_s` is how long a scheduler or workers that went away are waited for.
+    `wait_s` is how long to wait for a scheduler or workers that went away.
     """
 
     folder: Path
@@ -37,7 +37,7 @@ class Place:
 
 @dataclass(slots=True)
 class Effort:
-    """How many runs were judged anew, the bytes of their recordings, and CPU time (s) for all."""
+    """The cost of a campaign: runs judged anew, bytes of their recordings, CPU time (s)."""
 
     judged: int = 0
     size: int = 0
@@ -52,8 +52,8 @@ def carry_out(
 ) -> tuple[list[Row], Effort]:
     """Judge every source, keep its result in the folder, and return the runs in order.
 
-    What the folder already holds is not judged again; what was not judged is tried again.
-    `progress` takes every run as it is ready.
+    A run with a result in the folder is not judged again; a run that could not be judged is tried
+    again. `progress` is called with every run as it is ready.
     """
     store.prepare(place.folder)
     brief = replace(brief, known=store.known_keys(place.folder))
@@ -86,9 +86,9 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
 
 
 def all_failures(rows: Sequence[Row], entries: Sequence[Entry]) -> list[Failure]:
-    """Return the failures of all runs with those of a log, in the order of the runs.
+    """Return the failures of all runs with those of a failure log, in the order of the runs.
 
-    What the log says of an alert waits until its run is judged: nobody knows that alert yet.
+    A log entry about an alert of a run that is not yet judged is left out: the alert is not known.
     """
     names = {name: row.name for row in rows for name in (row.name, *row.also)}
     open_runs = {row.name for row in rows if row.verdict == NOT_JUDGED}

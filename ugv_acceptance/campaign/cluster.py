@@ -1,8 +1,9 @@
-"""Runs on a dask.distributed cluster, whose workers and scheduler may die or go away.
+"""Judges runs on a dask.distributed cluster, whose workers and scheduler may die or disconnect.
 
-Every batch is given to one worker by its address, a few ahead: so it is known what was lost with a
-worker. Of several runs that were, each is tried once more by itself, after all others: a run that
-kills its worker takes none with it. Where the scheduler goes away, a new connection is tried.
+Every batch is sent to one worker by its address, a few batches ahead: so it is known which runs
+were lost with a worker. Those are tried again one at a time, after all others, so that a run
+that kills its worker takes no other run with it. Where the scheduler goes away, a new connection
+is tried.
 """
 
 import logging
@@ -34,7 +35,7 @@ _ANY = (Exception, CancelledError)
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """A batch given to a worker, by its address; `alone` as the only one it has."""
+    """A batch sent to a worker, by its address; `alone`: as the only one that worker has."""
 
     future: Any
     worker: str
@@ -45,11 +46,11 @@ class _Given:
 def on_cluster(
     work: Work, sources: Sequence[Source], address: str, wait_s: float = WAIT_S
 ) -> Iterator[Done]:
-    """Yield the outcome of `work` for every source, done by the workers of a dask scheduler.
+    """Yield the outcome of `work` for every source, computed by the workers of a dask scheduler.
 
-    The workers need this package, and see paths as their own: shared disks, or URLs. Without a
-    scheduler or a worker for `wait_s` the rest is not judged. AcceptanceError where there is no
-    scheduler to begin with, or no dask.
+    The workers need this package, and the same paths: shared disks, or URLs. Without a scheduler or
+    a worker for `wait_s` the rest is not judged. Raises AcceptanceError where there is no scheduler
+    to begin with, or no dask.
     """
     distributed = _distributed()
     try:
@@ -68,7 +69,7 @@ def on_cluster(
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Let dask's own log be silent on what it lost: that is said here, for every run."""
+    """Silence dask's own log about lost work: each lost run is reported by us."""
     logs = [logging.getLogger(name) for name in ('distributed', 'distributed.client')]
     before = [log.level for log in logs]
     for log in logs:
@@ -86,7 +87,7 @@ def _connected(distributed: Any, address: str, patience: float) -> Any:  # noqa:
 
 @dataclass(slots=True)
 class _GivenOut:
-    """The state of a campaign on a cluster: what waits, what is given out, what came back."""
+    """The state of a campaign on a cluster: batches that wait, are sent out, and have come back."""
 
     distributed: Any
     work: Work
@@ -107,7 +108,7 @@ class _GivenOut:
     call: Any = None
 
     def judged(self) -> Iterator[Done]:
-        """Yield what came of every run, at last of those that nobody was left to judge."""
+        """Yield the outcome of every run, last those left unjudged because all workers are gone."""
         gone_since: float | None = None
         while self.unsorted or self.waiting or self.suspects or self.given:
             self.look()
@@ -127,7 +128,7 @@ class _GivenOut:
         yield from (Done(run, lost=f'{self.trouble} for {self.wait_s:g} s') for run in left)
 
     def look(self) -> None:
-        """See who works now, at most every so often; connect again where that is needed."""
+        """Update the list of workers, at most every `_LOOK_S`; connect again where needed."""
         if time.monotonic() < self.next_look:
             return
         try:
@@ -149,7 +150,7 @@ class _GivenOut:
         self.next_look = time.monotonic() + _LOOK_S
 
     def disconnect(self) -> None:
-        """Close the connection, whatever is left of it; what was given out waits again."""
+        """Close the connection even if it is broken; batches that were sent out wait again."""
         client, self.client, self.call, self.workers = self.client, None, None, {}
         for key in list(self.given):
             self.back(key, self.trouble, blamed=False)
@@ -158,7 +159,7 @@ class _GivenOut:
                 client.close(timeout=_CONNECT_S)
 
     def take_back(self) -> None:
-        """Take back what was given to workers that are gone."""
+        """Take back the batches that were sent to workers that are gone."""
         lost: dict[str, list[str]] = {}
         for key, given in self.given.items():
             if given.worker not in self.workers:
@@ -168,9 +169,9 @@ class _GivenOut:
                 self.back(key, DIED, blamed=len(keys) == 1, suspect=True)
 
     def back(self, key: str, why: str, *, blamed: bool, suspect: bool = False) -> None:
-        """Let runs that were given out wait again; end those that were lost too often.
+        """Put the runs of a batch back in the queue; give up those that were lost too often.
 
-        `blamed`, by a single run; as a `suspect` it is tried by itself.
+        `blamed`: a batch of one run counts as that run's fault; `suspect`: try each run alone.
         """
         given = self.given.pop(key)
         with suppress(*_ANY):
@@ -191,7 +192,7 @@ class _GivenOut:
             self.waiting.appendleft(left)
 
     def give(self) -> None:
-        """Give workers something ahead; a suspect to one that has nothing else, at the end."""
+        """Send waiting batches to workers, a few ahead; a suspect only to an otherwise idle one."""
         if self.unsorted and self.workers:
             self.waiting.extend(batches(self.unsorted, sum(self.workers.values())))
             self.unsorted = []
@@ -207,7 +208,7 @@ class _GivenOut:
                 self.submit(worker, [self.suspects.popleft()], alone=True)
 
     def submit(self, worker: str, runs: Runs, *, alone: bool) -> None:
-        """Give runs to a worker, with all they need: what is kept on a worker dies with it."""
+        """Send runs to a worker with all data they need: what a worker stores is lost with it."""
         try:
             future = self.client.submit(each, self.work, runs, workers=[worker], pure=False)
         except _ANY:
@@ -222,14 +223,14 @@ class _GivenOut:
         future.add_done_callback(lambda done: self.ready.put(done.key))
 
     def collected(self) -> Iterator[Done]:
-        """Yield what is ready; wait for something, but not for long."""
+        """Yield the runs that are ready, after waiting for the first for `_LOOK_S` at most."""
         with suppress(Empty):
             yield from self.outcome(self.ready.get(timeout=_LOOK_S))
             while True:
                 yield from self.outcome(self.ready.get_nowait())
 
     def outcome(self, key: str) -> list[Done]:
-        """Return what came of a batch, nothing where it is lost: then its runs wait again."""
+        """Return the outcomes of a batch; none if it was lost, and its runs then wait again."""
         given = self.given.get(key)
         if given is None:
             return []
@@ -254,12 +255,12 @@ class _GivenOut:
         return []
 
     def only(self, worker: str) -> bool:
-        """Return whether a worker has been given one batch alone."""
+        """Return whether a worker has just one batch."""
         return sum(given.worker == worker for given in self.given.values()) == 1
 
 
 def _seen_here(done: Done) -> Done:
-    """Return what came of a run; of one whose worker lacks files that are here, that."""
+    """Return a run's outcome; not judged if its worker lacks files that exist here."""
     if done.missing and all(Path(file).exists() for file in done.source.files):
         why = 'its worker does not see this path, which is here'
         return replace(done, error='', lost=f'{why}: {done.error}')

@@ -34,9 +34,10 @@ FIELDS = (*TEXTS, *CHOICES, *NUMBERS)
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of the log; `where` says file and line. Times in s since the run's start, or h.
+    """An entry of the failure log; `where` says file and line. `at_s` in s since the run's start.
 
-    `alert` is a code such as TIP_OVER: the entry tells more of that failure of the run.
+    `alert` is a code such as TIP_OVER: the entry then adds to the failure that this alert shows.
+    `repair_h` is in h.
     """
 
     where: str
@@ -51,11 +52,14 @@ class Entry:
     chargeable: bool = True
 
     def wrong(self, field: str, text: str) -> BadConfig:
-        """Return the error of a field."""
+        """Return the error to raise for a field with a wrong value."""
         return BadConfig(f'{self.where}: {field}: expected {text}')
 
     def run_of(self, runs: Mapping[str, str]) -> str:
-        """Return the one run this entry is about: its name, or the last parts of it."""
+        """Return the name of the run this entry is about, given in full or by its last parts.
+
+        Raises BadConfig where no run, or more than one, has that name.
+        """
         wanted = _parts(self.run)
         found = sorted(
             {run for name, run in runs.items() if _parts(name)[-len(wanted) :] == wanted}
@@ -71,9 +75,9 @@ def _parts(name: str) -> tuple[str, ...]:
 
 
 def read_log(path: Path) -> list[Entry]:
-    """Return the entries of a log, .csv or YAML.
+    """Return the entries of a failure log, .csv or YAML.
 
-    BadConfig with file, line and field where something is missing or wrong.
+    Raises BadConfig with file, line and field where something is missing or wrong.
     """
     try:
         if path.stat().st_size > LARGEST:

@@ -1,7 +1,7 @@
-"""The failures of a campaign: from alerts of its runs and from the failure log.
+"""The failures of a campaign: from the alerts of its runs and from the failure log.
 
-Class, impact and repairability are those of Carlson and Murphy's taxonomy. An alert shows an
-effect, so what it says of the class is a suspicion; an entry of the log replaces it.
+Class, impact and repairability are those of Carlson and Murphy's taxonomy. An alert shows only the
+effect of a failure, so the class derived from it is a suspicion; a log entry replaces it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ CRITICAL = frozenset({'ERROR', 'STALE'})
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A failure in a run: when (s since its start), what, and what taxonomy says of it.
+    """A failure in a run: when (s since its start), what, and its class in the taxonomy.
 
     `times` is how often the alert came in this run, about which `subjects`. `origin` is alert, log,
     or both. Only `chargeable` failures count.
@@ -45,20 +45,20 @@ class Failure:
 
     @property
     def path(self) -> str:
-        """Where it is in the taxonomy, such as "physical / effector"."""
+        """Its place in the taxonomy, such as "physical / effector"."""
         return FailureSource(self.source).path if self.source != UNKNOWN else UNKNOWN
 
     def json(self) -> Json:
-        """Return it for JSON."""
+        """Return the failure for JSON."""
         return {**asdict(self), 'class': self.path}
 
 
 def from_alerts(run: str, result: Json) -> list[Failure]:
-    """Return the failures that a run's critical alerts show: one a code, whatever its subjects.
+    """Return the failures shown by a run's critical alerts: one per code, whatever the subjects.
 
-    A fall passes several edges, a fault comes and goes: that is one cause until a log says more.
-    One that is still active at the end is terminal. One that went away without leaving the run
-    was repaired, or went by itself, in the field; of others nothing is known.
+    A fall passes several edges, a fault comes and goes: that is one cause unless a log says more.
+    A failure still active at the end is terminal. One that ended within the run was repaired, or
+    went by itself, in the field; of others nothing is known.
     """
     groups: dict[str, list[Json]] = {}
     for alert in result['alerts']:
@@ -87,9 +87,9 @@ def _from_group(run: str, code: str, group: Sequence[Json]) -> Failure:
 def with_log(
     failures: Sequence[Failure], entries: Sequence[Entry], runs: Mapping[str, str]
 ) -> list[Failure]:
-    """Return failures with those of a log; an entry that names an alert tells more of it.
+    """Return the failures completed by a log: an entry that names an alert adds to its failure.
 
-    `runs` gives every name of a run, those of its copies too, the name it goes by. BadConfig
+    `runs` maps every name of a run, those of its copies too, to the one in use. Raises BadConfig
     where an entry's run is not one of `runs`, or its alert did not come in that run.
     """
     merged = list(failures)
@@ -120,7 +120,7 @@ def _from_entry(run: str, entry: Entry) -> Failure:
 
 
 def _told(failure: Failure, entry: Entry) -> Failure:
-    """Return an alert's failure with what the log says of it; what it leaves out stays."""
+    """Return an alert's failure with the fields of a log entry; fields left out stay."""
     said = {
         'source': entry.source,
         'impact': entry.impact,
@@ -139,7 +139,7 @@ def _told(failure: Failure, entry: Entry) -> Failure:
 
 
 def counts(failures: Sequence[Failure]) -> Json:
-    """Return how many chargeable failures there are by class, impact and repairability."""
+    """Return the numbers of chargeable failures by class, impact and repairability."""
     counted = [f for f in failures if f.chargeable]
     keys = {
         'class': [f.path for f in counted],

@@ -18,10 +18,10 @@ def comparison(
     groups: Sequence[tuple[str, str]],
     confidence: float,
 ) -> Json | None:
-    """Return MTBFs and successes of two groups (name, pattern), with tests and their power.
+    """Return MTBF and success of two groups (name, pattern), with significance tests and power.
 
-    None without groups. AcceptanceError where a group has no run or no judged time, or a run is in
-    both.
+    None without groups. Raises AcceptanceError where a group has no run or no judged time, or a run
+    is in both.
     """
     if not groups:
         return None
@@ -40,7 +40,7 @@ def comparison(
 
 
 def _matches(row: Row, pattern: str) -> bool:
-    """Return whether a run, or a copy of it, has a name of this pattern."""
+    """Return whether the name of a run, or of a copy of it, fits a pattern."""
     return any(fnmatchcase(name, pattern) for name in (row.name, *row.also))
 
 

@@ -1,7 +1,7 @@
-"""Tells a run that could not be judged from a recording that cannot be read.
+"""Distinguishes a run that could not be judged here from a recording that cannot be read.
 
-No memory, no room, no network, no right to read: that is no fault of the run, and says nothing
-about it. A file that is not there, or holds something else, is.
+No memory, disk space, network or permission: those are faults of the machine and say nothing about
+the run. A file that is missing, or is no recording, is a fault of the run.
 """
 
 import errno
@@ -21,7 +21,7 @@ _MACHINE = frozenset(getattr(errno, name) for name in _NAMES if hasattr(errno, n
 
 
 def is_of_the_machine(error: BaseException, files: Iterable[Path]) -> bool:
-    """Return whether an error met while judging `files` is of the machine, not of these files."""
+    """Return whether an error is caused by the machine, not by the run's `files`."""
     return any(
         isinstance(cause, (MemoryError, ConnectionError, TimeoutError, PermissionError))
         or (isinstance(cause, OSError) and cause.errno in _MACHINE)
@@ -32,7 +32,7 @@ def is_of_the_machine(error: BaseException, files: Iterable[Path]) -> bool:
 
 
 def words(error: BaseException) -> str:
-    """Return what an error says in one line of at most 200 characters, or its name."""
+    """Return an error's text as one line of up to 200 characters; without text its type's name."""
     return ' '.join(str(error).split())[:200] or type(error).__name__
 
 

@@ -1,7 +1,7 @@
-"""Spreads the runs over workers: processes here, or a dask.distributed cluster.
+"""Judges runs on several workers: processes here, or a dask.distributed cluster.
 
-Results come as they are ready. A worker that dies (no memory, a crash in a library) takes only the
-run down that killed it; that run is not judged, which says nothing about it.
+Results come as they are ready. A worker that dies (no memory, a crash in a library) loses only the
+run that killed it; that run counts as not judged, which says nothing about it.
 """
 
 import multiprocessing
@@ -32,9 +32,9 @@ def judge_all(
     scheduler: str | None = None,
     wait_s: float = WAIT_S,
 ) -> Iterator[Done]:
-    """Yield what came of every run, in the order in which they are ready.
+    """Yield the outcome of every run, in the order in which they are ready.
 
-    A `scheduler` of dask or its workers, once gone, are waited for so long.
+    A dask `scheduler` or its workers, once gone, are waited for up to `wait_s`.
     """
     if scheduler is not None:
         yield from on_cluster(partial(judge_source, brief=brief), sources, scheduler, wait_s)
@@ -47,7 +47,7 @@ def judge_all(
 
 
 def in_processes(work: Work, sources: Sequence[Source], workers: int) -> Iterator[Done]:
-    """Yield the outcome of `work` for every source, done by processes."""
+    """Yield the outcome of `work` for every source, computed by processes of this machine."""
     waiting = deque(batches(sources, workers))
     suspects: Runs = []
     while waiting:
@@ -59,7 +59,7 @@ def in_processes(work: Work, sources: Sequence[Source], workers: int) -> Iterato
 
 
 def _end_with_parent() -> None:
-    """Ask this worker to end when the campaign does, even one that was killed."""
+    """Make this worker end when the campaign's process ends, even if that was killed."""
 
     def watch() -> None:
         if parent := multiprocessing.parent_process():
@@ -70,7 +70,7 @@ def _end_with_parent() -> None:
 
 
 def _round(work: Work, waiting: deque[Runs], workers: int, suspects: Runs) -> Iterator[Done]:
-    """Work until nothing waits or a process dies; then those given out are the suspects."""
+    """Work until all is done or a process dies; the runs then in work are added to `suspects`."""
     # Forked by a server that has all imported: a fork of this process, which has threads, may hang,
     # and spawned processes would each import everything anew.
     context = multiprocessing.get_context('forkserver')

@@ -1,4 +1,4 @@
-"""One line a run: verdict, hours, failures; in the order of time."""
+"""The table of a campaign: one row per run with verdict, hours and failures, ordered by time."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,11 +14,11 @@ _REASONS = 3
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A run: times in s, its start in ns. One that could not be read is BROKEN, with the reason.
+    """One run of the table: times in s, its start in ns.
 
-    One is NOT_JUDGED where that was prevented by something else than itself, with the reason.
-    `judged_s` is the time in which the margins were known: only that can count as operated without
-    a failure. `also` names other copies of the same recording.
+    A run that could not be read is BROKEN; one that something else kept from being judged is
+    NOT_JUDGED; both with the reason. `judged_s` is the time in which the margins were known: only
+    that counts as operated without a failure. `also` names other copies of the same recording.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Row:
     result: str | None = None
 
     def json(self) -> Json:
-        """Return it for JSON; the failures stand in a list of their own."""
+        """Return the row for JSON; failures are listed elsewhere."""
         return {
             'name': self.name,
             'verdict': self.verdict,
@@ -51,7 +51,7 @@ class Row:
 
 
 def row_of(name: str, key: str, result: Json) -> Row:
-    """Return the line of a run that was judged."""
+    """Return the row of a run that was judged."""
     return Row(
         name,
         result['verdict'],
@@ -67,17 +67,17 @@ def row_of(name: str, key: str, result: Json) -> Row:
 
 
 def broken_row(name: str, error: str) -> Row:
-    """Return the line of a run that could not be read."""
+    """Return the row of a run that could not be read."""
     return Row(name, BROKEN, (error,))
 
 
 def unjudged_row(name: str, why: str) -> Row:
-    """Return the line of a run that was not judged, by no fault of its own."""
+    """Return the row of a run that was not judged for a reason outside the run."""
     return Row(name, NOT_JUDGED, (why,))
 
 
 def in_order(rows: Iterable[Row]) -> list[Row]:
-    """Return runs by their start, each recording once; those without a result last, by name."""
+    """Return the rows by start time, each recording once; those without a result last, by name."""
     first: dict[str, Row] = {}
     copies: dict[str, list[str]] = {}
     for row in sorted(rows, key=lambda r: r.name):

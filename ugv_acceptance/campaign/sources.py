@@ -23,7 +23,7 @@ from ugv_acceptance.campaign.not_judged import words
 class Source:
     """One recording: its name (path or URL as found), its files, and whether fsspec fetches them.
 
-    Of a rosbag2 folder, metadata.yaml is among the files.
+    The files of a rosbag2 folder include metadata.yaml.
     """
 
     name: str
@@ -37,9 +37,9 @@ def is_url(place: str) -> bool:
 
 
 def find_sources(places: Iterable[str]) -> list[Source]:
-    """Return the recordings in folders, files and URLs, each once, by name.
+    """Return the recordings in folders, files and URLs, each once, sorted by name.
 
-    AcceptanceError where a place does not exist, cannot be listed, or holds no recording.
+    Raises AcceptanceError where a place does not exist, cannot be listed, or holds no recording.
     """
     found: set[Source] = set()
     for place in places:
@@ -54,7 +54,7 @@ def find_sources(places: Iterable[str]) -> list[Source]:
 
 
 def sorted_out(files: Sequence[str], *, remote: bool = False) -> list[Source]:
-    """Return the recordings that files make up; what is no recording is left out."""
+    """Return the recordings that files make up; files that are no recording are left out."""
     folders: dict[str, list[str]] = {}
     for file in sorted(files):
         folders.setdefault(posixpath.dirname(file), []).append(file)
@@ -90,7 +90,7 @@ def _remote_files(url: str) -> list[str]:
 
 
 def _opened(url: str) -> tuple[Any, str]:
-    """Return the file system of a URL and the path in it."""
+    """Return the fsspec file system of a URL and the path in it."""
     try:
         import fsspec  # noqa: PLC0415 - an extra
 
@@ -107,9 +107,9 @@ def _opened(url: str) -> tuple[Any, str]:
 
 @contextmanager
 def local_paths(source: Source) -> Iterator[Path | list[Path]]:
-    """Give what `open_bag` takes; remote files are copied into a folder that goes afterwards.
+    """Give the paths that `open_bag` takes; remote files are copied to a temporary folder.
 
-    BadBag where a remote file is not there; AcceptanceError where it cannot be fetched.
+    Raises BadBag where a remote file does not exist; AcceptanceError where it cannot be fetched.
     """
     if not source.remote:
         yield _openable(source, [Path(file) for file in source.files])

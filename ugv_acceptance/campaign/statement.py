@@ -1,8 +1,8 @@
 """The statement of a campaign for JSON: hours, failures, MTBF, success, trend.
 
-The same runs give the same statement whoever computed them in which order. Hours are those that
-could be judged; runs that are INCONCLUSIVE or BROKEN are counted, as no success. While a run is
-NOT_JUDGED nobody knows what it would say: nothing is stated then but what was seen so far.
+The same runs give the same statement, by whatever workers and in whatever order. Hours are those
+that could be judged; runs that are INCONCLUSIVE or BROKEN are counted, but not as a success. While
+a run is NOT_JUDGED its verdict is unknown: then nothing is stated but what was seen so far.
 """
 
 import math
@@ -44,7 +44,7 @@ _EARLIEST = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """What is asked of a campaign: a confidence, an MTBF (h) to show, and how the test ended.
+    """The options of a statement: confidence, MTBF (h) to demonstrate, how the test ended, groups.
 
     `groups` pairs the names of two groups with the patterns of their runs' names.
     """
@@ -57,7 +57,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """With what the runs were judged: names and hashes."""
+    """The configuration and criteria that the runs were judged by: names and hashes."""
 
     robot: str
     config_sha256: str
@@ -68,7 +68,7 @@ class Origin:
 def statement(
     rows: Sequence[Row], failures: Sequence[Failure], question: Question, origin: Origin
 ) -> Json:
-    """Return the campaign of `rows` (in order) and their failures, those of a log included.
+    """Return the statement on `rows` (in order) and their failures, those of a log included.
 
     While a run is NOT_JUDGED, `no_statement` says so and what would be stated is None.
     """
@@ -110,14 +110,14 @@ def statement(
 
 
 def no_statement(rows: Sequence[Row]) -> str | None:
-    """Return why nothing can be stated, None where it can."""
+    """Return why nothing can be stated, None where a statement is possible."""
     count = sum(row.verdict == NOT_JUDGED for row in rows)
     were = 'run was' if count == 1 else 'runs were'
     return f'{count} {were} not judged: no statement' if count else None
 
 
 def failure_times(rows: Sequence[Row], failures: Sequence[Failure]) -> list[float]:
-    """Return when (h of judged time of the whole campaign) each chargeable failure came, in order.
+    """Return the judged time (h, over the whole campaign) of each chargeable failure, in order.
 
     Within a run the judged time is taken to be spread evenly.
     """
@@ -133,7 +133,7 @@ def failure_times(rows: Sequence[Row], failures: Sequence[Failure]) -> list[floa
 
 
 def bounded(number: Bounded) -> Json:
-    """Return a number with bounds for JSON; what has no bound is None."""
+    """Return a number with its confidence bounds for JSON; a missing bound is None."""
     return {k: _finite(v) for k, v in asdict(number).items()}
 
 
@@ -151,7 +151,7 @@ def _runs(rows: Sequence[Row]) -> Json:
 
 
 def _endurance(rows: Sequence[Row], confidence: float) -> Json | None:
-    """Return what the longest run shows by itself, by time: often less than people think."""
+    """Return the MTBF (h) that the longest run demonstrates by itself; None without such a run."""
     row = max(rows, key=lambda r: r.judged_s, default=None)
     if row is None or row.judged_s <= 0.0:
         return None
@@ -161,7 +161,7 @@ def _endurance(rows: Sequence[Row], confidence: float) -> Json | None:
 
 
 def _availability(hours: float, failures: Sequence[Failure], confidence: float) -> Json:
-    """Return the availability of the repairs whose time is known; unknown ones are said."""
+    """Return the availability by repairs of known duration, and the number of unknown ones."""
     counted = [f for f in failures if f.chargeable]
     known = [f.repair_h for f in counted if f.repair_h is not None]
     repaired = len(known) == len(counted)
@@ -176,7 +176,7 @@ def _availability(hours: float, failures: Sequence[Failure], confidence: float) 
 
 
 def _success(rows: Sequence[Row], confidence: float) -> Json:
-    """Return the share of runs that passed, and what it would be if all the unclear ones had."""
+    """Return the share of runs that passed, and the share if all had that did not FAIL."""
     words = [row.verdict for row in rows]
     passed = words.count('PASS')
     at_best = len(words) - words.count('FAIL')
@@ -200,7 +200,7 @@ def _trend(times: Sequence[float], hours: float, confidence: float, *, by_failur
 
 
 def _requirement(question: Question, hours: float, failures: int, found: Bounded) -> Json | None:
-    """Return whether an MTBF is shown, excluded or open, and the hours that are missing."""
+    """Return whether an MTBF is demonstrated, excluded or open, and the hours still missing."""
     required, confidence = question.required, question.confidence
     if required is None:
         return None

@@ -1,4 +1,4 @@
-"""Keeps the result of each run under a hash of all it depends on, so that work is resumed."""
+"""Stores the result of each run under a hash of all it depends on, so that work can be resumed."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ _KEY = 64
 
 
 def prepare(folder: Path) -> None:
-    """Make the folder. AcceptanceError where that cannot be."""
+    """Make the folder. Raises AcceptanceError where that is not possible."""
     try:
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -21,17 +21,17 @@ def prepare(folder: Path) -> None:
 
 
 def known_keys(folder: Path) -> frozenset[str]:
-    """Return the keys of the results that are there."""
+    """Return the keys of the results in the folder."""
     return frozenset(p.stem for p in (folder / RUNS).glob('*.json') if len(p.stem) == _KEY)
 
 
 def keep(folder: Path, key: str, text: str) -> None:
-    """Write a run's result, its JSON, whole or not at all."""
+    """Write the JSON of a run's result, complete or not at all."""
     write_text(folder / RUNS / f'{key}.json', text)
 
 
 def read(folder: Path, key: str) -> Json:
-    """Return a run's result. AcceptanceError where it is not what was written."""
+    """Return a run's result. Raises AcceptanceError where it is not as it was written."""
     path = folder / RUNS / f'{key}.json'
     try:
         result = json.loads(path.read_text('utf-8'))

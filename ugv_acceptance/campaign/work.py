@@ -1,4 +1,4 @@
-"""Judges one run, in this process, another, or on a cluster."""
+"""Judges one run: in this process, in another, or on a cluster."""
 
 import hashlib
 import time
@@ -21,7 +21,7 @@ from ugv_acceptance.type_aliases import Json
 
 @dataclass(frozen=True, slots=True)
 class Brief:
-    """What every worker needs: the robot, the criteria (None: its limits), keys already known."""
+    """The data every worker needs: robot, criteria (None: the robot's limits), known keys."""
 
     config: Config
     criteria: CriteriaSet | None = None
@@ -30,7 +30,7 @@ class Brief:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A run that was looked at: its source, size (bytes), and one of four outcomes.
+    """The outcome of one run: its source, size (bytes), and one of four results.
 
     `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
     that it is unreadable (`missing`: a file of it is not there), `lost` that it was not judged for
@@ -50,7 +50,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A result, its key and the size (bytes) of its recording; None: known."""
+    """A result, its key and the size (bytes) of its recording; None: the result is known."""
 
     key: str
     size: int
@@ -58,13 +58,13 @@ class _Found:
 
 
 def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
-    """Return the name of a result: the same inputs and software give the same."""
+    """Return the key of a result: a hash of recording, configuration, criteria and software."""
     parts = (bag_sha256, config_sha256, criteria_sha256, __version__, str(RESULT_VERSION))
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 
 
 def judge_source(source: Source, brief: Brief) -> Done:
-    """Return what came of one run; whatever is wrong is said in `error` or `lost`, never raised."""
+    """Return the outcome of one run; every error is put in `error` or `lost`, none is raised."""
     began = time.process_time()
     try:
         done = _tried(source, brief)
@@ -92,7 +92,7 @@ def _tried(source: Source, brief: Brief) -> Done:
 
 
 def _failed(source: Source, paths: Path | list[Path], error: Exception) -> Done:
-    """Return a run that failed: by its own fault, or by that of the machine."""
+    """Return the outcome of a run that failed: by its own fault, or by that of the machine."""
     text = str(error) if isinstance(error, AcceptanceError) else f'{type(error).__name__}: {error}'
     text = _renamed(text, source, paths)
     files = [paths] if isinstance(paths, Path) else paths
@@ -119,7 +119,7 @@ def _judged(bag: Bag, brief: Brief) -> _Found:
 
 
 def _renamed(said: Any, source: Source, paths: Path | list[Path]) -> Any:  # noqa: ANN401 - JSON
-    """Return what is said with a fetched copy named by what it was fetched from."""
+    """Return `said` with the paths of a fetched copy replaced by the URL it came from."""
     if not source.remote:
         return said
     copied = str(paths if isinstance(paths, Path) else paths[0].parent)
