@@ -1,6 +1,7 @@
-"""The alerts a console has heard of: which are active, which nobody has seen yet.
+"""The list of alerts a console shows: those the monitor published, and those it sees itself.
 
-Who joins late misses what was said before: `also` adds what a console itself sees to be active.
+A console that starts late has missed earlier messages: `also` adds the alerts that its own
+evaluation finds active.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,12 +17,12 @@ _STATES = {state.value: state for state in State}
 
 @dataclass(slots=True)
 class AlertBook:
-    """The newest row of each alert, by code, subject and level."""
+    """The newest row of each published alert, by code, subject and level."""
 
     rows: dict[str, AlertRow] = field(default_factory=dict)
 
     def take(self, values: Mapping[str, str], message: str) -> None:
-        """Take a change as published on `~/alerts`, with the alarm's state and what it offers."""
+        """Take a change as published on `~/alerts`, with the alarm's state and allowed commands."""
         how = values.get('state', '')
         code, subject = values.get('code', ''), values.get('subject', '')
         level = LEVELS.index(values['level']) if values.get('level') in LEVELS else ERROR
@@ -50,24 +51,24 @@ class AlertBook:
         )
 
     def row(self, key: object) -> AlertRow:
-        """Return the row of a key that a client sent. Raises BadSample where there is none."""
+        """Return the row with a key sent by a client. Raises BadSample where there is none."""
         row = self.rows.get(str(key))
         if row is None:
             raise BadSample(f'key: expected that of an alert that is listed, got {key!r:.80}')
         return row
 
     def clear(self) -> None:
-        """Forget all: the monitor has none, or started anew."""
+        """Remove all rows, for a monitor that has none or was started anew."""
         self.rows.clear()
 
     def also(self, active: Iterable[AlertRow]) -> tuple[AlertRow, ...]:
-        """Return all rows, with those of `active` that the book does not have as active."""
+        """Return all rows, and those of `active` that are not in the list as active."""
         told = {key for key, row in self.rows.items() if row.end is None}
         return (*self.rows.values(), *(row for row in active if row.key not in told))
 
 
 def row_of(alert: Alert, text: str, advice: str) -> AlertRow:
-    """Return an active alert that only the console itself sees."""
+    """Return the row of an active alert that only the console itself has found."""
     rule = alert.rule
     return AlertRow(
         f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}',

@@ -1,7 +1,7 @@
-"""A snapshot as one frame of JSON for the page and the terminal, live or recorded.
+"""Converts a snapshot to one frame of JSON for page and terminal, live or recorded.
 
-Degrees at this edge, in names ending `_deg`. What is not a finite number is null: a page must say
-that it does not know. `describe_robot` is what does not change from frame to frame.
+Angles become degrees here, in names ending `_deg`. What is not a finite number is null: a page must
+say that it does not know. `describe_robot` gives what does not change from frame to frame.
 """
 
 import math
@@ -28,7 +28,7 @@ Plain = dict[str, Any]
 
 
 def describe_robot(settings: Settings) -> Plain:
-    """Return what a page must know once: names, units, limits."""
+    """Return what a page needs once: names of joints and sides, units, limits."""
     robot, limits = settings.robot, settings.limits
     return {
         'robot': robot.name,
@@ -51,7 +51,7 @@ def describe_robot(settings: Settings) -> Plain:
 
 
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
-    """Return the frame of a snapshot; `figure` is that of the settings' robot."""
+    """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
     cause, advice = _cause(snapshot, level)
     return {
@@ -78,17 +78,17 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
 
 
 def number(value: float) -> float | None:
-    """Return a number rounded to six digits behind the point; None where it is not finite."""
+    """Return a number rounded to six decimals; None where it is not finite."""
     return round(float(value), 6) if math.isfinite(value) else None
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:
-    """Return `number` of each."""
+    """Return a list of `number` of each value."""
     return [number(value) for value in values]
 
 
 def what_is_left(snapshot: Snapshot, settings: Settings) -> str:
-    """Return the smallest margins in a few words; '' where they are not known."""
+    """Return the smallest margins as a short text; '' where they are not known."""
     if not snapshot.known:
         return ''
     parts = []
@@ -117,9 +117,9 @@ def _uses(snapshot: Snapshot, settings: Settings) -> list[tuple[float, str]]:
 
 
 def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
-    """Active before over, then severe, unseen and new first; a robot that tips before a motor.
+    """Return rows by urgency: active, severe, unseen and new first; tip-over before motors.
 
-    A caution whose danger is there as well says nothing new and is left out.
+    A caution is left out while the danger of the same code and subject is active.
     """
     worse = {(row.code, row.subject) for row in rows if row.level == ERROR and row.end is None}
     rows = [row for row in rows if row.level != WARN or (row.code, row.subject) not in worse]

@@ -1,4 +1,4 @@
-"""Sends one feed to many clients: each frame is made once, slow clients skip some."""
+"""Sends one feed to many clients: each frame is made once, and slow clients skip frames."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ from ugv_acceptance.monitoring.drawing import Figure, figure_of
 
 
 def number_in(values: Mapping[str, object], name: str) -> float:
-    """Return a finite number of a command. Raises BadSample where there is none."""
+    """Return a finite number from a client's command. Raises BadSample where there is none."""
     value = values.get(name)
     # JSON's whole numbers have no end, floats have.
     most = sys.float_info.max
@@ -39,9 +39,9 @@ _AS_JSON = json.JSONEncoder(separators=(',', ':'), allow_nan=False).encode
 
 @dataclass(slots=True, eq=False)
 class Client:
-    """One page or terminal: the newest frame and map it has not taken yet, and answers to it.
+    """A connected page or terminal: its newest unsent frame and map, and answers to its commands.
 
-    `sending` is since when (s) something is on its way to it, infinite where nothing is.
+    `sending` is the time (s) since when a message is on its way to it, infinite if none is.
     """
 
     axes: tuple[str, str]
@@ -54,7 +54,7 @@ class Client:
     server: 'asyncio.Task[None] | None' = None
 
     def take(self) -> list[str]:
-        """Return what waits, and forget it: answers, then the map, then the frame."""
+        """Return the unsent messages and remove them: answers, then the map, then the frame."""
         found = [*self.answers, *(text for text in (self.map, self.frame) if text is not None)]
         self.answers.clear()
         self.frame = self.map = None
@@ -64,7 +64,7 @@ class Client:
 
 @dataclass(slots=True, eq=False)
 class Hub:
-    """Makes frames at 20 Hz while anybody looks, and does what clients ask."""
+    """Makes frames at 20 Hz while a client is connected, and carries out clients' commands."""
 
     feed: Feed
     clients: set[Client] = field(default_factory=set)
@@ -95,7 +95,7 @@ class Hub:
             await asyncio.sleep(due - clock())
 
     def _let_go(self, since: float) -> None:
-        """End the service of clients that have taken nothing since then."""
+        """Disconnect clients whose message has been on its way since before a time (s)."""
         for client in self.clients:
             if client.sending < since and client.server is not None:
                 client.server.cancel()
@@ -123,7 +123,7 @@ class Hub:
             client.ready.set()
 
     def join(self) -> Client:
-        """Return a new client, greeted. Raises BadSample where there are too many."""
+        """Return a new client with its first message. Raises BadSample where there are too many."""
         if len(self.clients) >= MOST_CLIENTS:
             raise BadSample(f'expected at most {MOST_CLIENTS} clients')
         client = Client(axes_of(self.feed.settings))
@@ -134,7 +134,7 @@ class Hub:
         return client
 
     async def serve(self, client: Client, send: Callable[[str], Awaitable[None]]) -> None:
-        """Send a client what there is until it is gone or takes nothing any more."""
+        """Send a client its messages until it disconnects or takes nothing any more."""
         client.server, clock = asyncio.current_task(), asyncio.get_running_loop().time
         while True:
             await client.ready.wait()
@@ -144,7 +144,7 @@ class Hub:
             client.sending = math.inf
 
     def ask(self, client: Client, text: str) -> None:
-        """Do what a client asks (JSON with `do`); it is answered, whatever it sent."""
+        """Carry out a client's command (JSON with `do`) and answer it, also where it is invalid."""
         number: object = None
         try:
             values = json.loads(text)
@@ -170,10 +170,10 @@ class Hub:
 
 
 def as_json(value: dict[str, Any]) -> str:
-    """Return compact JSON that every parser takes: no NaN."""
+    """Return compact JSON by the standard, so without NaN."""
     return _AS_JSON(value)
 
 
 def _small(number: object) -> int | None:
-    """Return a client's own number of its question; nothing else is sent back."""
+    """Return the number by which a client marks its command, None unless a small integer."""
     return number if isinstance(number, int) and abs(number) < 1 << 53 else None

@@ -1,7 +1,6 @@
-"""The newest message of each input, and whether the monitor is silent.
+"""Keeps the newest message of each input for the next frame, and tells whether a sender is silent.
 
-A picture needs no more than the newest message of each kind before it; the others are the monitor's
-business, which judges every one.
+A picture needs only the newest message of each kind before it; the monitor judges every one.
 """
 
 from collections import defaultdict
@@ -18,41 +17,41 @@ Pick = Callable[[Sequence[bytes]], Sequence[bytes]]
 
 @dataclass(slots=True)
 class Heartbeat:
-    """How regularly something is heard; `last` and `period` in seconds of a monotonic clock."""
+    """The regularity of a message: the time of the last and its period (s, monotonic clock)."""
 
     last: float | None = None
     period: float = 0.0
 
     def beat(self, now: float) -> None:
-        """Take one."""
+        """Record that a message came at `now` (s)."""
         if self.last is not None:
             self.period += 0.1 * (min(now - self.last, 1.0) - self.period)
         self.last = now
 
     def silent(self, now: float, least: float) -> bool:
-        """Return whether it was heard before, and not for `least` s and five of its periods."""
+        """Return whether messages came before, but none for `least` s and five of their periods."""
         return self.last is not None and now - self.last > max(least, 5.0 * self.period)
 
 
 @dataclass(slots=True)
 class Newest:
-    """The messages of one input since the last look: those that `pick` leaves are taken."""
+    """The messages of one input since the last frame, of which `pick` chooses those to evaluate."""
 
     take: Callable[[bytes], None]
     pick: Pick
     _waiting: list[bytes] = field(default_factory=list)
 
     def __call__(self, data: bytes) -> None:
-        """Keep a message until the next look."""
+        """Keep a message until the next frame."""
         self._waiting.append(data)
 
     @property
     def waiting(self) -> bool:
-        """Whether anything came since the last look."""
+        """Whether any message came since the last frame."""
         return bool(self._waiting)
 
     def hand_on(self) -> int:
-        """Hand on what is picked of what was kept; return how many were not."""
+        """Pass the chosen messages to `take`; return the number of those dropped."""
         waiting, self._waiting = self._waiting, []
         picked = self.pick(waiting) if waiting else ()
         for data in picked:
@@ -61,9 +60,9 @@ class Newest:
 
 
 def newest_of_joints() -> Pick:
-    """Pick the newest JointState of each set of names, for a driver may tell of some joints only.
+    """Return a pick of the newest JointState per set of joint names, for drivers that send parts.
 
-    What cannot be read is handed on, each of it, to be counted as that.
+    A message that cannot be read is always passed on, so that it is counted.
     """
     decode = joint_state_decoder().raw
 
@@ -83,10 +82,10 @@ def newest_of_joints() -> Pick:
 
 
 def newest_attitude(imu: ImuInput) -> Pick:
-    """Pick the newest Imu message where its orientation is given and counts, else all of them.
+    """Return a pick of the newest Imu message if its orientation is used, else of all messages.
 
-    Where the attitude comes from the smoothed acceleration, none replaces another; nor does one
-    replace what is not as long as itself, and thus no such message.
+    Where the attitude comes from the smoothed acceleration every message is needed. A message never
+    replaces one of another length, which cannot be read as an Imu message.
     """
     decode = imu_decoder().one
     counts = imu.attitude != 'accelerometer' and not imu.specific_force
@@ -108,7 +107,7 @@ def newest_attitude(imu: ImuInput) -> Pick:
 
 
 def hints_of(values: Mapping[str, str]) -> tuple[str, ...]:
-    """Return what a verdict's values tell beside the alerts, in plain words."""
+    """Return the hints in a verdict's values beside the alerts, in plain words."""
     forms = (
         ('tip_in_s', 'it tips to the {tip_of} in {tip_in_s} s at this rate'),
         ('saturation_in_s', '{saturation_of} saturates in {saturation_in_s} s at this rate'),

@@ -1,4 +1,4 @@
-"""The console as plain lines where there is no terminal: one where something changes."""
+"""The console as plain text where there is no terminal: one line whenever something changes."""
 
 import time
 from collections.abc import Callable
@@ -12,7 +12,7 @@ LISTEN, BETWEEN = 0.05, 1.0
 
 
 def line_of(frame: Plain) -> str:
-    """Return level, word, cause, advice and what is left in one line."""
+    """Return a frame as one line: level, word, cause, advice and remaining margins."""
     parts = [f'{frame["level"]:<5}  {frame["word"]}: {frame["cause"]}']
     parts += [f'DO: {frame["advice"]}'] * bool(frame['advice'])
     parts += [f'now: {frame["left"]}'] * bool(frame['left'])
@@ -20,7 +20,7 @@ def line_of(frame: Plain) -> str:
 
 
 def show_lines(feed: Feed, say: Callable[[str], None], asked: Callable[[], bool]) -> None:
-    """Tell a line where it differs from the one before, until `asked` or at a recording's end.
+    """Print a line whenever it differs from the last, until `asked` or a recording's end.
 
     Each begins with the time: of a recording the position in it, else that of the day.
     """

@@ -1,4 +1,4 @@
-"""A recording as a feed of the console: judged once, then played, paused and searched."""
+"""A recording as a feed of the console: evaluated once, then played, paused and searched."""
 
 import math
 import time
@@ -32,7 +32,7 @@ SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 @dataclass(slots=True)
 class Playhead:
-    """`position` in seconds from the beginning, at most `duration`; it stops at the end."""
+    """The position in a recording, in seconds from its start; stops at `duration`."""
 
     duration: float
     position: float = 0.0
@@ -40,24 +40,24 @@ class Playhead:
     playing: bool = True
 
     def advance(self, seconds: float) -> None:
-        """Let time pass."""
+        """Move on by `seconds` of real time, at the chosen speed."""
         if self.playing:
             self.position += self.speed * seconds
         if self.position >= self.duration:
             self.position, self.playing = self.duration, False
 
     def play(self) -> None:
-        """Go on, from the beginning where it has come to the end."""
+        """Start playing; from the start if it is at the end."""
         if self.position >= self.duration:
             self.position = 0.0
         self.playing = True
 
     def pause(self) -> None:
-        """Stay where it is."""
+        """Stop playing."""
         self.playing = False
 
     def seek(self, position: float) -> None:
-        """Go to a position (s); beyond an end is that end."""
+        """Go to a position (s), limited to the recording."""
         self.position = min(max(position, 0.0), self.duration)
 
 
@@ -68,7 +68,7 @@ INPUTS = ('joint_states', 'imu')
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShownRecording:
-    """A judged recording: `snapshot_at` any of its times. Times are log times, ns.
+    """An evaluated recording; `snapshot_at` gives any moment of it. Times are log times, ns.
 
     `payloads` are those that count, and since when; `declared` (n,) when any message of one came.
     """
@@ -82,16 +82,16 @@ class ShownRecording:
 
     @property
     def settings(self) -> Settings:
-        """What it was judged by."""
+        """The settings it was evaluated with."""
         return self.evaluation.judgement.settings
 
     @property
     def bag(self) -> Bag:
-        """Its files."""
+        """The recording's files."""
         return self.evaluation.recording.bag
 
     def snapshot_at(self, when: int) -> Snapshot:
-        """Return what was known at `when`."""
+        """Return the snapshot of what was known at `when` (ns)."""
         alerts = tuple(self._alert(k, a, when) for k, a in self._near(when))
         active = [row.level for row in alerts if row.end is None]
         k = self.track.row(when)
@@ -164,7 +164,7 @@ class ShownRecording:
         )
 
     def _payload_input(self, when: int) -> InputRow:
-        """Return how the payload's topic is, which may be silent, or not there."""
+        """Return the state of the payload's topic, which may be silent or absent."""
         came = bisect_right(self.declared, when)
         bad = self._bad('payload', when)
         return InputRow(
@@ -178,7 +178,7 @@ class ShownRecording:
         )
 
     def _bad(self, subject: str, when: int) -> list[Alert]:
-        """Return the alerts of an input that are active then."""
+        """Return the alerts about an input that are active at `when` (ns)."""
         return [
             a
             for a in self.alerts
@@ -186,7 +186,7 @@ class ShownRecording:
         ]
 
     def timeline(self) -> dict[str, Any]:
-        """Return the run at a glance: worst margins by stretches, alerts, verdict."""
+        """Return the overview of the run: worst margins of each part, alerts, verdict."""
         start = self.bag.start_ns
         return {
             'duration_s': self.bag.duration_s,
@@ -207,7 +207,7 @@ class ShownRecording:
 
 
 def shown_recording(recording: Recording, config: Config) -> ShownRecording:
-    """Return a recording that can be shown: it is evaluated, all of it read once."""
+    """Return a recording ready to be shown; it is read and evaluated once as a whole."""
     maker = TrackMaker(config.settings, recording.bag.start_ns, recording.bag.end_ns)
     found = evaluate(recording, config=config, options=Options(takers=(maker,)))
     alerts = tuple(ordered(found.judgement.evaluator.watch.log))
@@ -218,7 +218,7 @@ def shown_recording(recording: Recording, config: Config) -> ShownRecording:
 def _payloads(
     bag: Bag, topics: Topics, settings: Settings
 ) -> tuple[Times, tuple[tuple[int, Payload], ...]]:
-    """Return when payloads were declared, and those that count."""
+    """Return when payloads were declared (ns), and the valid ones with their start."""
     found, times = [(-1, settings.robot.payload)], list[int]()
     if topics.payload is None:
         return np.array(times, np.int64), tuple(found)
@@ -237,7 +237,7 @@ def _numbers(row: np.ndarray[Any, Any]) -> tuple[float, ...]:
 
 @dataclass(slots=True)
 class RecordingFeed:
-    """Plays a recording; `now` reads a clock (s) that never goes back."""
+    """Plays a recording as a feed; `now` reads a monotonic clock (s)."""
 
     recording: ShownRecording
     now: Any = time.monotonic
@@ -256,7 +256,7 @@ class RecordingFeed:
         return {'source': 'bag', 'title': title, 'timeline': self.recording.timeline()}
 
     def snapshot(self) -> Snapshot:
-        """Return the snapshot where the playhead is now."""
+        """Return the snapshot at the playhead's position."""
         now = self.now()
         self.head.advance(now - self._then)
         self._then = now
@@ -264,7 +264,7 @@ class RecordingFeed:
         return self.recording.snapshot_at(start + round(self.head.position * 1e9))
 
     def extra(self) -> dict[str, Any]:
-        """Return where the playhead is."""
+        """Return the playhead's position and speed for the frame."""
         head = self.head
         return {
             'playback': {
@@ -275,7 +275,7 @@ class RecordingFeed:
         }
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Play, pause, seek (`to_s`) or change the `speed`."""
+        """Carry out play, pause, seek (`to_s`) or `speed`; return what was done."""
         head = self.head
         if do == 'play':
             head.play()

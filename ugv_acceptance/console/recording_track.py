@@ -1,4 +1,4 @@
-"""A recording's margins thinned for pictures: a row each 50 ms, and the worst of each part."""
+"""A recording's margins reduced for display: a row each 50 ms, and the worst of each part."""
 
 import math
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ WINDOW = 3_000_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Rows in order of `time` (n,) ns; the others as in MarginRows, of the named `joints`.
+    """Rows in order of `time` (n,) ns; other columns as in MarginRows, for the named `joints`.
 
     `heard` (n, 2) is when a row's newest joint state and IMU message came (ns; -1: none yet), and
     `taken` (n, 2) how many had come by then.
@@ -40,13 +40,13 @@ class Track:
     taken: Times
 
     def row(self, when: int) -> int:
-        """Return the newest row at `when` (ns); -1 before the first."""
+        """Return the index of the newest row at `when` (ns); -1 before the first."""
         return int(np.searchsorted(self.time, when, side='right')) - 1
 
     def worst_of(self, rule: Rule, start: int, when: int, peak: float) -> float:
-        """Return the worst value of an alert from its start to `when` (ns), at most its `peak`.
+        """Return an alert's worst value from its start to `when` (ns), at most its `peak`.
 
-        Of what is not in the track, the peak itself.
+        For values that are not in the track, the peak.
         """
         rows = slice(max(self.row(start), 0), self.row(when) + 1)
         if rule.code == 'TIP_OVER':
@@ -60,7 +60,7 @@ class Track:
 
 
 def rate_at(when: int, heard: Times, taken: Times, since: int = 0) -> float:
-    """Return an input's rate (Hz) at `when` (ns): between its messages of the WINDOW before.
+    """Return an input's message rate (Hz) at `when` (ns), over the WINDOW before.
 
     `heard` (n,) is when messages came (ns, in order; negative: none yet), `taken` (n,) how many had
     come by then. At least the last two messages count, but none before `since` (ns), when a gap
@@ -79,7 +79,7 @@ def rate_at(when: int, heard: Times, taken: Times, since: int = 0) -> float:
 
 @dataclass(slots=True)
 class TrackMaker:
-    """Takes stretches of margins, as a sink of `judge`, of a recording from `start` to `end` (ns).
+    """Collects the margins of a recording from `start` to `end` (ns), as a sink of `judge`.
 
     `tilt` (rad) is the least tilt left and `use` the largest share of a torque limit in each of
     STRETCHES equal parts of the recording; infinite and 0 where nothing is known.
@@ -94,7 +94,7 @@ class TrackMaker:
     _taken: Times = field(default_factory=lambda: np.zeros(2, np.int64))
 
     def __call__(self, rows: MarginRows) -> None:
-        """Take the next stretch."""
+        """Take the margins of the next part."""
         if not len(rows.time):
             return
         self._see_worst(rows)
@@ -110,7 +110,7 @@ class TrackMaker:
         self._parts.append(tuple(np.asarray(c)[last].copy() for c in (*columns, *more)))
 
     def track(self) -> Track:
-        """Return what was gathered."""
+        """Return the track of all margins taken so far."""
         names = self.settings.robot.joint_names
         joints = len(names)
         if not self._parts:

@@ -1,4 +1,4 @@
-"""The map of two joints: where the arm may go, all else as it is now."""
+"""The safe map of two joints: where the arm may go, with everything else as it is now."""
 
 import math
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _STEP = 0.01
 
 @dataclass(frozen=True, slots=True)
 class MapKey:
-    """What a map depends on, rounded so that noise makes no new one."""
+    """All that a map depends on, rounded so that noise does not cause a new map."""
 
     axes: tuple[str, str]
     numbers: tuple[float, ...]
@@ -55,7 +55,7 @@ def axes_of(settings: Settings, wanted: tuple[str, str] | None = None) -> tuple[
 
 
 def key_of(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> MapKey | None:
-    """Return what the map of a snapshot depends on; None where that is not known."""
+    """Return the key of a snapshot's map; None where posture or attitude is not known."""
     others = [
         q
         for name, q in zip(settings.robot.joint_names, snapshot.q, strict=False)
@@ -88,7 +88,7 @@ def safe_map(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> P
 def probe(
     snapshot: Snapshot, settings: Settings, axes: tuple[str, str], at: tuple[float, float]
 ) -> Plain:
-    """Return what would be if the two joints stood `at` (rad; m): margins of that posture.
+    """Return the margins of a posture in which the two joints stand `at` (rad; m), as JSON.
 
     Raises BadSample where the rest of the posture is not known or `at` is not two numbers.
     """

@@ -1,7 +1,7 @@
-"""Who may talk to the console: checks of address, Host, Origin and token, and the page's rights.
+"""Access checks of the console: address, Host, Origin and token, and the page's permissions.
 
-A page of any web site can reach a server on this machine; so names in Host are checked against
-rebinding, Origin against foreign pages, and whatever is no browser must bring the token.
+Any web page in a browser can send requests to a server on this machine. So the Host name is checked
+against DNS rebinding, Origin against foreign pages, and clients that are no browser need the token.
 """
 
 import hmac
@@ -35,7 +35,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 
 def check_address(host: str, token: str | None) -> None:
-    """Raise BadConfig where `host` is open to others and there is no token worth the name."""
+    """Raise BadConfig for a `host` open to other machines without a token, or a short token."""
     if token is not None and len(token) < SHORTEST_TOKEN:
         raise BadConfig(f'--token: expected at least {SHORTEST_TOKEN} characters, got {len(token)}')
     if token is None and not is_loopback(host):
@@ -45,7 +45,7 @@ def check_address(host: str, token: str | None) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine only."""
+    """Return whether a host address is only reachable from this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -54,7 +54,7 @@ def is_loopback(host: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """The checks of one server that was bound to `host`."""
+    """The access checks of one server that is bound to `host`."""
 
     host: str
     token: str | None
@@ -62,7 +62,7 @@ class Guard:
     def refusal(
         self, method: str, headers: Mapping[bytes, bytes], query: bytes
     ) -> HTTPStatus | None:
-        """Return why a request is refused, None where it may pass.
+        """Return the HTTP status with which a request is refused, None if it is allowed.
 
         400: a Host that is not ours. 403, for methods other than GET and HEAD: an Origin that is
         not ours, a wrong token, or neither Origin nor token.
@@ -106,7 +106,7 @@ def _token(headers: Mapping[bytes, bytes], query: bytes) -> bytes:
 
 
 def guarded(app: App, guard: Guard) -> App:
-    """Return the application behind the checks; every answer carries HEADERS."""
+    """Return the application behind the access checks; every answer carries HEADERS."""
 
     async def checked(scope: Scope, receive: Receive, send: Send) -> None:
         if scope['type'] not in {'http', 'websocket'}:

@@ -29,7 +29,7 @@ MOST_SILENT, _SILENCE = 64, 15.0
 
 
 def application(hub: Hub, guard: Guard) -> App:
-    """Return the console as an ASGI application behind its checks."""
+    """Return the console as an ASGI application behind its access checks."""
 
     async def page(_: object) -> FileResponse:
         return FileResponse(STATIC / 'index.html')
@@ -73,7 +73,7 @@ async def _converse(hub: Hub, websocket: WebSocket) -> None:
 
 
 async def _listen(hub: Hub, client: Client, websocket: WebSocket) -> None:
-    """Do what a client asks until it goes, or sends what is no text."""
+    """Carry out a client's commands until it disconnects or sends something other than text."""
     while isinstance(text := (await websocket.receive()).get('text'), str):
         hub.ask(client, text)
 
@@ -86,11 +86,10 @@ def serve(
     ready: Callable[[str], None] = lambda _: None,
     asked: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Serve until SIGINT or SIGTERM, or `asked` to end.
+    """Serve the console until SIGINT, SIGTERM or `asked`.
 
-    `ready` takes the page's address once the port is open.
-
-    Port 0 takes a free one. BadConfig where the address cannot be had, or must not be had.
+    `ready` takes the page's address once the port is open. Port 0 takes a free one. Raises
+    BadConfig where the address is in use, is not this machine's, or may not be used.
     """
     check_address(host, token)
     family = socket.AF_INET6 if ':' in host else socket.AF_INET
@@ -119,7 +118,7 @@ def serve(
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, which lets go of who asks for nothing, and keeps little for who is slow."""
+    """uvicorn's server, which also closes idle connections and limits the buffers of slow ones."""
 
     def __init__(self, config: uvicorn.Config, asked: Callable[[], bool]) -> None:
         super().__init__(config)
@@ -127,7 +126,7 @@ class _Server(uvicorn.Server):
         self._since: dict[Any, float] = {}
 
     async def on_tick(self, counter: int) -> bool:
-        """Look at all connections, ten times a second."""
+        """Check all connections, ten times a second; return whether to end."""
         now, there = time.monotonic(), list(self.server_state.connections)
         # A WebSocket has no cycle of request and answer.
         silent = [c for c in there if getattr(c, 'cycle', c) is None]

@@ -1,4 +1,4 @@
-"""What a console knows of one moment, and what every source of snapshots offers."""
+"""The console's view of one moment, and the interface of live robot and recording."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ NO_PAYLOAD = 'optional; none was declared'
 
 @dataclass(frozen=True, slots=True)
 class AlertRow:
-    """One alert as it stands: `state` in words, times in ns, `offers` what one may do with it.
+    """One alert as shown: `state` in words, times in ns, `offers` the commands allowed on it.
 
     `key` is the same for the same alert in all snapshots. `unseen`: nobody acknowledged it.
     """
@@ -39,7 +39,7 @@ class AlertRow:
 
 @dataclass(frozen=True, slots=True)
 class InputRow:
-    """How an input is: `rate` Hz (NaN: unknown), `age` s (NaN: none came), publishers, faults."""
+    """The state of an input: `rate` in Hz and `age` in s (NaN: unknown), publishers, faults."""
 
     name: str
     topic: str
@@ -52,7 +52,7 @@ class InputRow:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """One moment at `time` (ns). SI and radians; joints in the order of `robot.joint_names`.
+    """All that is known at one `time` (ns). SI and radians; joints as in `robot.joint_names`.
 
     `level` is that of the verdict. Where the margins are not `known`, `problem` may say why and the
     numbers are NaN. `torque` (N m; N), `angle` (rad) the tilt left to each of SIDES, `state` a
@@ -78,18 +78,21 @@ class Snapshot:
 
 
 class Feed(Protocol):
-    """A live robot or a recording; its methods are called from one thread, 20 times a second."""
+    """A source of snapshots: a live robot or a recording.
+
+    Its methods are called from one thread, 20 times a second.
+    """
 
     settings: Settings
 
     def describe(self) -> dict[str, Any]:
-        """Return what a page must know once beside the robot: `source` and its `title`."""
+        """Return what a page needs once beside the robot: `source` and its `title`."""
 
     def snapshot(self) -> Snapshot:
         """Return the newest snapshot; never waits."""
 
     def extra(self) -> dict[str, Any]:
-        """Return what this source adds to each frame, such as where a recording is played."""
+        """Return what this source adds to each frame, such as the position in a recording."""
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Do what an operator asks; return what was done. Raises BadSample where it cannot be."""
+        """Carry out an operator's command; return what was done. Raises BadSample if refused."""

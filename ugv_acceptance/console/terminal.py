@@ -31,7 +31,7 @@ _BAR = 20
 
 
 class Terminal(App[None]):
-    """Shows a feed until it is left or `asked` to end; `frame` is what is shown now."""
+    """Shows a feed until the user leaves or `asked` to end; `frame` is the one shown now."""
 
     CSS = """
     #verdict { height: auto; min-height: 4; padding: 0 1; }
@@ -58,7 +58,7 @@ class Terminal(App[None]):
         self._live = bool(feed.describe()['source'] == 'live')
 
     def compose(self) -> ComposeResult:
-        """Make the parts."""
+        """Yield the widgets of the screen."""
         yield Static(id='verdict')
         with VerticalScroll():
             yield Static(id='alerts')
@@ -67,7 +67,7 @@ class Terminal(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
-        """Draw now, and again each PERIOD."""
+        """Draw now, and again every PERIOD (s)."""
         self.title = str(self.feed.describe()['title'])
         self._draw()
         self.set_interval(LISTEN, self._listen)
@@ -78,7 +78,7 @@ class Terminal(App[None]):
         action: str,
         parameters: tuple[object, ...],  # noqa: ARG002 - Textual's signature
     ) -> bool:
-        """Offer only what this feed can do."""
+        """Return whether the current feed supports an action."""
         if action == 'ask':
             return self._live
         if action in {'play', 'jump'}:
@@ -86,7 +86,7 @@ class Terminal(App[None]):
         return True
 
     def action_ask(self, do: str) -> None:
-        """Ask the monitor."""
+        """Send a command about alerts to the monitor."""
         self._command(do, {})
 
     def action_play(self) -> None:
@@ -94,7 +94,7 @@ class Terminal(App[None]):
         self._command('pause' if self.frame['playback']['playing'] else 'play', {})
 
     def action_jump(self, seconds: int) -> None:
-        """Go some seconds on or back in a recording."""
+        """Go some seconds forward or back in a recording."""
         self._command('seek', {'to_s': self.frame['playback']['position_s'] + seconds})
 
     def _command(self, do: str, values: dict[str, Any]) -> None:
@@ -120,7 +120,7 @@ class Terminal(App[None]):
 
 
 def verdict_of(frame: Plain, said: str = '') -> Text:
-    """Return the verdict: word, sign, cause, advice, what is left."""
+    """Return the verdict as text: word, sign, cause, advice, remaining margins."""
     style, sign = LOOKS[frame['level']]
     text = Text()
     text.append(f' {sign} {frame["word"]} {sign} ', style)
@@ -134,7 +134,7 @@ def verdict_of(frame: Plain, said: str = '') -> Text:
 
 
 def where_of(frame: Plain) -> str:
-    """Return where a recording is played; '' for a live robot."""
+    """Return the position in a recording as text; '' for a live robot."""
     head = frame.get('playback')
     if head is None:
         return ''
@@ -142,7 +142,7 @@ def where_of(frame: Plain) -> str:
 
 
 def alerts_of(frame: Plain) -> Table:
-    """Return the alerts as a table: word, what, what to do, state."""
+    """Return the alerts as a table: level, text, advice, state."""
     table = Table('Alert', 'What', 'What to do', 'State', box=None, expand=True, padding=(0, 1))
     for row in frame['alerts']:
         word = Text(str(row['word']), LOOKS[row['level']][0])
@@ -155,7 +155,7 @@ def alerts_of(frame: Plain) -> Table:
 
 
 def margins_of(frame: Plain) -> Table:
-    """Return torques and tilt left; none of them where the margins are not known."""
+    """Return torques and tilt left as a table; empty where the margins are not known."""
     table = Table('Margin', 'Now', 'Limit', '', box=None, padding=(0, 1))
     if frame['level'] == LEVELS[STALE]:
         table.add_row(*(['NO DATA'] * 3))
