@@ -60,7 +60,7 @@ CLOSING = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An SVG and what it shows."""
+    """An SVG with its caption."""
 
     svg: str
     caption: str
@@ -69,7 +69,7 @@ class Picture:
 def acceptance_page(
     result: Json, strips: Strips, settings: Settings, parts: Mapping[str, str]
 ) -> str:
-    """Return the report's HTML. `parts` names what an identity can say: key -> words."""
+    """Return the report's HTML. `parts` maps keys of an identity to their labels."""
     environment = Environment(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
@@ -127,7 +127,7 @@ def _events(result: Json, strips: Strips, settings: Settings) -> list[Picture]:
 
 
 def _spans(result: Json) -> list[tuple[str, float, float]]:
-    """Return what to show closely: alerts that are not mere warnings, joined where they overlap."""
+    """Return the times (s) to show in detail: alerts above WARN, joined where they overlap."""
     duration = result['coverage']['duration_s']
     spans: list[tuple[str, float, float]] = []
     for alert in result['alerts']:

@@ -1,4 +1,4 @@
-"""The report of a campaign: its statement as one self-contained HTML page with its trend."""
+"""The report of a campaign: its statement as one self-contained HTML page with a trend chart."""
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -16,7 +16,7 @@ MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?', 'BROKEN': '!', 'NOT_
 
 
 def campaign_page(said: Json) -> str:
-    """Return the report's HTML."""
+    """Return the HTML of the report on a campaign's statement."""
     environment = Environment(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
@@ -37,7 +37,7 @@ def campaign_page(said: Json) -> str:
 
 
 def closing(said: Json) -> str:
-    """Return the sentence the report ends on."""
+    """Return the last sentence of the report: what the campaign shows."""
     if said['no_statement'] is not None:
         return f'{said["no_statement"]}. The same command again judges what is missing.'
     found = said['requirement']
@@ -52,7 +52,7 @@ def closing(said: Json) -> str:
 
 
 def trend_figure(said: Json) -> Figure | None:
-    """Return failures over judged hours: the count, a constant rate, the power law; None: none."""
+    """Return failures over judged hours: count, constant rate, power law; None without failures."""
     if said['trend'] is None:
         return None
     times, hours = said['trend']['failure_times_h'], said['hours']['counted']

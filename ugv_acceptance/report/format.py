@@ -1,4 +1,4 @@
-"""Numbers of a result as text: what is not known is a dash, never a zero."""
+"""Formats the numbers of a result as text; an unknown number is a dash, never a zero."""
 
 from ugv_acceptance.evaluation.criteria.quantities import DATA
 from ugv_acceptance.type_aliases import Json
@@ -11,7 +11,7 @@ LONG = 1e6
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
-    """Return a number with its unit; a dash where there is none, three digits of a long one."""
+    """Return a number with its unit, a long one with three digits; a dash where it is unknown."""
     if value is None:
         return DASH
     if abs(value) >= LONG:
@@ -21,7 +21,7 @@ def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
 
 
 def time_text(seconds: float | None, digits: int = 3) -> str:
-    """Return a time as people say it: 45 s, 3.2 min, 6.35 h; a dash where there is none."""
+    """Return a time in a suitable unit: 45 s, 3.2 min, 6.35 h; a dash where it is unknown."""
     if seconds is None:
         return DASH
     units = ((3600.0, 'h'), (60.0, 'min'))
@@ -33,7 +33,7 @@ def time_text(seconds: float | None, digits: int = 3) -> str:
 
 
 def hours_text(hours: float | None) -> str:
-    """Return a number of hours as people say it."""
+    """Return a number of hours in a suitable unit, as `time_text` does."""
     if hours is None:
         return DASH
     # What is still to run of some hundred hours is planned by the hour.
@@ -41,7 +41,7 @@ def hours_text(hours: float | None) -> str:
 
 
 def seconds_text(value: float | None) -> str:
-    """Return seconds since the start of the recording."""
+    """Return seconds since the start of the recording as text."""
     return 'the end' if value is None else f'{value:.2f} s'
 
 
@@ -62,7 +62,7 @@ def _data_text(value: float | None, measured: Json) -> str:
 
 
 def worst_text(measured: Json) -> str:
-    """Return what a criterion measured: the worst value, or the numbers of its kind."""
+    """Return a criterion's measured value as text: the worst value, or its kind's own numbers."""
     if 'signal' in measured:
         return _in_unit(measured['worst'], measured)
     if 'values' in measured:
@@ -77,7 +77,7 @@ def worst_text(measured: Json) -> str:
 
 
 def limit_text(measured: Json) -> str:
-    """Return the limit of a value; a dash for other criteria, whose demand is a sentence."""
+    """Return a criterion's limit as text; a dash where the criterion is not a limit of a value."""
     if 'least' in measured or 'most' in measured:
         pairs = (('at least', measured['least']), ('at most', measured['most']))
         return ', '.join(
@@ -89,20 +89,20 @@ def limit_text(measured: Json) -> str:
 
 
 def bound_text(measured: Json) -> str:
-    """Return the uncertainty of a worst value; a dash where none is known."""
+    """Return the uncertainty of a worst value as text; a dash where it is unknown."""
     bound = measured.get('uncertainty')
     return DASH if not bound else _in_unit(bound['bound'], {**measured, 'digits': 2})
 
 
 def missing_text(source: Json, duration: float) -> str:
-    """Return which share of an input's messages is missing by its rate; empty: hardly any."""
+    """Return the share of an input's messages that are missing by its rate; empty: hardly any."""
     expected = (source['rate_hz'] or 0.0) * duration
     share = 1.0 - source['messages'] / expected if expected else 0.0
     return f'{share:.0%} missing' if share > MISSING else ''
 
 
 def doubts_of(result: Json) -> list[str]:
-    """Return what speaks against the margins or their limits, a sentence each."""
+    """Return the reasons to doubt the margins or their limits, one sentence each."""
     doubts, wider = [], result.get('limits_relaxed')
     if wider:
         doubts = [f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}']
@@ -117,7 +117,7 @@ def doubts_of(result: Json) -> list[str]:
 
 
 def interval_text(found: Json | None, unit: str = '') -> str:
-    """Return a fitted number with its 95 % interval."""
+    """Return a fitted number with its 95 % confidence interval."""
     if found is None:
         return DASH
     half = (found['high'] - found['low']) / 2.0
@@ -125,5 +125,5 @@ def interval_text(found: Json | None, unit: str = '') -> str:
 
 
 def _short(value: float) -> str:
-    """Return a number of two places after the point, or three digits of a large one."""
+    """Return a number with two decimals, a large one with three digits."""
     return number_text(value, 2) if abs(value) < 100.0 else f'{value:.3g}'

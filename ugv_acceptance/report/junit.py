@@ -1,4 +1,4 @@
-"""Results as JUnit XML: a suite a recording, a case a criterion; colcon test-result reads it."""
+"""Results as JUnit XML for `colcon test-result`: a suite per recording, a case per criterion."""
 
 import re
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ _FORBIDDEN = re.compile('[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 
 def junit_of(results: Sequence[Json]) -> bytes:
-    """Return the XML. FAIL is a failure, INCONCLUSIVE and an unreadable recording an error."""
+    """Return the XML: FAIL is a failure; INCONCLUSIVE or an unreadable recording an error."""
     document: Any = JUnitXml('ugv_acceptance')  # half of junitparser is annotated
     for result in results:
         document.add_testsuite(_suite(result))

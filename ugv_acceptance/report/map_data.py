@@ -1,4 +1,4 @@
-"""The four maps over two joints as numbers: what is mapped, its unit, and where it turns."""
+"""The four maps over two joints as numbers: value, unit, levels and cause in each cell."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from ugv_acceptance.type_aliases import Floats
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a map assumes; `gravity` (m/s2) and `direction` of the pull in `base_link`."""
+    """The assumptions of a map; `gravity` (m/s2) and `direction` of the pull in `base_link`."""
 
     robot: Robot
     grid: Grid
@@ -31,7 +31,7 @@ class Scene:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapData:
-    """A map's `value` (n, m) in `unit`; `margin` is the same with larger the better.
+    """A map: `value` (n, m) in `unit`; `margin` is the same turned so that larger is better.
 
     `levels` are in the margin's terms; `sign` turns a margin into a value. `cause` (n, m) is a
     number in `causes`: the tip edge's side, or what ends a pull.
@@ -48,7 +48,7 @@ class MapData:
 
     @property
     def margin(self) -> Floats:
-        """The value, turned so that larger is better."""
+        """The value with its sign turned where needed so that larger is better."""
         return self.sign * self.value
 
 
@@ -123,7 +123,7 @@ KINDS: dict[str, Callable[[Scene], MapData]] = {
 
 
 def map_of(kind: str, scene: Scene) -> MapData:
-    """Return the map of a kind in KINDS. Raises BadConfig where the robot lacks what it needs."""
+    """Return the map of one of KINDS. Raises BadConfig where the robot lacks what it needs."""
     if kind not in KINDS:
         raise BadConfig(f'map: expected {", ".join(KINDS)}, got {kind}')
     if kind != 'torque' and not scene.robot.contacts:

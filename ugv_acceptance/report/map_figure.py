@@ -1,4 +1,4 @@
-"""A map as a picture or as a file of numbers."""
+"""Writes a map as a picture or as a CSV file."""
 
 import csv
 import io
@@ -34,12 +34,12 @@ def _turns(robot: Robot, joint: int) -> bool:
 
 
 def shown(robot: Robot, joint: int, values: Floats) -> Floats:
-    """Return positions as they are shown: degrees, m where prismatic."""
+    """Return positions in the units shown to people: degrees, m where prismatic."""
     return np.degrees(values) if _turns(robot, joint) else values
 
 
 def assumptions(scene: Scene, kind: str) -> str:
-    """Return what a map of that kind assumes, in words: attitude, payload, joints, limits."""
+    """Return the assumptions of a map as text: attitude, payload, joints, limits."""
     gx, gy, gz = scene.gravity
     roll, pitch = math.atan2(-gy, -gz), math.atan2(gx, math.hypot(gy, gz))
     ground = 'level ground'
@@ -113,7 +113,7 @@ def _label(data: MapData) -> Callable[[float], str]:
 
 
 def _draw_track(axes: Axes, scene: Scene, track: Floats) -> None:
-    """Draw where a run went, from a circle to a square; whole turns are taken off."""
+    """Draw the path of a run on the map, from a circle to a square, modulo full turns."""
     points = []
     for joint, axis, values in zip(
         (scene.grid.first, scene.grid.second), (scene.grid.x, scene.grid.y), track.T, strict=True
@@ -145,7 +145,7 @@ def _axis(axes: Axes, scene: Scene) -> None:
 def write_map(
     file: BinaryIO, ending: str, scene: Scene, data: MapData, track: Floats | None = None
 ) -> None:
-    """Write the map as one of ENDINGS says."""
+    """Write the map in the format of an ending, one of ENDINGS."""
     _WRITERS[ending](file, scene, data, track)
 
 
@@ -158,7 +158,7 @@ def _write_png(file: BinaryIO, scene: Scene, data: MapData, track: Floats | None
 
 
 def _write_csv(binary: BinaryIO, scene: Scene, data: MapData, _: Floats | None) -> None:
-    """Write one line a cell: positions (rad, m), value, class, cause."""
+    """Write one line per cell: positions (rad, m), value, class, cause."""
     robot, grid = scene.robot, scene.grid
     kind = classes(data.margin, data.levels.caution, data.levels.failure)
     names = [robot.joint_names[grid.first], robot.joint_names[grid.second]]

@@ -34,7 +34,7 @@ STYLE: Any = {
 
 
 def figure(width: float, height: float) -> Figure:
-    """Return an empty figure (inches) drawn without a display."""
+    """Return an empty figure (width and height in inches) that needs no display."""
     with mpl.rc_context(STYLE):
         made = Figure(figsize=(width, height), layout='constrained')
         FigureCanvasAgg(made)
@@ -49,7 +49,7 @@ def draw_regions(
     levels: Levels,
     label: Callable[[float], str] | None = None,
 ) -> None:
-    """Fill the map of a `margin` (n, m) over x (n,) and y (m,), and draw where it turns.
+    """Fill the areas of a `margin` (n, m) over x (n,), y (m,) by level, and draw their borders.
 
     `label` writes a level on its line; without it the lines stay bare.
     """
@@ -73,7 +73,7 @@ def legend(
     more: Sequence[Artist] = (),
     **options: Any,  # noqa: ANN401 - matplotlib's own
 ) -> None:
-    """Add the key of the three areas, and of `more`, to a figure or to axes."""
+    """Add a legend of the three areas, and of `more`, to a figure or to axes."""
     patches = [
         Patch(facecolor=colour, hatch=hatch, edgecolor='#666666', label=word)
         for colour, hatch, word in zip(COLOURS, HATCHES, words, strict=True)

@@ -24,14 +24,14 @@ MOST_POINTS = 1500
 
 
 def judged_joints(settings: Settings) -> list[int]:
-    """Return the numbers of the joints with a torque limit."""
+    """Return the indices of the joints with a torque limit."""
     return [j for j, limit in enumerate(settings.limits.torque) if math.isfinite(limit)]
 
 
 def run_chart(
     strips: Strips, result: Json, settings: Settings, window: tuple[float, float] | None = None
 ) -> Figure | None:
-    """Return the margins of a run, or of a window (s), over time; None where nothing was known."""
+    """Return a chart of a run's margins over time, or in a window (s); None if none are known."""
     start, end = window or (0.0, result['coverage']['duration_s'])
     rows = (strips.time >= start - 0.1) & (strips.time <= end + 0.1)
     if not rows.any():
@@ -58,7 +58,7 @@ def _end(alert: Json, otherwise: float) -> float:
 
 
 def _thinned(count: int) -> NDArray[np.intp]:
-    """Return the first column of each stretch to draw as one point."""
+    """Return the first column of each group of columns that is drawn as one point."""
     return np.arange(0, count, max(1, math.ceil(count / MOST_POINTS)))
 
 
@@ -96,7 +96,7 @@ def _limit(axes: Axes, at: float, word: str) -> None:
 
 
 def _shade_unknown(axes: Axes, result: Json, end: float) -> None:
-    """Hatch the gaps of an input: nothing was known there."""
+    """Hatch the gaps of an input, in which no margins were known."""
     for key in ('joint_states', 'imu'):
         for first, last in result['inputs'][key]['first_gaps_s']:
             if first <= end:
@@ -130,7 +130,7 @@ def _draw_alerts(axes: Axes, alerts: list[Json], kinds: list[tuple[str, str]], e
 
 
 def plain(name: str) -> str:
-    """Return a name that matplotlib does not take for mathematics, short enough for a label."""
+    """Return a name short enough for a label, with matplotlib's math sign `$` escaped."""
     return name.replace('$', r'\$')[:40]
 
 
@@ -138,11 +138,10 @@ CELLS = 121
 
 
 def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None:
-    """Return the map of the two judged joints that moved most, with the run's track on it.
+    """Return the map of the two judged joints that moved most, with the run's path on it.
 
-    All else - the other joints, attitude, payload - is as when the tilt left first broke its limit,
-    else as when it was least. None where
-    the robot has no two such joints or the run no known posture.
+    The other joints, attitude and payload are as when the tilt left first passed its limit, else
+    as when it was least. None where the robot has no two such joints or the run no known posture.
     """
     pair = _moving_pair(strips, settings)
     moment = _telling_moment(result)
@@ -194,7 +193,7 @@ def _moving_pair(strips: Strips, settings: Settings) -> list[int] | None:
 
 
 def _telling_moment(result: Json) -> Json | None:
-    """Return when the tilt left first broke its limit, else when it was least."""
+    """Return the margins when the tilt left first passed its limit, else when it was least."""
     for outcome in result['criteria']['results']:
         measured = outcome['measured']
         if measured.get('signal') == 'tip_angle' and measured['moment'] is not None:

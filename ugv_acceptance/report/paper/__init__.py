@@ -1,1 +1,1 @@
-"""The page that computes the paper again."""
+"""The page that recomputes the paper: its numbers, tables and figures beside ours."""

@@ -99,7 +99,7 @@ def _weights(n: int) -> Floats:
 
 
 def disagreement(grid: Grid) -> dict[float, int]:
-    """Return how many cells the closed-form intervals and the map judge differently."""
+    """Return the number of cells where closed form and map differ, per threshold (N m)."""
     found = {}
     for limit, mask in safe_masks(grid).items():
         wrong = 0

@@ -1,4 +1,4 @@
-"""Dragging and lifting: how much, and what ends it first, over the arm's range."""
+"""Figures of pulling and lifting: how much, and which limit ends it, over the arm's range."""
 
 import math
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ _SHADES = {SATURATION: ('#cfe3f3', '////'), TIP: ('#e7a9a0', '..'), SLIP: ('#fff
 
 @dataclass(frozen=True, slots=True)
 class Capability:
-    """One line of the tables: a way to pull or lift, its value at best over the map, its cause."""
+    """One line of the tables: a way to pull or lift, its best value over the map, its limit."""
 
     what: str
     flippers: str
@@ -48,7 +48,7 @@ class Capability:
 
 
 def flipper_ways(robot: Robot) -> dict[str, float]:
-    """Return the two flipper angles (rad) that are compared."""
+    """Return the two flipper angles (rad) to compare, by name."""
     return {'stowed': STOWED, 'forward': grounding_angle(robot, PARTS.flipper)}
 
 
@@ -114,7 +114,7 @@ def _best(
 def draw_capacity(
     axes: Axes, x: Floats, y: Floats, value: Floats, cause: Causes, levels: list[float], unit: str
 ) -> None:
-    """Draw lines of equal capacity over areas hatched by what ends it (n, m)."""
+    """Draw contours of capacity over areas hatched by the limit that ends it (n, m)."""
     shown = np.where(cause == NOTHING, SLIP, cause)
     for key, (colour, hatch) in _SHADES.items():
         if (shown == key).any():  # one area a cause: between two there is no third

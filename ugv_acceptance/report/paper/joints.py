@@ -1,4 +1,4 @@
-"""Which joints of a robot stand for the paper's: shoulder, elbow, turret, flippers."""
+"""The robot's joints in the roles of the paper: shoulder, elbow, turret, flippers."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ STOWED = math.pi
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Which joints play the parts of the paper's robot."""
+    """The names of the joints that take the roles of the paper's robot."""
 
     shoulder: str = 'shoulder_joint'
     elbow: str = 'elbow_joint'
@@ -36,7 +36,7 @@ def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
 
 
 def posture(robot: Robot, parts: Parts = PARTS, **angles: float) -> np.ndarray:
-    """Return the posture (j,) with the parts at `angles` (rad); flippers stowed unless given."""
+    """Return the posture (j,) with angles (rad) by role; flippers stowed unless given."""
     q = np.zeros(len(robot.joint_names))
     for part, angle in {'flipper': STOWED, **angles}.items():
         q[robot.joint_names.index(getattr(parts, part))] = angle

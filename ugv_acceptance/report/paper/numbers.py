@@ -1,4 +1,4 @@
-"""The numbers of the paper beside ours: each a row that matches or says why it does not."""
+"""The numbers of the paper beside ours: each row matches, or states why it does not."""
 
 import math
 from dataclasses import asdict, dataclass
@@ -49,7 +49,7 @@ TABLE_1: tuple[tuple[str, float, tuple[float, ...]], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Simulated:
-    """What a simulation gave over the sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
+    """The result of a simulated sweep: theta_2 (n,) in rad, torques (n, 2) in N m."""
 
     theta2: Floats
     torque: Floats
@@ -57,7 +57,7 @@ class Simulated:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One number: where the paper has it, what it printed, what comes out here, and why."""
+    """One number: its place in the paper, the printed value, ours, and why they differ."""
 
     place: str
     what: str
@@ -119,7 +119,7 @@ def speed_limits() -> dict[str, float]:
 
 
 def speed_rows() -> list[Row]:
-    """Return the critical value and the acceptable speed."""
+    """Return the rows of the critical value and the acceptable speed."""
     place, critical, limits = 'Statistical assessment', critical_value(), speed_limits()
     computed, printed = limits['computed_critical'], limits['paper_critical']
     chance = 100.0 * fdtrc(PAPER_SAMPLES - 1, PAPER_SAMPLES - 1, PAPER_CRITICAL)
@@ -153,7 +153,7 @@ def speed_rows() -> list[Row]:
 
 
 def torque_rows(arm: PlanarArm = PAPER) -> list[Row]:
-    """Return what the text says of the arm's torques."""
+    """Return the rows of the statements in the text about the arm's torques."""
     first, _ = planar_torque(arm, math.pi / 6.0, np.linspace(0.0, 2.0 * math.pi, 201))
     least, most = float(np.min(first)), float(np.max(first))
     acute = np.linspace(0.01, math.pi / 2.0 - 0.01, 50)
@@ -198,7 +198,7 @@ def _narrower(arm: PlanarArm, theta1: Floats, *, two_sided: bool) -> bool:
 
 
 def summary(rows: list[Row]) -> dict[str, dict[str, int]]:
-    """Return matches and number of rows of each place."""
+    """Return the number of matches and of rows for each place in the paper."""
     found: dict[str, dict[str, int]] = {}
     for row in rows:
         entry = found.setdefault(row.place, {'matches': 0, 'of': 0})
@@ -208,7 +208,7 @@ def summary(rows: list[Row]) -> dict[str, dict[str, int]]:
 
 
 def as_json(rows: list[Row], figures: list[str]) -> dict[str, Any]:
-    """Return what paper.json holds."""
+    """Return the content of paper.json."""
     fits, counts = family(), summary(rows)
     table = [
         {'speed_deg_s': speed, 'paper': [printed, 1.0], 'ours': [float(x) for x in ours]}
@@ -239,7 +239,7 @@ def _range(ends: np.ndarray) -> list[float]:
 
 
 def ideal_row() -> Row:
-    """Return what the mid-link model, without any error at rest, gives for Table 2's last cell."""
+    """Return the row of Table 2's last cell for the mid-link model without any error at rest."""
     f = float(table_2(0.0, 0.0)[-1, 0])
     return Row(
         'Table 2, ideal model',

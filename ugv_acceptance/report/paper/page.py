@@ -1,4 +1,4 @@
-"""A self-contained HTML page of sections: text, rows, tables, pictures."""
+"""Renders a self-contained HTML page of sections: text, rows, tables, pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from ugv_acceptance.report.regions import svg_of
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure with the name of its file and what it shows."""
+    """A figure with its file's name and its caption."""
 
     name: str
     made: Figure
@@ -55,7 +55,7 @@ def render(robot: str, sections: Sequence[Section], drawn: dict[str, str]) -> st
 
 
 def draw(sections: Sequence[Section]) -> dict[str, str]:
-    """Return the SVG of every picture by its name, with ids that stay apart on one page."""
+    """Return the SVG of every picture by its name, with ids that do not clash on one page."""
     drawn: dict[str, str] = {}
     for section in sections:
         for picture in section.pictures:

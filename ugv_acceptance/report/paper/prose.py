@@ -1,4 +1,4 @@
-"""The text of the paper's page, between its tables and pictures."""
+"""The texts of the paper's page between its tables and pictures."""
 
 
 def _paragraphs(text: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Figures 6 and 7: the orientations, and where the arm tips the chassis over."""
+"""Figures 6 and 7: the orientations, and the postures in which the robot tips over."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ TIP_LEVELS = Levels(10.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One map of Figure 7: right tilt and turret in rad, load in kg, flippers stowed or forward."""
+    """One map of Figure 7: right tilt and turret angle in rad, load in kg, flipper position."""
 
     tilt: float
     forward: bool
@@ -31,7 +31,7 @@ class Panel:
 
     @property
     def words(self) -> str:
-        """What is assumed, in two lines."""
+        """The panel's assumptions as text in two lines."""
         flippers = 'forward' if self.forward else 'stowed'
         turret = 'ahead' if self.turret == 0.0 else 'to the low side'
         load = f'{self.load:g} kg' if self.load else 'no load'
@@ -52,7 +52,7 @@ def arm_grid(robot: Robot, q: np.ndarray, steps: int, parts: Parts = PARTS) -> G
 
 
 def panels(load: float) -> list[Panel]:
-    """Return the sixteen maps: 30 and 40 degrees, flippers, turret, load."""
+    """Return the sixteen panels: 30 and 40 degrees, flippers, turret, load (kg)."""
     return [
         Panel(math.radians(tilt), forward, turret, mass)
         for tilt in (30.0, 40.0)

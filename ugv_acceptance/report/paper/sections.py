@@ -52,7 +52,7 @@ Extra = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """What the page is about: a robot with its torque limits (N m), and what a simulation gave.
+    """The data of the page: a robot with its torque limits (N m), and simulation results.
 
     `simulated` are the arm's torques in a multi-body simulation, `simulated_f` the F values (8, 2)
     from it, `truth` the lines of a table that compares the rollover map with simulated tipping,
@@ -71,7 +71,7 @@ Built = tuple[Section, Extra]
 
 
 def taxonomy(_: Subject) -> Built:
-    """Return Figure 1."""
+    """Return the section of Figure 1, the taxonomy of failures."""
     physical = [s.value for s in FailureSource if s not in HUMAN]
     human = [s.value for s in FailureSource if s in HUMAN]
     table = [
@@ -84,7 +84,7 @@ def taxonomy(_: Subject) -> Built:
 
 
 def worst_case(_: Subject) -> Built:
-    """Return Table 1 and the ranges of equations (4) to (8)."""
+    """Return the section of Table 1 and the ranges of equations (4) to (8)."""
     return (
         Section(
             'Equations (1) to (8) and Table 1: worst cases and safe ranges',
@@ -97,7 +97,7 @@ def worst_case(_: Subject) -> Built:
 
 
 def dynamic(subject: Subject) -> Built:
-    """Return Figure 4."""
+    """Return the section of Figure 4, static against dynamic torque."""
     caption = FIGURE_4
     if subject.simulated is not None:
         caption += ' Crosses: the same arm in MuJoCo.'
@@ -108,7 +108,7 @@ def dynamic(subject: Subject) -> Built:
 
 
 def statistics(subject: Subject) -> Built:
-    """Return Table 2, the critical value and the speed."""
+    """Return the section of Table 2, the critical value and the acceptable speed."""
     text = [part.format(**_spans()) for part in STATISTICS]
     tables = []
     if subject.simulated_f is not None:
@@ -118,7 +118,7 @@ def statistics(subject: Subject) -> Built:
 
 
 def _spans() -> dict[str, float]:
-    """Return the ends of the bands of offsets (mm), and the pair the page uses."""
+    """Return the ends (mm) of the ranges of link offsets that give Table 2, and the pair used."""
     fits = family()
     return {
         'second_low': fits.offset2[0] * 1e3,
@@ -141,7 +141,7 @@ def _simulated_table(found: Floats) -> list[list[str]]:
 
 
 def torque_regions(_: Subject) -> Built:
-    """Return Figure 5."""
+    """Return the section of Figure 5, the regions of torque failure."""
     grid = paper_grid()
     fractions, wrong = safe_fractions(grid), disagreement(grid)
     cells = len(grid.x) * len(grid.y)
@@ -158,14 +158,14 @@ def torque_regions(_: Subject) -> Built:
 
 
 def orientations(_: Subject) -> Built:
-    """Return Figure 6."""
+    """Return the section of Figure 6, the orientations."""
     caption = 'The named orientations, for --orientation of the verb map.'
     picture = Picture('figure_6', figure_6(), caption)
     return Section('Figure 6: orientations', pictures=[picture]), {}
 
 
 def rollover(subject: Subject) -> Built:
-    """Return Figure 7, level ground, and the comparison with simulated truth."""
+    """Return the section of Figure 7, level ground, and simulated tip-overs."""
     check_parts(subject.robot)
     seven, table = figure_7(subject.robot)
     level, left = level_figure(subject.robot)
@@ -181,7 +181,7 @@ def rollover(subject: Subject) -> Built:
 
 
 def capability(subject: Subject) -> Built:
-    """Return dragging and lifting capability."""
+    """Return the section on pulling and lifting capability."""
     drag, lift = (
         drag_table(subject.robot, subject.limits),
         lift_table(subject.robot, subject.limits),
