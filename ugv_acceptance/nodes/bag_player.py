@@ -1,7 +1,7 @@
 """Node `bag_player`: publishes a recording with its timing and QoS.
 
-Header stamps are told anew (stamps.py), so that a monitor does not take them for those of a wrong
-clock; without `restamp` they stay as recorded.
+Header stamps are moved to the time of replay (replay_stamps.py), so that a monitor does not report
+a wrong clock; without `restamp` they stay as recorded.
 """
 
 import sys
@@ -35,7 +35,7 @@ _CLOCK_STEP = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Play:
-    """How a recording is played; no `topics`: all that can be."""
+    """The options of a replay; with no `topics`, all that can be published are."""
 
     bag: Path
     rate: float = 1.0
@@ -47,7 +47,7 @@ class Play:
 
 @dataclass(slots=True)
 class Player:
-    """Publishes a recording on a node. `published` counts; `skipped` says which topics and why."""
+    """Publishes a recording on a node. `published` counts; `skipped` names topics and reasons."""
 
     node: Node
     play: Play
@@ -103,7 +103,7 @@ class Player:
         time.sleep(SETTLING)
 
     def run(self, stop: Stop, progress: Callable[[float], None] = lambda _: None) -> None:
-        """Play to the end, or for ever with `loop`; `progress` takes seconds of the recording."""
+        """Play to the end, or for ever with `loop`; `progress` is called with the position (s)."""
         clock = self.node.create_publisher(Clock, CLOCK, 10) if self.play.clock else None
         while not stop.asked:
             self._once(stop, clock, progress)
@@ -146,7 +146,7 @@ def player_of(play: Play) -> Player:
 
 
 def message_type(name: str) -> Any:  # noqa: ANN401 - a message class
-    """Return the class of a type such as sensor_msgs/msg/Imu, None where it is not installed."""
+    """Return the Python class of a type such as sensor_msgs/msg/Imu; None if not installed."""
     package, _, kind = name.partition('/msg/')
     try:
         return getattr(import_module(f'{package}.msg'), kind)
@@ -155,7 +155,7 @@ def message_type(name: str) -> Any:  # noqa: ANN401 - a message class
 
 
 def qos_of(offer: Offered) -> QoSProfile:
-    """Return the QoS a recorded publisher offered, with a queue for the replay."""
+    """Return the QoS that a recorded publisher offered, with a queue for the replay."""
     reliable, latched = offer.reliability == 'reliable', offer.durability == 'transient_local'
     return QoSProfile(
         depth=1000,
@@ -171,7 +171,7 @@ def _clock_at(now: int) -> Clock:
 
 
 def play_from(node: Node) -> Play:
-    """Return what the parameters of a node say is to be played."""
+    """Return the options of a replay from the parameters of a node."""
     declare = node.declare_parameter
     declare('bag', '', described('recording: a rosbag2 folder or one file'))
     declare('rate', 1.0, described('speed, as a multiple of real time', 0.001, 1000.0))
@@ -191,7 +191,7 @@ def play_from(node: Node) -> Play:
 
 
 def main(args: Iterable[str] | None = None) -> None:
-    """Play what the parameters say until the end or an interrupt; exit code 2 for bad input."""
+    """Play as the parameters say until the end or an interrupt; exit code 2 for bad input."""
     try:
         with ros(None if args is None else list(args)) as stop:
             node = Node('bag_player')

@@ -1,9 +1,9 @@
-"""The console's live feed: the monitor's verdict and the inputs it speaks of.
+"""The console's live feed: the monitor's verdict and the inputs behind it.
 
-The verdict and the alerts are the monitor's: if it falls silent there are NO DATA. What is drawn is
-computed here from the same inputs by the same code, so that a page costs the monitor nothing. What
-came is taken in bursts, just before it is shown: a thread that wakes for each message would cost
-twice as much, and show it no sooner.
+Verdict and alerts are the monitor's: while it is silent the console shows NO DATA. The numbers are
+computed here from the same inputs by the same code, so that a page costs the monitor nothing.
+Messages are taken in bursts, just before a frame: a thread that wakes for each message would cost
+twice as much and show it no sooner.
 """
 
 import gc
@@ -50,7 +50,7 @@ _LOOK = 0.5
 
 
 class ConsoleNode(Node):
-    """Listens to a robot and its monitor whenever a snapshot is asked for; has no thread."""
+    """A node without a thread: takes messages of robot and monitor when a snapshot is asked for."""
 
     def __init__(self, config: Config) -> None:
         super().__init__('acceptance_console')
@@ -90,16 +90,16 @@ class ConsoleNode(Node):
         self._executor.add_node(self)
 
     def describe(self) -> dict[str, Any]:
-        """Return where the numbers come from."""
+        """Return the source of the numbers: the live robot, and its namespace."""
         where = self.get_namespace()
         return {'source': 'live', 'title': 'live' if where == '/' else f'live {where}'}
 
     def extra(self) -> dict[str, Any]:
-        """Return nothing: a live robot adds nothing to a frame."""
+        """Return nothing, because a live robot adds nothing to a frame."""
         return {}
 
     def snapshot(self) -> Snapshot:
-        """Take what has come since the last time, and return what is known now."""
+        """Process the messages that came since the last call and return the present state."""
         self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
         silent = not all(newest.waiting for newest in self._heard.values())
         for name, newest in self._heard.items():
@@ -118,7 +118,7 @@ class ConsoleNode(Node):
         return self._look(now)
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Do about alerts what the monitor offers, or declare a payload; BadSample for else."""
+        """Send the monitor a command about alerts, or declare a payload; BadSample for others."""
         if do in DOINGS:
             self._hand.publish(self._operation(do, values))
             return f'asked the monitor: {do}'
@@ -162,7 +162,7 @@ class ConsoleNode(Node):
         self._say_load()
 
     def _say_load(self) -> None:
-        """Say it each second: who comes later hears it too."""
+        """Publish the declared load every second, so that a late subscriber receives it too."""
         if self._load is not None:
             self._load.header.stamp = self.get_clock().now().to_msg()
             self._load_out.publish(self._load)
@@ -195,7 +195,7 @@ class ConsoleNode(Node):
         self._say_load()
 
     def _look_around(self) -> None:
-        """Let time pass, and see what is active and how the inputs are."""
+        """Advance the evaluation's time, and update active alerts and the state of the inputs."""
         self.session.tick()
         active = self.session.active
         say = self.session.faults.sentence
@@ -204,7 +204,7 @@ class ConsoleNode(Node):
         self._rows = tuple(self._input(name, active) for name in INPUTS)
 
     def _problem(self, now: float) -> str:
-        """Return why nothing may be believed; '' where the monitor is heard."""
+        """Return why the margins are not to be trusted; '' while the monitor is alive."""
         margins = self.session.evaluator.margins
         if margins is None:
             self._known_since = None
@@ -253,7 +253,7 @@ class ConsoleNode(Node):
         )
 
     def _newest(self, row: AlertRow) -> AlertRow:
-        """Return an active alert with its worst until now, and the newest advice on it."""
+        """Return an active alert with its worst value until now and the newest advice."""
         if row.end is not None:
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
@@ -278,7 +278,7 @@ class ConsoleNode(Node):
         )
 
     def close(self) -> None:
-        """Stop listening."""
+        """Destroy the node and its executor."""
         self._executor.remove_node(self)
         self._executor.shutdown()
         self.destroy_node()
@@ -286,7 +286,7 @@ class ConsoleNode(Node):
 
 @contextmanager
 def live_feed(config: Config, args: list[str] | None = None) -> Iterator[tuple[ConsoleNode, Stop]]:
-    """Run the console's node for as long as it is asked for snapshots; yield also when to stop."""
+    """Run the console's node; yield it, and the object that says when to stop."""
     with ros(args) as stop:
         node = ConsoleNode(config)
         # What is there now stays: the garbage collector need not look through it between frames.

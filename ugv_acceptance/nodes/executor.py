@@ -1,7 +1,7 @@
-"""Runs a node on the events executor until it is interrupted, and ends it cleanly.
+"""Runs a node on the events executor until it is interrupted, and shuts it down cleanly.
 
-EventsExecutor hears a signal only when a callback runs, so a timer has one run twice a second. Each
-call of it leaks some bytes: it is called once an hour.
+EventsExecutor notices a signal only when a callback runs, so a timer fires twice a second. Each
+call of `spin` leaks some bytes, so it is called once an hour.
 """
 
 import gc
@@ -50,13 +50,13 @@ class Stop:
     signal: int = 0
 
     def leave(self) -> None:
-        """End the process where it was asked to, without a result: cli/termination.py."""
+        """End the process without a result if it was asked to end: see cli/termination.py."""
         if self.asked:
             raise SystemExit(128 + self.signal)
 
 
 def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
-    """Build a node, bring it up, spin it until SIGINT or SIGTERM; return the exit code."""
+    """Build a node, start it, spin it until SIGINT or SIGTERM; return the exit code."""
     try:
         with ros(args) as stop:
             node = make()
@@ -73,7 +73,7 @@ def run(make: Callable[[], Any], args: list[str] | None = None) -> int:
 
 @contextmanager
 def ros(args: list[str] | None = None) -> Iterator[Stop]:
-    """Initialise rclpy with signals that only set `asked`, and shut it down, come what may.
+    """Initialise rclpy with signals that only set `asked`, and always shut it down at the end.
 
     `args` are those behind a program's name: ROS arguments such as remaps among them.
     """
@@ -97,9 +97,9 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
 
 
 def choose_transport(environment: MutableMapping[str, str]) -> None:
-    """Leave Fast DDS's shared memory out, unless somebody chose: docs/decisions/0005-transport.md.
+    """Switch Fast DDS's shared memory off unless the user chose: docs/decisions/0005-transport.md.
 
-    Its queues are locked between processes: one that stops or dies holds up whoever publishes.
+    Its queues are locked between processes: one that stops or dies blocks every publisher.
     """
     chosen = {environment[name] for name in (TRANSPORT, *PROFILES) if name in environment}
     fast_dds = get_rmw_implementation_identifier().startswith('rmw_fastrtps')
@@ -113,12 +113,12 @@ def choose_transport(environment: MutableMapping[str, str]) -> None:
 
 
 def end(node: Node) -> None:
-    """Take a node down."""
+    """Destroy a node."""
     node.destroy_node()
 
 
 def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
-    """Spin until the process is asked to stop, or `until` says so (asked twice a second)."""
+    """Spin until the process is asked to stop or `until` returns true (called twice a second)."""
     executor, over = EventsExecutor(), Future()
 
     def look() -> None:

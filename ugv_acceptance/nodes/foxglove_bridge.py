@@ -1,7 +1,7 @@
-"""Foxglove WebSocket of the live topics: read only, for this machine only.
+"""Serves the live topics to Foxglove by WebSocket: read only, for this machine only.
 
-Messages go through as the bytes they came in, with the text of their types. A topic is subscribed
-while somebody watches it, so that nothing is taken from the robot's network for nobody.
+Messages pass through as the bytes they came in, with the definitions of their types. A topic is
+subscribed only while somebody watches it, to spare the robot's network.
 """
 
 import time
@@ -32,7 +32,7 @@ BACKLOG, DEPTH = 256, 100
 
 @dataclass(slots=True)
 class _Topic:
-    """A topic that is offered: its type, its channel, and the subscription while it is watched."""
+    """An offered topic: its type, its channel, and its subscription while it is watched."""
 
     kind: str
     channel: Any
@@ -40,22 +40,22 @@ class _Topic:
 
 
 class _Listener:
-    """Hears, on the server's threads, how many watch a topic; only counts them."""
+    """Counts how many clients watch each topic; called on the server's threads."""
 
     def __init__(self) -> None:
         self.heard: SimpleQueue[tuple[str, int]] = SimpleQueue()
 
     def on_subscribe(self, _client: object, channel: Any) -> None:  # noqa: ANN401 - foxglove's view
-        """One more watches a topic."""
+        """Count one more client that watches a topic."""
         self.heard.put((channel.topic, 1))
 
     def on_unsubscribe(self, _client: object, channel: Any) -> None:  # noqa: ANN401
-        """One less watches a topic."""
+        """Count one less client that watches a topic."""
         self.heard.put((channel.topic, -1))
 
 
 class Bridge(Node):
-    """Offers the topics of standard types that somebody publishes. AcceptanceError: no server."""
+    """Offers all published topics of standard types. Raises AcceptanceError if no server starts."""
 
     def __init__(self, port: int = PORT) -> None:
         super().__init__('foxglove_bridge')
@@ -84,7 +84,7 @@ class Bridge(Node):
         self.look_for_topics()
 
     def look_for_topics(self) -> None:
-        """Offer what is published by now, and no longer what is not."""
+        """Add channels of newly published topics, and remove those no longer published."""
         there = {
             name: kinds[0]
             for name, kinds in self.get_topic_names_and_types()
@@ -99,7 +99,7 @@ class Bridge(Node):
                 self.offered[name] = _Topic(kind, channel)
 
     def _channel(self, name: str, kind: str) -> Any:  # noqa: ANN401 - foxglove's channel
-        """Return a new channel, None for a type that is not one of ROS's own, or not installed."""
+        """Return a new channel; None for a type that is not one of ROS's own or not installed."""
         try:
             text, _ = definition_of(kind)
         except BadBag:
@@ -136,7 +136,7 @@ class Bridge(Node):
             topic.subscription = None
 
     def _qos(self, name: str) -> QoSProfile:
-        """Return what matches every publisher, and brings the last message where all keep it."""
+        """Return a QoS that matches every publisher; latched if all of them are."""
         offers = [info.qos_profile for info in self.get_publishers_info_by_topic(name)]
         latched = all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
         reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
@@ -147,7 +147,7 @@ class Bridge(Node):
         )
 
     def destroy_node(self) -> None:
-        """Close the server too."""
+        """Close the server and destroy the node."""
         if hasattr(self, '_server'):
             self._server.stop()
         super().destroy_node()

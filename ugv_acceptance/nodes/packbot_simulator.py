@@ -1,10 +1,10 @@
-"""Node `packbot_simulator`: a simulated robot behind the topics of a real one.
+"""Node `packbot_simulator`: a simulated robot with the topics of a real one.
 
 It publishes joint_states and imu/data (and /clock when asked) and obeys cmd_vel and
-arm_controller/joint_trajectory. What a person does on a test ground comes on topics of its own:
-~/ground tilts what it stands on, ~/load puts a load into its hand, ~/pull pulls it backwards (x: N,
-z: height in m), ~/reset stands it up again. At the start and after a reset its hand holds the load
-that the configuration declares, for that is what a monitor takes it to hold.
+arm_controller/joint_trajectory. What a person does on a test ground has topics of its own: ~/ground
+tilts the ground, ~/load puts a load into the gripper, ~/pull pulls it backwards (x: N, z: height in
+m), ~/reset stands it up again. At the start and after a reset its gripper holds the load that the
+configuration declares, because a monitor assumes that one.
 """
 
 import math
@@ -40,7 +40,7 @@ CLOCK_STEP = 0.01
 
 
 class Simulator(Node):
-    """The simulated robot as a node; `slipped` (s) is how much real time it could not follow."""
+    """The simulated robot as a node; `slipped` (s) is the real time it could not keep up with."""
 
     def __init__(self, **node: Any) -> None:  # noqa: ANN401 - as Node does
         # Where MuJoCo is absent, they say so: run() catches it here.
@@ -102,7 +102,7 @@ class Simulator(Node):
         self.create_service(Trigger, '~/reset', self._on_reset)
 
     def _guard(self, take: Callable[[Any], None]) -> Callable[[Any], None]:
-        """Return `take` such that a bad command is refused aloud and changes nothing."""
+        """Return `take` wrapped so that a bad command is logged and changes nothing."""
 
         def guarded(message: Any) -> None:  # noqa: ANN401 - a message
             try:
@@ -113,7 +113,7 @@ class Simulator(Node):
         return guarded
 
     def bring_up(self) -> None:
-        """Start the time of the simulation."""
+        """Start the simulation's time."""
         self._began = time.monotonic()
         if not self._clocked:
             self.virtual.shift(time.time_ns())
@@ -165,7 +165,7 @@ class Simulator(Node):
         return response
 
     def _hold_declared(self) -> None:
-        """Put the load of the configuration into the hand: what a monitor reckons with."""
+        """Put the configuration's load into the gripper, as a monitor assumes."""
         declared = self.virtual.config.settings.robot.payload
         if declared.mass > 0.0:
             self.virtual.remote.take(declared)

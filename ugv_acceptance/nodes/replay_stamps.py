@@ -1,7 +1,7 @@
 """Moves header stamps of a recording to the time of its replay.
 
-A stamp moves by the time between recording and replay, and advances at the rate of the replay. One
-clock's topics move alike, so what they tell of each other stays. A topic whose stamps are far from
+A stamp moves by the time between recording and replay, and advances at the rate of the replay.
+Topics of one clock move alike, so that their differences stay. A topic whose stamps are far from
 when they were logged has another clock than the recorder's, such as a simulation's.
 """
 
@@ -30,7 +30,7 @@ Move = Callable[[int], int]
 
 @dataclass(slots=True)
 class _Clock:
-    """A clock that is `offset` (ns) ahead of the recorder's; the topic `leader` tells how far."""
+    """A clock that is `offset` (ns) ahead of the recorder's, measured by the topic `leader`."""
 
     offset: int = 0
     leader: str = ''
@@ -44,9 +44,9 @@ class _Clock:
 
 @dataclass(slots=True)
 class Stamps:
-    """Stamps of one round of a replay: what was logged at `first` is published at `began` (ns).
+    """Moves the stamps of one round of a replay from `first` (ns, logged) to `began` (ns, now).
 
-    `leaders` are the topics whose stamps advance, so that they tell the time of a clock.
+    `leaders` are the topics whose stamps advance, so that they measure a clock.
     """
 
     first: int
@@ -58,7 +58,7 @@ class Stamps:
     _clocks: dict[str, _Clock] = field(default_factory=dict)
 
     def of(self, topic: str, logged: int, stamp: int) -> Move:
-        """Return what moves the stamps of a message: that of its first header, logged when (ns)."""
+        """Return what moves the stamps of a message, by its first stamp and log time (ns)."""
         if topic not in self._clocks and stamp:
             self._clocks[topic] = self._clock(topic, stamp - logged)
         clock = self._clocks.get(topic, self._recorder)
@@ -86,7 +86,7 @@ class Stamps:
 
 
 def stamp_of(data: bytes) -> int:
-    """Return the stamp (ns) of a serialised message that begins with a Header; 0: too short."""
+    """Return the stamp (ns) of a serialised message that starts with a Header; 0: too short."""
     if len(data) < 12:
         return 0
     sec, nanosec = struct.unpack_from(f'{_order(data)}iI', data, 4)
@@ -94,7 +94,7 @@ def stamp_of(data: bytes) -> int:
 
 
 def restamped(data: bytes, move: Move) -> bytes:
-    """Return a serialised message that begins with a Header, its stamp (ns) moved.
+    """Return a serialised message that starts with a Header, its stamp (ns) moved.
 
     A stamp cannot be before 1970 or after 2038. A message too short for one stays as it is.
     """
@@ -114,14 +114,14 @@ def _bounded(stamp: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Stamped:
-    """Where messages of a type have headers: at their begin, and elsewhere (such as in tf's)."""
+    """The places of headers in messages of a type: at the start, and inside (such as in tf's)."""
 
     kind: Any
     first: bool
     inside: bool
 
     def moved(self, data: bytes, topic: str, logged: int, stamps: Stamps) -> bytes:
-        """Return a serialised message with its stamps moved; one that is broken stays as it is."""
+        """Return a serialised message with its stamps moved; a broken one stays as it is."""
         if not self.inside:
             return restamped(data, stamps.of(topic, logged, stamp_of(data))) if self.first else data
         try:
@@ -140,7 +140,7 @@ class Stamped:
 
 
 def stamped(kind: Any) -> Stamped:  # noqa: ANN401 - a message class
-    """Return where the messages of a class have headers."""
+    """Return the places of headers in messages of a class."""
     fields = list(kind.get_fields_and_field_types().values())
     first = bool(fields) and fields[0] == _HEADER
     return Stamped(kind, first, any(map(_has_header, fields[1:] if first else fields)))
@@ -148,7 +148,7 @@ def stamped(kind: Any) -> Stamped:  # noqa: ANN401 - a message class
 
 @cache
 def _has_header(field_type: str) -> bool:
-    """Return whether a field of a type, such as sequence<geometry_msgs/Pose, 3>, has a header."""
+    """Return whether a field's type, such as sequence<geometry_msgs/Pose, 3>, has a header."""
     name = field_type.removeprefix('sequence<').rstrip('>').partition(',')[0].partition('[')[0]
     if name == _HEADER:
         return True

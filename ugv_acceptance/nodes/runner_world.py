@@ -1,7 +1,7 @@
-"""The world of `run` in ROS: records topics, hears the monitor, commands, stops motion.
+"""The runner's `World` over ROS: records topics, sends commands, and freezes motion at alerts.
 
-What freezes: an alert that the step in hand does not expect, and a monitor that has gone silent.
-It runs on the thread that takes messages, so it does not wait for anything the runner does.
+Motion freezes at an alert that the current step does not expect, and when the monitor is silent.
+That is done on the thread that takes messages, so it does not wait for the runner.
 """
 
 import threading
@@ -42,7 +42,7 @@ ANSWER_WITHIN = 30.0
 
 
 class RosCommands:
-    """The commands of `run.world.Commands` sent by a node, joints counted as its driver does."""
+    """The runner's `Commands` over ROS, with joint names, signs and offsets of the driver."""
 
     def __init__(self, node: Node, config: Config) -> None:
         self._node, self._config = node, config
@@ -56,9 +56,9 @@ class RosCommands:
         self._reset: Any = node.create_client(Trigger, f'{SIMULATOR}/reset')
 
     def unheard(self, mode: str) -> str:
-        """Return a topic that nobody listens to yet though a run of this mode needs it; or empty.
+        """Return a topic this mode needs that has no subscriber yet; empty: none.
 
-        A command that is sent before its topic is matched is lost, and nobody is told.
+        A command sent before a subscriber is matched is lost without notice.
         """
         needed = [self._payload]
         if mode != OPERATOR:
@@ -83,18 +83,18 @@ class RosCommands:
         self._trajectory.publish(message)
 
     def freeze(self) -> None:
-        """Hold arm and tracks still: an empty trajectory, no speed."""
+        """Stop arm and tracks: an empty trajectory, speed zero."""
         self._trajectory.publish(JointTrajectory())
         self._velocity.publish(Twist())
 
     def drive(self, forward: float, yaw: float) -> None:
-        """Drive at m/s and rad/s."""
+        """Drive at `forward` (m/s) and `yaw` (rad/s)."""
         message = Twist()
         message.linear.x, message.angular.z = forward, yaw
         self._velocity.publish(message)
 
     def declare(self, mass: float) -> None:
-        """Tell the monitor what is carried (kg)."""
+        """Declare to the monitor what is carried (kg)."""
         message = InertiaStamped(inertia=self._inertia(mass))
         message.header.frame_id = self._config.topics.payload.frame_id or ''
         message.header.stamp = self._node.get_clock().now().to_msg()
@@ -105,7 +105,7 @@ class RosCommands:
         self._ground.publish(Vector3(x=tilt, y=heading, z=rate))
 
     def load(self, mass: float) -> None:
-        """Put a load (kg) into the simulated hand."""
+        """Put a load (kg) into the simulated gripper."""
         self._load.publish(self._inertia(mass))
 
     def pull(self, force: float) -> None:
@@ -113,7 +113,7 @@ class RosCommands:
         self._pull.publish(Vector3(x=force, z=HITCH))
 
     def stand_up(self) -> None:
-        """Put the simulated robot back to its start, and wait until it is."""
+        """Reset the simulated robot to its start, and wait until that is done."""
         if self._reset.wait_for_service(ANSWER_WITHIN):
             future, end = (
                 self._reset.call_async(Trigger.Request()),
@@ -144,10 +144,10 @@ class _Recording:
 
 
 class Guard(Node):
-    """The live world of a runner: a node that records and hears, and can freeze the robot.
+    """The runner's world as a node: it records, follows the alerts, and can freeze the robot.
 
-    `on_stop(reason)` is told what froze it, `progress(now)` the time while the runner waits. `mode`
-    says who moves the robot, so who has to listen before a run begins.
+    `on_stop(reason)` is called when motion is frozen, `progress(now)` while the runner waits.
+    `mode` says who moves the robot, and so which subscribers a run needs.
     """
 
     def __init__(
@@ -199,7 +199,7 @@ class Guard(Node):
     # Recording
 
     def record(self, folder: Path) -> None:
-        """Record into a new folder from now on."""
+        """Begin to record all messages into a new folder."""
         bag = BagWriter(folder)
         for name, type_, qos in self._topics:
             bag.add_topic(name, type_, qos)
@@ -272,7 +272,7 @@ class Guard(Node):
     # The world of a runner
 
     def missing(self) -> str:
-        """Return who was not heard, or does not listen, yet; empty when everything is there."""
+        """Return what has not been heard, or does not listen, yet; empty when all is there."""
         if not self.positions.now:
             return 'joint states of the robot'
         if not self._heard:
@@ -285,30 +285,30 @@ class Guard(Node):
         return self._silent >= SILENT
 
     def now(self) -> float:
-        """Return the steady time (s)."""
+        """Return the time (s) of the steady clock."""
         return time.monotonic()
 
     def fed(self) -> float:
-        """Return for how long (s) joint states kept coming."""
+        """Return for how long (s) joint states kept coming; stands still while they do not."""
         return self._fed
 
     def stamp(self) -> int:
-        """Return the time (ns) at which a message that comes now is recorded."""
+        """Return the time (ns) that a message recorded now carries."""
         return time.time_ns()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Wait `seconds` of real time."""
         time.sleep(seconds)
         self._progress(time.monotonic())
 
 
 def _nothing(_: bytes) -> None:
-    """Take a message that is only recorded."""
+    """Ignore a message: it is only recorded."""
 
 
 @contextmanager
 def spinning(guard: Guard) -> Iterator[None]:
-    """Take messages on a thread of its own, so that recording and brake wait for nobody."""
+    """Take messages on a separate thread, so that recording and brake never wait."""
     executor, over = EventsExecutor(), threading.Event()
     executor.add_node(guard)
     never: Future = Future()

@@ -1,4 +1,4 @@
-"""A node in a subprocess that ends with its parent, even one that was killed.
+"""Runs a node in a subprocess that ends with its parent, even if the parent is killed.
 
 `python -m ugv_acceptance.nodes.subprocess_node packbot_simulator --ros-args ...`; its input is the
 parent's pipe.
@@ -21,9 +21,9 @@ PATIENCE = 5.0
 def child(
     module: str, ros_args: list[str], environment: Mapping[str, str] | None = None
 ) -> Iterator['subprocess.Popen[bytes]']:
-    """Run the node of ugv_acceptance.nodes.MODULE until the block is left.
+    """Run the node of ugv_acceptance.nodes.MODULE in a process until the block is left.
 
-    It has a session of its own: a Ctrl-C is for this process, which ends it.
+    It has a session of its own: Ctrl-C reaches only this process, which ends the node.
     """
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
@@ -43,7 +43,7 @@ def child(
 
 
 def end_with_parent() -> None:
-    """Ask this process to end as soon as its input, the parent's pipe, is closed."""
+    """Make this process end as soon as its input, the parent's pipe, is closed."""
     threading.Thread(target=_wait_for_the_end, daemon=True).start()
 
 
@@ -55,7 +55,7 @@ def _wait_for_the_end() -> None:
 
 
 def main() -> None:
-    """Run the node named by the first argument."""
+    """Run the node that the first argument names."""
     end_with_parent()
     import_module(f'ugv_acceptance.nodes.{sys.argv[1]}').main(sys.argv[2:])
 

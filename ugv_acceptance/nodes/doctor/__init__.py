@@ -1,1 +1,1 @@
-"""Checks of a set-up: what is heard of a robot, and what is wrong with it."""
+"""Checks of a ROS set-up: `probe.py` listens to a robot, `checks.py` lists what is wrong."""

@@ -1,4 +1,4 @@
-"""Checks of a set-up: findings from what was heard, each with what to do."""
+"""Checks a set-up: turns what `probe.py` received into findings, each with what to do."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -28,7 +28,7 @@ OUTSIDE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line: how it is, about what, what was seen, what to do (empty: nothing)."""
+    """One line of the result: level, subject, observation, and what to do (empty: nothing)."""
 
     level: str
     about: str
@@ -37,7 +37,7 @@ class Finding:
 
 
 def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
-    """Yield what is to be said of a set-up."""
+    """Yield the findings about a set-up; `config` is the robot's."""
     where = f'{around.distribution}, {around.middleware}, domain {around.domain}'
     yield Finding(OK, 'ROS', f'{where}, discovery {around.discovery}')
     yield Finding(OK, 'configuration', f'{config.name} from {config.path}')

@@ -29,10 +29,10 @@ _MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
 
 @dataclass(slots=True)
 class Heard:
-    """What came on one input: receipt times and samples; publishers as (node, type, why no match).
+    """The messages of one input: receipt times (ns), samples, and the publishers.
 
-    `alike` are the other topics that carry messages of the input's type, but for what a monitor
-    publishes itself.
+    `publishers` are (node, type, why its QoS does not match). `alike` are the other topics with
+    messages of the input's type, except those a monitor publishes.
     """
 
     topic: str
@@ -44,7 +44,7 @@ class Heard:
     malformed: list[str] = field(default_factory=list)
 
     def take(self, decode: Callable[[bytes], JointStateSample | ImuSample], data: bytes) -> None:
-        """Take a message."""
+        """Decode a message and keep it, or the reason why it cannot be read."""
         try:
             sample = decode(data)
         except BadSample as error:
@@ -58,7 +58,7 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The ROS environment, and what was heard on the two inputs in `seconds`."""
+    """The ROS environment, and the messages received on both inputs in `seconds`."""
 
     distribution: str
     middleware: str
@@ -104,7 +104,7 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
 
 
 def _distribution() -> str:
-    """Return the sourced ROS, or the wheels in its place."""
+    """Return the ROS distribution that is sourced, or the wheels used instead."""
     if sourced := os.environ.get('ROS_DISTRO'):
         return sourced
     try:
@@ -149,7 +149,7 @@ def _look(node: Node, heard: Heard, topic: Topic) -> None:
 
 
 def _told_by_a_monitor(node: Node, topic: str) -> bool:
-    """Return whether a topic is what a monitor makes of its inputs, live or played again."""
+    """Return whether a topic is published by a monitor, live or from a recording."""
     if topic.rpartition('/')[2] in _MARGINS:
         return True
     infos = node.get_publishers_info_by_topic(topic)

@@ -1,7 +1,7 @@
 """The black box: saves the seconds around each critical alert as a small recording.
 
-Messages are kept as they came, in memory. On a critical alert what is kept goes to the file at
-once, what follows is written as it comes: a process that is killed later loses half a second.
+Messages are kept in memory as they came. A critical alert writes them to a file at once, and what
+follows as it comes: if the process is killed later, half a second is lost.
 """
 
 import time
@@ -36,7 +36,7 @@ Kept = tuple[int, str, bytes]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic that is recorded. `lasting`: its newest message counts until the next comes."""
+    """A topic to record. `lasting`: its newest message counts until the next comes."""
 
     topic: str
     type: str
@@ -45,17 +45,17 @@ class Channel:
 
 
 def is_critical(alert: Alert) -> bool:
-    """Return whether an alert is a failure of the robot: what a recording is made for."""
+    """Return whether an alert is a failure of the robot, for which a recording is made."""
     return alert.rule.level == ERROR and alert.rule.code in FAILURES
 
 
 @dataclass(slots=True)
 class BlackBox:
-    """Keeps what comes in, and writes recordings into `folder` (None: it does nothing).
+    """Keeps incoming messages in memory and writes recordings into `folder` (None: does nothing).
 
-    Times in ns of receipt, `offset` what is added to the steady clock for them. `on_problem` hears
-    why a recording could not be made; the box then goes on keeping. `saved` are the recordings
-    whose past is in the file. Writing is done by a thread, so that no message has to wait.
+    Times in ns of receipt; `offset` converts those of the steady clock. `on_problem` is called with
+    the reason why a recording could not be made; the box then goes on keeping. `saved` are the
+    recordings whose past is in the file. A thread writes, so that no message has to wait.
     """
 
     folder: Path | None
@@ -72,7 +72,7 @@ class BlackBox:
     _problems: 'SimpleQueue[str]' = field(default_factory=SimpleQueue)
 
     def tap(self, name: str, take: Take) -> Take:
-        """Return `take` such that every message of a channel is kept before it is taken."""
+        """Return `take` wrapped so that every message of a channel is kept before it is taken."""
         if self.folder is None:
             return take
         keep, offset, clock = self.keep, self.offset, time.monotonic_ns
@@ -84,7 +84,7 @@ class BlackBox:
         return tapped
 
     def keep(self, now: int, name: str, data: bytes) -> None:
-        """Take a message, serialised."""
+        """Keep a serialised message, received at `now` (ns)."""
         kept = self._kept
         while kept and kept[0][0] < now - BEFORE:
             _, old, content = kept.popleft()
@@ -97,7 +97,7 @@ class BlackBox:
     def alerts(self, now: int, raised: Sequence[Alert], summary: bytes) -> None:
         """Take a message of the channel `alerts`, and the alerts that were raised in it.
 
-        A critical one starts a recording, or prolongs it. Who acknowledged what is kept as well.
+        A critical one starts a recording or prolongs it. Acknowledgements are kept as well.
         """
         if self.folder is None:
             return
@@ -109,7 +109,7 @@ class BlackBox:
             self._begin(self.folder, now, critical[0])
 
     def advance(self, now: int) -> None:
-        """Let time pass: end a recording that is long enough, tell what went wrong."""
+        """Advance to `now` (ns): end a recording that is long enough, report problems."""
         if self._queue is not None and now > self._until:
             self._queue.put(None)
             self._queue = None
@@ -117,7 +117,7 @@ class BlackBox:
             self.on_problem(f'black box: {self._problems.get()}')
 
     def close(self) -> None:
-        """End the recording that is being made, and wait until all are in their files."""
+        """End the current recording, and wait until all are written."""
         self.advance(self._until + 1)
         for thread in self._threads:
             thread.join(PATIENCE)
@@ -137,7 +137,7 @@ class BlackBox:
         thread.start()
 
     def _record(self, path: Path, past: list[Kept], queue: 'SimpleQueue[Kept | None]') -> None:
-        """Write a recording; a full disk must not end the watch."""
+        """Write a recording; an error such as a full disk is reported and does not end the node."""
         try:
             # Not compressed: that would keep the processor from the messages that come now.
             with BagWriter(path, compression='') as writer:
@@ -153,7 +153,7 @@ class BlackBox:
             self._problems.put(str(error))
 
     def _follow(self, writer: BagWriter, queue: 'SimpleQueue[Kept | None]') -> None:
-        """Write what comes until the end is said, and hand it on twice a second or more."""
+        """Write messages from the queue until its end, flushing at least twice a second."""
         flushed = time.monotonic()
         while True:
             with suppress(Empty):

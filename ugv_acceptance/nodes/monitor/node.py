@@ -1,7 +1,7 @@
 """Node `acceptance_monitor`, a lifecycle node: docs/ros_interface.md.
 
-It advises; it is not a safety function. It brings itself up unless `autostart` is false. Inputs are
-subscribed as raw bytes on activation, so an inactive monitor costs nothing.
+It advises; it is not a safety function. It configures and activates itself unless `autostart` is
+false. Inputs are subscribed as raw bytes on activation, so an inactive monitor costs nothing.
 """
 
 import sys
@@ -62,7 +62,7 @@ Listener = Callable[[str, Status], None]
 
 
 class Monitor(LifecycleNode):
-    """The monitor. `listener` hears all verdicts and changes of alerts, for a console."""
+    """The monitor's node. `listener` is called with every verdict and change of an alert."""
 
     def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
         super().__init__(NAME, **node)
@@ -92,7 +92,7 @@ class Monitor(LifecycleNode):
     # Lifecycle
 
     def bring_up(self) -> None:
-        """Configure and activate if `autostart`; BadConfig says why that was not possible."""
+        """Configure and activate if `autostart`. Raises BadConfig where that is not possible."""
         if not self._value('autostart'):
             return
         success = TransitionCallbackReturn.SUCCESS
@@ -100,23 +100,23 @@ class Monitor(LifecycleNode):
             raise BadConfig(self.problem)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Read the robot's files, declare its parameters, make the margin topics."""
+        """Read the robot's files, declare its parameters, create the margin topics."""
         return self._transition(self._configure)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start a new evaluation and subscribe the inputs."""
+        """Start a new evaluation and subscribe to the inputs."""
         return self._transition(self._activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop listening; the verdict is STALE from now on."""
+        """Unsubscribe; the verdict is STALE from now on."""
         return self._transition(self._deactivate)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget the robot."""
+        """Discard the robot's configuration, its parameters and topics."""
         return self._transition(self._clean_up)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop listening for good."""
+        """Unsubscribe for good."""
         return self._transition(self._deactivate)
 
     def _transition(self, step: Callable[[], None]) -> TransitionCallbackReturn:
@@ -214,7 +214,7 @@ class Monitor(LifecycleNode):
     # What is said
 
     def verdict(self) -> Status:
-        """Return the verdict now: STALE in every state but active."""
+        """Return the present verdict: STALE in every state but active."""
         return unavailable(self.problem) if self.session is None else verdict_of(self.session)
 
     def say(self) -> None:
@@ -230,7 +230,7 @@ class Monitor(LifecycleNode):
             self.say()
 
     def _tell(self, changes: list[Change]) -> None:
-        """Publish changes of alerts, and give those to the black box that it is made for."""
+        """Publish changes of alerts, and pass newly raised ones to the black box."""
         session = self.session
         if session is None or not changes:
             return
@@ -254,7 +254,7 @@ class Monitor(LifecycleNode):
         return response
 
     def _on_operator(self, message: DiagnosticStatus) -> None:
-        """Take what a person did, with name and note: docs/operator.md."""
+        """Carry out an operator's command with its name and note: docs/operator.md."""
         try:
             if self.session is None:
                 raise BadSample(INACTIVE)
@@ -276,7 +276,7 @@ class Monitor(LifecycleNode):
         return self.get_parameter(name).value
 
     def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Refuse a set as a whole, with the reason; what it would change is not touched here."""
+        """Accept or refuse a set of parameters as a whole, with the reason; apply nothing."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             if self.session is not None:
@@ -298,12 +298,12 @@ class Monitor(LifecycleNode):
         self._take_rates()
 
     def _in_force(self, settings: Settings) -> Settings:
-        """Return settings with the load that a message may have declared."""
+        """Return settings with the payload in use, which a message may have declared."""
         load = settings.robot.payload if self.session is None else self.session.evaluator.payload
         return replace(settings, robot=replace(settings.robot, payload=load))
 
     def _tell_load(self) -> None:
-        """Let the parameters of the load say what is in force when a message has changed it."""
+        """Set the payload's parameters to the payload in use after a message has changed it."""
         if self._settings is None or self._in_force(self._settings) == self._settings:
             return
         self._settings = self._in_force(self._settings)
@@ -320,7 +320,7 @@ class Monitor(LifecycleNode):
 
 
 def build(config: str | None, urdf: str | None, listener: Listener) -> Monitor:
-    """Return a monitor of a robot; None: what the ROS arguments say."""
+    """Return a monitor of a robot; None: as the ROS arguments say."""
     given = {'config': config, 'urdf': urdf}
     overrides = [Parameter(name, value=value) for name, value in given.items() if value]
     return Monitor(listener, parameter_overrides=overrides)

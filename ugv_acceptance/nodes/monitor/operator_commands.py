@@ -1,7 +1,7 @@
-"""Commands of the operator: acknowledge, shelve, unshelve, reset; with name and note.
+"""The operator's commands: acknowledge, shelve, unshelve, reset; each with a name and a note.
 
-On `~/operator` as a DiagnosticStatus: `name` is what to do, `hardware_id` who, `message` the note,
-`values` the alert: code, subject, level, and for shelve seconds. No alert named: all of them.
+They come on `~/operator` as a DiagnosticStatus: `name` is the command, `hardware_id` who, `message`
+the note, `values` the alert: code, subject, level, and for shelve seconds. Without an alert: all.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ SHELVED = 300.0
 
 @dataclass(frozen=True, slots=True)
 class Operation:
-    """What to do, who does it, to which alarm (None: all), why, and for how long (s)."""
+    """A command: what, by whom, on which alarm (None: all), a note, and for how long (s)."""
 
     do: str
     who: str
@@ -37,7 +37,7 @@ class Operation:
 
 
 def operation_from(message: DiagnosticStatus) -> Operation:
-    """Return the operation of a message; BadSample says what is wrong with it."""
+    """Return the command in a message. Raises BadSample saying what is wrong with it."""
     values = {pair.key: pair.value for pair in message.values}
     if message.name not in DOINGS:
         raise BadSample(f'name: expected one of {", ".join(DOINGS)}, got {message.name[:80]!r}')
@@ -58,12 +58,12 @@ def operation_from(message: DiagnosticStatus) -> Operation:
 
 
 def by_service(session: Session) -> list[Change]:
-    """Acknowledge all; a service of type Trigger does not say who it was."""
+    """Acknowledge all alarms; a service of type Trigger does not say who called it."""
     return session.alarm_tracker.alarms.acknowledge(session.clock.now(), SERVICE)
 
 
 def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
-    """Do what a message asks; return what changed. AcceptanceError where it is refused."""
+    """Carry out the command in a message; return the changes. Raises AcceptanceError if refused."""
     alarms, now, o = session.alarm_tracker.alarms, session.clock.now(), operation_from(message)
     if o.do == 'acknowledge':
         return alarms.acknowledge(now, o.who, o.note, o.key)
@@ -77,13 +77,13 @@ def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
 
 
 def all_reset(session: Session) -> list[Change]:
-    """Return what is told of all alarms when an evaluation ends."""
+    """Return the changes to publish when an evaluation ends: every alarm reset."""
     now, table = session.clock.now(), session.alarm_tracker.alarms.table
     return [Change(now, alarm.alert, 'reset', State.NORMAL) for alarm in table.values()]
 
 
 def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
-    """Return a black box before the inputs of a session; it does nothing without a folder."""
+    """Return a black box for the inputs of a session; without a folder it does nothing."""
     names = {
         'joint_states': (topics.joint_states, 'sensor_msgs/msg/JointState'),
         'imu': (topics.imu, 'sensor_msgs/msg/Imu'),

@@ -1,7 +1,7 @@
-"""Parameters of the monitor: which can change while it runs, and their ranges.
+"""The monitor's parameters: their ranges, and which can change while it runs.
 
-Names are those of the YAML file, units included. A set is checked as a whole and is wholly taken
-or wholly refused; several values that belong together go into one set_parameters_atomically.
+Names are those of the YAML file, units included. A set is checked as a whole and is accepted or
+refused as a whole; values that belong together go into one set_parameters_atomically.
 """
 
 import math
@@ -32,10 +32,10 @@ NOT_JUDGED = 0.0
 
 @dataclass(frozen=True, slots=True)
 class TunableParameter:
-    """A parameter: how it is read from settings and put into them; its range.
+    """A parameter that can change at run time: how to read it from settings and set it; its range.
 
-    `permitted` is what is expected without a reason, and with one; such a range is checked by
-    evaluation/permitted_limits.py, so that the answer says so.
+    `permitted` describes the permitted values, without a reason and with one; such a range is
+    checked by evaluation/permitted_limits.py, so that its error message says so.
     """
 
     name: str
@@ -47,7 +47,7 @@ class TunableParameter:
     permitted: str = ''
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return what ROS tools show of it, and check."""
+        """Return the descriptor with the range that ROS tools show and check."""
         if not self.permitted:
             return described(self.what, self.lower, self.upper)
         return ParameterDescriptor(description=self.what, additional_constraints=self.permitted)
@@ -56,7 +56,7 @@ class TunableParameter:
 def described(
     what: str, lower: float | None = None, upper: float | None = None, *, fixed: bool = False
 ) -> ParameterDescriptor:
-    """Return a descriptor with a range for floats, or none."""
+    """Return a parameter's descriptor, with a range of floats if given."""
     ranges = []
     if lower is not None and upper is not None:
         ranges = [FloatingPointRange(from_value=float(lower), to_value=float(upper), step=0.0)]
@@ -64,7 +64,7 @@ def described(
 
 
 def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
-    """Return a descriptor with a range for integers."""
+    """Return a parameter's descriptor with a range of integers."""
     ranges = [IntegerRange(from_value=lower, to_value=upper, step=1)]
     return ParameterDescriptor(description=what, integer_range=ranges)
 
@@ -77,14 +77,14 @@ ALLOWED = 'allowed_publishers'
 
 
 def check_at_rest(values: Mapping[str, Any]) -> None:
-    """Raise BadConfig where one of these parameters cannot change while the monitor is active."""
+    """Raise BadConfig where a parameter cannot change while the monitor is active."""
     fixed = [name for name in AT_REST if name in values]
     if fixed:
         raise BadConfig(f'{fixed[0]}: cannot change while active: deactivate first')
 
 
 def check_locked(values: Mapping[str, Any], tunables: Sequence[TunableParameter]) -> None:
-    """Raise BadConfig where one of these parameters decides what is told: all but the load."""
+    """Raise BadConfig where a parameter decides what is reported: all but the load's are locked."""
     locked = {tunable.name for tunable in tunables if tunable.name not in FREE} | {ALLOWED}
     found = [name for name in values if name in locked]
     if found:
@@ -92,7 +92,7 @@ def check_locked(values: Mapping[str, Any], tunables: Sequence[TunableParameter]
 
 
 def declare_all(node: Node) -> None:
-    """Declare what a monitor can be told before it knows its robot."""
+    """Declare the parameters that exist before the robot's files are read."""
     declare = node.declare_parameter
     declare('config', 'packbot', described('YAML file, or the name of one that ships'))
     declare('urdf', '', described('URDF in place of the one the YAML names'))
@@ -111,7 +111,7 @@ def declare_all(node: Node) -> None:
 
 
 def knobs_of(settings: Settings) -> tuple[TunableParameter, ...]:
-    """Return the parameters of a robot."""
+    """Return the parameters of a robot that can change at run time."""
     torque = tuple(_torque_knob(settings, j) for j in range(len(settings.robot.joint_names)))
     return (*(_field_knob(of) for of in RANGES if of.live), *torque, *_CHOICES)
 
@@ -212,7 +212,7 @@ def unknown(names: Sequence[str], tunables: Sequence[TunableParameter]) -> list[
 def changed(
     settings: Settings, tunables: Sequence[TunableParameter], values: Mapping[str, Any]
 ) -> Settings:
-    """Return settings with parameters changed; BadConfig names the one that cannot be taken.
+    """Return settings with parameters changed. Raises BadConfig naming the one refused.
 
     A value that is what it was changes nothing, so that no digit is lost in a unit's conversion.
     """

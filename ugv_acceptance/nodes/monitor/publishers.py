@@ -1,4 +1,4 @@
-"""The monitor's publishers, conversions to messages, and markers."""
+"""The monitor's publishers: conversion of results to messages, and RViz markers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +33,7 @@ _NS = 1_000_000_000
 
 
 def key_values(values: Mapping[str, object]) -> list[KeyValue]:
-    """Return values as texts; floats with six digits."""
+    """Return values as KeyValue messages; floats with six digits."""
     return [
         KeyValue(key=key, value=f'{value:.6g}' if isinstance(value, float) else str(value))
         for key, value in values.items()
@@ -41,7 +41,7 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 
 def status_message(status: Status, name: str, hardware_id: str) -> DiagnosticStatus:
-    """Return a status as a message; `name` comes before the status's own name."""
+    """Return a status as a DiagnosticStatus; `name` is put before the status's own name."""
     full = f'{name}: {status.name}' if status.name else name
     return DiagnosticStatus(
         level=bytes([status.level]),
@@ -71,7 +71,7 @@ MARGIN_TOPICS = ('~/static_torque', '~/torque_margin', '~/stability')
 
 
 class StatusOutput:
-    """Verdict, alerts and diagnostics: there in every state of the lifecycle, never silent."""
+    """Publishes verdict, alerts and diagnostics, in every state of the lifecycle."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -82,7 +82,7 @@ class StatusOutput:
         self._diagnostics = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     def verdict(self, status: Status) -> None:
-        """Publish the verdict; who comes later gets the last one."""
+        """Publish the verdict, latched: a late subscriber gets the last one."""
         self._verdict.publish(status_message(status, self.name, self.hardware_id))
 
     def alerts(self, statuses: Sequence[Status]) -> DiagnosticArray:
@@ -92,7 +92,7 @@ class StatusOutput:
         return message
 
     def diagnostics(self, statuses: Sequence[Status]) -> None:
-        """Publish the state of everything."""
+        """Publish the state of all parts as diagnostics."""
         self._diagnostics.publish(self._array(statuses))
 
     def _array(self, statuses: Sequence[Status]) -> DiagnosticArray:
@@ -101,7 +101,7 @@ class StatusOutput:
 
 
 class MarginOutput:
-    """The three margin topics, at most `rate` times a second (0: every message)."""
+    """Publishes the three margin topics, at most `rate` times a second (0: every message)."""
 
     def __init__(self, node: Node, settings: Settings) -> None:
         self._node = node
@@ -116,7 +116,7 @@ class MarginOutput:
         self.limits = settings.limits.torque
 
     def look_for_listeners(self) -> None:
-        """See which topics have subscribers; the others are not made."""
+        """Update which topics have subscribers; messages of the others are not built."""
         torque, margin, tip = (p.get_subscription_count() > 0 for p in self._publishers)
         self._wanted = (torque, margin, tip)
         if not any(self._wanted):
@@ -125,7 +125,7 @@ class MarginOutput:
             self._due = 0
 
     def publish(self, stamp: int, margins: Margins) -> None:
-        """Publish the margins of a message with this header stamp (ns), if it is time to."""
+        """Publish margins with a header stamp (ns), unless the last are too recent."""
         if margins.time < self._due:
             return
         late = margins.time - self._due > self.period
@@ -143,7 +143,7 @@ class MarginOutput:
             self._publishers[2].publish(self._sides.fill(stamp, tuple(angle), tuple(moment)))
 
     def destroy(self) -> None:
-        """Take the topics away."""
+        """Destroy the publishers."""
         for publisher in self._publishers:
             self._node.destroy_publisher(publisher)
 

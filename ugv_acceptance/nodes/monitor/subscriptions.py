@@ -1,4 +1,4 @@
-"""The monitor's subscriptions: serialised messages into the session, and who publishes."""
+"""The monitor's subscriptions: passes serialised messages to the session; watches publishers."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -37,7 +37,7 @@ _OPPOSED = 5
 
 
 def qos_of(topic: Topic, depth: int) -> QoSProfile:
-    """Return the QoS of an input: no deadline, for publishers without one would not match."""
+    """Return the QoS of an input; no deadline, which would exclude publishers without one."""
     return QoSProfile(
         depth=max(depth, topic.depth),
         reliability=_RELIABILITY[topic.reliability],
@@ -48,7 +48,7 @@ def qos_of(topic: Topic, depth: int) -> QoSProfile:
 class Inputs:
     """The subscriptions of an active monitor. `publishers` are the nodes that publish each input.
 
-    `voices` tells them apart: a driver that was started again is one node.
+    `voices` tells them apart: a driver that was restarted counts as one node.
     """
 
     def __init__(self, node: Node, topics: Topics, session: Session, depth: int) -> None:
@@ -102,7 +102,7 @@ class Inputs:
         )
 
     def _look_soon(self) -> None:
-        """Look for publishers every now and then for a second: one has come or gone."""
+        """Look for publishers several times in the next second, because one has come or gone."""
         self._looks = 0
         self._soon.reset()
 
@@ -116,7 +116,7 @@ class Inputs:
             self._session.fail('publishers', error)
 
     def look_around(self, allowed: Sequence[str]) -> None:
-        """See who publishes the inputs, and which faults are over. To be called once a second."""
+        """Update publishers, and clear faults that are over; to be called once a second."""
         self._allowed = frozenset(node for node in allowed if node)
         now, faults = self._session.clock.now(), self._session.faults
         self._see_publishers(now)
@@ -149,7 +149,7 @@ class Inputs:
             self._tell(now, 'FOREIGN_PUBLISHER', name, foreign, 1.0)
 
     def _nameless(self, name: str, now: int, nodes: Sequence[str]) -> bool:
-        """Return whether to wait for the name of a node, which comes a little later."""
+        """Return whether to wait for a node's name, which DDS delivers a little later."""
         if not any(_UNKNOWN in node for node in nodes):
             self._unnamed.pop(name, None)
             return False
@@ -169,7 +169,7 @@ class Inputs:
             self._session.faults.clear(now, 'NO_CLOCK', 'clock')
 
     def _look_at_efforts(self, now: int) -> None:
-        """Name the joints whose effort was opposed at every look of the last seconds."""
+        """Report joints whose effort had the opposite sign at every look of the last seconds."""
         margins, evaluator = self._session.evaluator.margins, self._session.evaluator
         if margins is None:
             return
@@ -180,7 +180,7 @@ class Inputs:
             self._tell(now, 'EFFORT_SIGN', name, told, 1.0)
 
     def destroy(self) -> None:
-        """Stop listening."""
+        """Unsubscribe from all inputs."""
         self._node.destroy_timer(self._soon)
         for subscription in self.subscriptions.values():
             self._node.destroy_subscription(subscription)
@@ -188,7 +188,7 @@ class Inputs:
 
 
 def numbered(take: Callable[[bytes], None], voices: Voices) -> Callable[..., None]:
-    """Return a subscription's callback that lets `voices` hear the number of each message."""
+    """Return a subscription's callback that gives `voices` the number of each message."""
     hear = voices.hear
 
     # An executor hands message and information on as two arguments, the events executor as a pair.
