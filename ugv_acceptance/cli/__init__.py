@@ -1,6 +1,9 @@
-"""The command line, `ugv-acceptance VERB`: one module a verb, each thin: parse, call, print.
+"""The command line, `ugv-acceptance VERB`: one thin module per verb that parses, calls and prints.
 
-A verb's module imports what it needs inside its function, so that --help and completion are quick.
+In: options and paths as texts, which each verb checks and converts. Out: text, files and the exit
+code; every file passes `outputs.py`, which keeps it from replacing an input. The work is done by
+the other rooms. A verb's module imports what it needs inside its function, so that --help and
+completion are quick. Read `evaluate.py` first, as the pattern of a verb.
 """
 
 import errno
@@ -68,7 +71,7 @@ def _options(
 
 
 def main() -> None:
-    """Run the command line; an error a user can act on is one line and exit code 2."""
+    """Run the command line; an error the user can act on gives one line and exit code 2."""
     with ended_by_signals() as told:
         for verb in VERBS:
             module = import_module(f'ugv_acceptance.cli.{verb.replace("-", "_")}')
@@ -88,7 +91,7 @@ def main() -> None:
 
 
 def _sentence(error: Exception) -> str:
-    """Return what a user is told of an error that he can act on; empty for others."""
+    """Return the message of an error that the user can act on; empty for other errors."""
     if isinstance(error, OSError) and error.errno in NO_ROOM:
         where = f'{error.filename}: ' if error.filename else ''
         return f'{where}cannot be written: {error.strerror}'

@@ -1,4 +1,4 @@
-"""`ugv-acceptance campaign`: many recorded runs to one statement of reliability."""
+"""`ugv-acceptance campaign`: judges many recorded runs and states their reliability."""
 
 import sys
 import time
@@ -29,7 +29,7 @@ _MOST_BROKEN = 8
 
 
 def print_campaign(said: Json, out: Path, console: Console | None = None) -> None:
-    """Print the statement of a campaign."""
+    """Print the statement of a campaign, and where its files are."""
     console = console or Console(highlight=False)
     table = Table(box=None, pad_edge=False, padding=(0, 2), show_header=False)
     for what, text in lines(said):
@@ -46,7 +46,7 @@ def print_campaign(said: Json, out: Path, console: Console | None = None) -> Non
 
 
 def lines(said: Json) -> list[tuple[str, str]]:
-    """Return the statement as pairs of what and how much."""
+    """Return the statement as pairs of a name and a value."""
     runs, share = said['runs'], f'{said["confidence"]:.0%}'
     hours, failed = said['hours'], said['failures']
     verdicts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS)
@@ -87,7 +87,7 @@ def lines(said: Json) -> list[tuple[str, str]]:
 
 
 def mtbf_text(found: Json, share: str) -> str:
-    """Return an MTBF with its bounds."""
+    """Return an MTBF with its bounds as text."""
     value = 'no failure' if found['value'] is None else hours_text(found['value'])
     high = 'no upper bound' if found['high'] is None else hours_text(found['high'])
     return (
@@ -97,13 +97,13 @@ def mtbf_text(found: Json, share: str) -> str:
 
 
 def interval_percent(found: Json) -> str:
-    """Return a share with its bounds."""
+    """Return a share with its bounds as text in percent."""
     value = 'unknown' if found['value'] is None else f'{found["value"]:.1%}'
     return f'{value}, {found["low"]:.1%} to {found["high"]:.1%}'
 
 
 def trend_text(found: Json) -> str:
-    """Return whether failures grow rarer."""
+    """Return whether failures become rarer, as text."""
     law = found['power_law']
     if law is None:
         return 'fewer than 3 failures: no trend'
@@ -115,7 +115,7 @@ def trend_text(found: Json) -> str:
 
 
 def endurance_text(found: Json, share: str) -> str:
-    """Return what the longest run shows by itself."""
+    """Return the MTBF that the longest run demonstrates by itself, as text."""
     return (
         f'{hours_text(found["hours"])} with {found["failures"]} failures alone shows MTBF'
         f' >= {hours_text(found["demonstrated_h"])} at {share}'
@@ -123,7 +123,7 @@ def endurance_text(found: Json, share: str) -> str:
 
 
 def requirement_text(found: Json, share: str) -> str:
-    """Return whether an MTBF is shown, and what is missing."""
+    """Return whether the required MTBF is demonstrated, and the hours missing, as text."""
     start = f'{MARKS[found["verdict"]]} MTBF {found["mtbf_h"]:g} h at {share}'
     words = {'PASS': 'demonstrated', 'FAIL': 'excluded', 'INCONCLUSIVE': 'not demonstrated'}
     text = f'{start}: {words[found["verdict"]]}'
@@ -136,7 +136,7 @@ def requirement_text(found: Json, share: str) -> str:
 
 
 def comparison_lines(found: Json, confidence: float) -> list[tuple[str, str]]:
-    """Return two groups beside each other, and whether a difference was shown."""
+    """Return the two groups side by side, and whether a difference was shown."""
     first, second = found['groups']
     rows = [('comparison', _group_text(first)), ('', _group_text(second))]
     order = f'{second["name"]} over {first["name"]}'
@@ -157,7 +157,7 @@ def _group_text(group: Json) -> str:
 
 
 def print_effort(effort: 'Effort', runs: int, seconds: float) -> None:
-    """Print how fast the runs were judged, and how many were found judged."""
+    """Print how fast the runs were judged, and how many already had a result."""
     rate = 3600.0 / max(seconds, 1e-9)
     text = f'    {effort.judged} of {runs} judged anew in {seconds:.1f} s'
     if effort.judged:
@@ -263,7 +263,7 @@ def campaign(
 def exit_code(said: dict[str, Any]) -> int:
     """Return the exit code: that of the requirement if there is one, else of the worst run.
 
-    That of INCONCLUSIVE where nothing could be stated.
+    The code of INCONCLUSIVE where nothing could be stated.
     """
     if said['no_statement'] is not None:
         return EXIT['INCONCLUSIVE']
@@ -274,13 +274,13 @@ def exit_code(said: dict[str, Any]) -> int:
 
 
 def check_requirement(required: float | None) -> None:
-    """Raise AcceptanceError where the MTBF to demonstrate is no time."""
+    """Raise AcceptanceError where the MTBF to demonstrate is not a positive number of hours."""
     if required is not None and not 0.0 < required < float('inf'):
         raise AcceptanceError(f'--require-mtbf: expected hours above 0, got {required:g}')
 
 
 def groups_from(compare: list[str]) -> tuple[tuple[str, str], ...]:
-    """Return the two groups (name, pattern). AcceptanceError where there are not two of them."""
+    """Return the groups (name, pattern): two or none. Raises AcceptanceError for anything else."""
     groups = tuple((name, pattern) for name, _, pattern in (c.partition('=') for c in compare))
     if any(not name or not pattern for name, pattern in groups):
         raise AcceptanceError('--compare: expected NAME=PATTERN, such as new=*/fw2/*')
@@ -292,7 +292,7 @@ def groups_from(compare: list[str]) -> tuple[tuple[str, str], ...]:
 def terms_of(
     config: Path | None, urdf: Path | None, criteria: Path | None
 ) -> 'tuple[Brief, Origin]':
-    """Return by what the runs are judged, and its names and hashes."""
+    """Return the configuration and criteria that runs are judged by, with names and hashes."""
     from ugv_acceptance.campaign.statement import Origin
     from ugv_acceptance.campaign.work import Brief
     from ugv_acceptance.config import load
@@ -306,7 +306,7 @@ def terms_of(
 
 
 def write(out: Path, said: dict[str, Any]) -> None:
-    """Write campaign.json and campaign.html."""
+    """Write campaign.json and campaign.html into the folder."""
     from ugv_acceptance.bag.atomic_files import write_json, write_text
     from ugv_acceptance.report.campaign import campaign_page
 
@@ -316,7 +316,7 @@ def write(out: Path, said: dict[str, Any]) -> None:
 
 @contextmanager
 def progress_bar(total: int) -> 'Iterator[Callable[[Done], None]]':
-    """Show how many runs are ready, and how many not judged, where a person is watching."""
+    """Show how many runs are done and how many not judged, if the output is a terminal."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 

@@ -1,4 +1,4 @@
-"""`ugv-acceptance console [BAG]`: the operator's page, of a recording or of the live robot."""
+"""`ugv-acceptance console [BAG]`: serves the operator's page, of a recording or a live robot."""
 
 from typing import Annotated
 

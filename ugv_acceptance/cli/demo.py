@@ -1,4 +1,4 @@
-"""`ugv-acceptance demo`: a recorded run through real DDS into the monitor, then its verdict."""
+"""`ugv-acceptance demo`: plays a recording through real DDS into the monitor, then evaluates it."""
 
 import os
 import random
@@ -26,9 +26,9 @@ WORKED, BROKEN = 0, 1
 
 
 def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
-    """Run the demo, with the console's `page` or without; return its exit code.
+    """Run the demo, with or without the console's `page`; return its exit code.
 
-    That is 0 where live and recording were both judged.
+    It is 0 where both the live run and the recording were judged.
     """
     from ugv_acceptance.cli.result_text import print_result
     from ugv_acceptance.offline.evaluate import evaluate
@@ -60,7 +60,7 @@ def free_domain() -> int:
 
 
 def find(bag: Path | None) -> Path:
-    """Return the recording to play: the one given, or the one that ships."""
+    """Return the recording to play: the given one, or the one that ships."""
     if bag is not None:
         return bag
     from ugv_acceptance.config import load
@@ -94,9 +94,9 @@ def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Rai
 
 @contextmanager
 def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
-    """Run a verb in a process that ends when this one does; its output is to be read.
+    """Run a verb in a process that ends when this one does; its output can be read.
 
-    It has a session of its own: a Ctrl-C is for this process, which ends it.
+    It has a session of its own: Ctrl-C reaches only this process, which ends the verb.
     """
     # The ROS wheels set this for their own children, whom it makes load the wrong libraries.
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
@@ -113,7 +113,7 @@ def verb(*words: str) -> Iterator['subprocess.Popen[str]']:
 
 
 def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
-    """Say where the console is; where it cannot be had, it said why, and the demo goes on."""
+    """Print the console's address, or why there is no console; the demo goes on in both cases."""
     said = next(iter(process.stdout or ()), '').split()
     if len(said) > 2:
         text = f'Open {said[2]} in a browser on this machine to see it as an operator does.'
@@ -121,7 +121,7 @@ def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
 
 
 def conclude(console: Console, seen: 'Raised', played: bool, result: dict[str, Any]) -> int:
-    """Say what came of it."""
+    """Print the results of the live run and of the evaluation; return the exit code."""
     console.rule('3. What came of it')
     recorded = Counter((a['code'], a['subject'], a['level']) for a in result['alerts'])
     both, only_live, only_bag = seen & recorded, seen - recorded, recorded - seen

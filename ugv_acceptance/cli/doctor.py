@@ -1,4 +1,4 @@
-"""`ugv-acceptance doctor`: checks a set-up and says what to do."""
+"""`ugv-acceptance doctor`: checks a ROS set-up and says what to do."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,7 +19,7 @@ _NO_ROS = (
 
 
 def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[str]) -> int:
-    """Print what is found and return the exit code: 1 where something fails."""
+    """Print the findings and return the exit code: 1 if any has failed."""
     from ugv_acceptance.config import load
 
     console = Console(highlight=False)

@@ -1,4 +1,4 @@
-"""`ugv-acceptance evaluate`: judge recorded runs and print what a person reads in ten seconds."""
+"""`ugv-acceptance evaluate`: judges recorded runs and prints the verdict with its reasons."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -116,7 +116,7 @@ def evaluate(
 
 
 def worst(codes: list[int]) -> int:
-    """Return the exit code of several bags: a failure, then bad input, then inconclusive."""
+    """Return the exit code of several bags: of a FAIL, else of bad input, else of INCONCLUSIVE."""
     return next((code for code in (1, BAD_INPUT, 3) if code in codes), 0)
 
 

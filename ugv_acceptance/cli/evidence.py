@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Papers:
-    """The files of one recording a user asked for, and the criteria it is judged by."""
+    """The output files that the user asked for, and the criteria a recording is judged by."""
 
     report: Path | None = None
     pdf: Path | None = None
@@ -38,7 +38,7 @@ class Papers:
         return self.report is not None or self.pdf is not None
 
     def outputs(self, recordings: int) -> list['Output']:
-        """Return the files to write. AcceptanceError where one is of one run, but asked of more."""
+        """Return the files to write. Raises AcceptanceError if one fits a single run only."""
         from ugv_acceptance.cli import output_kinds as kinds
         from ugv_acceptance.cli.outputs import Output
 
@@ -64,7 +64,7 @@ def evaluate_files(
     compare_effort: bool = False,
     identity: 'Mapping[str, str] | None' = None,
 ) -> 'Evaluation':
-    """Evaluate one recording, write its papers on the way and after, and return what was found."""
+    """Evaluate one recording, write the files asked for, and return the evaluation."""
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.evaluation.downsampling import StripRecorder
@@ -96,7 +96,7 @@ def evaluate_files(
 
 
 def annotate(path: Path, evaluation: 'Evaluation') -> None:
-    """Write the recording with its judgement beside it, for viewers."""
+    """Write a copy of the recording with margins, alerts and verdict added, for viewers."""
     from ugv_acceptance.bag.annotated import write_annotated
     from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.offline.annotation import Annotation
@@ -125,7 +125,7 @@ def write_papers(
 
 
 def _propose(path: Path, result: Json) -> None:
-    """Write criteria that a good run meets; of any other say so and go on: its verdict stands."""
+    """Write criteria that a good run meets; for any other print why not, the verdict stands."""
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.config.seal import sealed
     from ugv_acceptance.evaluation.criteria.proposal import proposed_criteria
@@ -138,7 +138,7 @@ def _propose(path: Path, result: Json) -> None:
 
 
 def _write_pdf(path: Path, html: str) -> None:
-    """Write the PDF; without WeasyPrint say so and go on: the verdict does not depend on it."""
+    """Write the PDF; without WeasyPrint print that and go on: the verdict does not need it."""
     from ugv_acceptance.bag.atomic_files import write_bytes
     from ugv_acceptance.report.acceptance import pdf_of
 

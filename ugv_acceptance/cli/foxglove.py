@@ -1,4 +1,4 @@
-"""`ugv-acceptance foxglove`: the live topics for Foxglove and Lichtblick, read only."""
+"""`ugv-acceptance foxglove`: serves the live topics to Foxglove and Lichtblick, read only."""
 
 from typing import Annotated
 

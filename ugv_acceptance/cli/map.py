@@ -1,4 +1,4 @@
-"""`ugv-acceptance map`: torque, tilt left, payload or pull over two joints."""
+"""`ugv-acceptance map`: draws torque, tilt left, payload or pull over two joints."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -83,7 +83,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
 
 
 def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':
-    """Return where a recorded run went: positions (n, 2) of the two joints (rad, m)."""
+    """Return the path of a recorded run: positions (n, 2) of the two joints (rad, m)."""
     import numpy as np
 
     from ugv_acceptance import BadBag

@@ -1,4 +1,4 @@
-"""What the options of `map` mean: axes, posture, gravity, limits, levels."""
+"""Converts the options of `map`: axes, posture, gravity, limits, levels."""
 
 import math
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from ugv_acceptance.type_aliases import Floats
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """The options as they were typed."""
+    """The options of `map` as they were typed."""
 
     x: str
     y: str
@@ -34,7 +34,7 @@ class Wanted:
 
 
 def scene_from(loaded: Config, wanted: Wanted) -> Scene:
-    """Return what is to be mapped. Raises BadConfig naming the option that does not fit."""
+    """Return the assumptions of the map. Raises BadConfig naming the option that is wrong."""
     robot = loaded.settings.robot
     first, x = _axis(robot, '--x', wanted.x, wanted.steps, (0.0, math.pi))
     second, y = _axis(robot, '--y', wanted.y, wanted.steps, (0.0, 2.0 * math.pi))
@@ -106,7 +106,7 @@ _LEVELS = {'rollover': ('angle', 180.0 / math.pi), 'payload': ('mass', 1.0), 'dr
 
 
 def with_levels(data: MapData, caution: str, failure: str) -> MapData:
-    """Return the map with its thresholds replaced where given."""
+    """Return the map with its thresholds replaced where the user gave others."""
     levels = Levels(
         _level(data, '--caution', caution, data.levels.caution),
         _level(data, '--failure', failure, data.levels.failure),
@@ -120,7 +120,7 @@ def with_levels(data: MapData, caution: str, failure: str) -> MapData:
 
 
 def _level(data: MapData, option: str, text: str, usual: float) -> float:
-    """Return a threshold in the terms of the map's margin."""
+    """Return a threshold converted to the map's margin. Raises BadConfig."""
     if not text:
         return usual
     if data.kind in _LEVELS:

@@ -1,4 +1,4 @@
-"""`ugv-acceptance model`: what the tool believes the robot is, and its margins in one posture."""
+"""`ugv-acceptance model`: shows the robot as its files describe it, and margins in one posture."""
 
 import math
 from pathlib import Path
@@ -19,7 +19,7 @@ _MANY = 10.0
 
 
 def print_tables(description: Values) -> None:
-    """Print what `describe` returned."""
+    """Print a description returned by `describe` as tables."""
     console = Console(highlight=False, soft_wrap=False)
     _head(console, description)
     console.print(_links(description))
@@ -119,7 +119,7 @@ def _print_payload(console: Console, d: Values) -> None:
 
 
 def _boundless(d: Values) -> bool:
-    """Return whether joints hold the payload here, and any other a person would try."""
+    """Return whether the torque limits allow far more payload here than anyone would load."""
     largest, carried = d['payload']['largest_kg'], d['payload']['mass_kg']
     own = sum(link['mass_kg'] for link in d['links'])
     return largest is None or bool(largest > max(carried, _MANY * own))

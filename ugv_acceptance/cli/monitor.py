@@ -1,4 +1,4 @@
-"""`ugv-acceptance monitor`: the live monitor from a plain shell."""
+"""`ugv-acceptance monitor`: runs the live monitor from a plain shell."""
 
 import math
 import time
@@ -32,7 +32,7 @@ _SHOWN = 8
 
 
 class Lines:
-    """Prints every change of an alert; the verdict when its level changes and every few seconds."""
+    """Prints every change of an alert, and the verdict when it changes and every few seconds."""
 
     def __init__(self, console: Console, every: float) -> None:
         self._console = console
@@ -43,7 +43,7 @@ class Lines:
         self.raised: Raised = Counter()
 
     def __call__(self, kind: str, status: 'Status') -> None:
-        """Take what the monitor says."""
+        """Print an alert or a verdict of the monitor."""
         now = time.monotonic()
         if kind == 'alert':
             count(self.raised, status)
@@ -58,7 +58,7 @@ class Lines:
 
 
 class Panel:
-    """A table of margins that is drawn anew a few times a second, alerts in lines under it."""
+    """A table of margins redrawn a few times a second, with alerts as lines below it."""
 
     def __init__(self, console: Console) -> None:
         self._live = Live(console=console, refresh_per_second=4, auto_refresh=False)
@@ -74,7 +74,7 @@ class Panel:
         self._live.stop()
 
     def __call__(self, kind: str, status: 'Status') -> None:
-        """Take what the monitor says."""
+        """Keep an alert or a verdict of the monitor for the next drawing."""
         text = f'{mark(status.level)}  {escape(status.message)}'
         if kind == 'alert':
             count(self.raised, status)
@@ -84,7 +84,7 @@ class Panel:
             self._verdict = text
 
     def draw(self, monitor: 'Monitor') -> None:
-        """Show the monitor as it is now."""
+        """Draw the monitor's present state."""
         rows: list[RenderableType] = [
             self._verdict,
             table_of(monitor),
@@ -95,19 +95,19 @@ class Panel:
 
 
 def count(raised: Raised, status: 'Status') -> None:
-    """Count an alert where it was raised."""
+    """Count an alert if the status says that it was raised."""
     said = status.values
     if said['state'] == 'raised':
         raised[str(said['code']), str(said['subject']), str(said['level'])] += 1
 
 
 def mark(level: int) -> str:
-    """Return a level as coloured text of fixed width: colour is never the only sign."""
+    """Return a level as coloured text of fixed width, readable without colour too."""
     return f'[{COLOURS[level]}]{LEVELS[level]:<5}[/]'
 
 
 def table_of(monitor: 'Monitor') -> Table:
-    """Return the newest margins of a monitor."""
+    """Return the newest margins of a monitor as a table."""
     table = Table(box=None, pad_edge=False, padding=(0, 2))
     for heading in ('margin', 'now', 'limit', 'left'):
         table.add_column(heading, justify='left' if heading == 'margin' else 'right')
@@ -138,9 +138,9 @@ def watch(
     every: float = 5.0,
     until: Callable[[], bool] | None = None,
 ) -> Raised:
-    """Run the monitor in this process until it is interrupted; return what alerts it raised.
+    """Run the monitor in this process until it is interrupted; return the alerts it raised.
 
-    With `until` an interrupt comes too early, and ends the process.
+    With `until`, it ends when that is true; an interrupt before that ends the process.
     """
     from ugv_acceptance.nodes.executor import end, ros, spin
     from ugv_acceptance.nodes.monitor.node import build

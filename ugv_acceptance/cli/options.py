@@ -1,4 +1,4 @@
-"""Options that several verbs share, and what stands behind --ros-args."""
+"""Options that several verbs share, and the arguments after --ros-args."""
 
 import typer
 
@@ -7,7 +7,7 @@ CONTEXT = {'allow_extra_args': True, 'ignore_unknown_options': True}
 
 
 def ros_arguments(context: typer.Context) -> list[str]:
-    """Return the arguments for ROS; a usage error where one does not stand behind --ros-args."""
+    """Return the arguments for ROS; a usage error for any that is not after --ros-args."""
     if context.args and context.args[0] != '--ros-args':
         raise typer.BadParameter(
             f'got {context.args[0]!r}, which is no option; what is for ROS stands behind --ros-args'

@@ -1,4 +1,4 @@
-"""The kinds of files the verbs write: endings, and how one of ours is recognised."""
+"""The kinds of files the verbs write: their endings, and how a file of ours is recognised."""
 
 import json
 import re
@@ -18,10 +18,11 @@ _HEX = re.compile(r'[0-9a-f]{64}\.json')
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of file: its format, its endings, whether a file is one we wrote, and what else it is.
+    """A kind of file: its format, its endings, and how to tell whether a file is one we wrote.
 
-    A file that is one we wrote may be replaced without a word; another only with --overwrite.
-    `by_ending`: the ending says what is written, so a pipe, which has none, will not do.
+    A file that we wrote may be replaced without asking; another only with --overwrite.
+    `else_it_is` describes such a file. `by_ending`: the ending says what is written, so a pipe,
+    which has none, will not do.
     """
 
     format: str
@@ -33,7 +34,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class FolderKind:
-    """A kind of folder: what it is, the files written into it, and whether one is ours.
+    """A kind of folder: what it is, the files written into it, and how to recognise one of ours.
 
     `files` are patterns. `may_fill`: with --overwrite it may also be one that is not ours.
     """
@@ -54,7 +55,7 @@ def _whole(path: Path) -> bytes:
 
 
 def _starts(pattern: bytes) -> Callable[[Path], bool]:
-    """Return the test for a file whose beginning matches."""
+    """Return a test whether a file's beginning matches a pattern."""
     found = re.compile(pattern, re.DOTALL)
     return lambda path: found.match(_head(path)) is not None
 
@@ -81,7 +82,7 @@ def _one_result(result: dict[str, Any]) -> bool:
 
 
 def _is_pdf(path: Path) -> bool:
-    """Whether a PDF is a report: its outline, in a packed part of it, tells."""
+    """Whether a PDF is a report of ours, by its outline in a compressed part."""
     content = _whole(path)
     if not content.startswith(b'%PDF-'):
         return False
@@ -106,7 +107,7 @@ def _is_parquet(path: Path) -> bool:
 
 
 def _unedited(first_line: str) -> Callable[[Path], bool]:
-    """Return the test for a YAML file that begins so and that nobody has edited since."""
+    """Return a test for a YAML file that starts with a line and was not edited since."""
 
     def test(path: Path) -> bool:
         from ugv_acceptance.config.seal import is_sealed
@@ -118,7 +119,7 @@ def _unedited(first_line: str) -> Callable[[Path], bool]:
 
 
 def _is_map(path: Path) -> bool:
-    """Whether a file is a map, as its ending says."""
+    """Whether a file is a map of ours, of the format its ending names."""
     if path.suffix.lower() == '.npz':
         try:
             with zipfile.ZipFile(path) as file:
@@ -137,7 +138,7 @@ _MAPS = {
 
 
 def _is_campaign(path: Path) -> bool:
-    """Whether a folder has our statement or, ended early, nothing but results of runs."""
+    """Whether a folder holds our statement or, if ended early, only results of runs."""
     if (path / 'campaign.json').is_file():
         found = _json(path / 'campaign.json')
         return isinstance(found, dict) and {'version', 'mtbf_h', 'each_run'} <= set(found)

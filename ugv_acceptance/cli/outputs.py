@@ -1,7 +1,7 @@
-"""Guards every output: no input, no other output and no file of others is replaced.
+"""Guards every output: it must not replace an input, another output or somebody else's file.
 
 An output is never an input of the same command, nor another output of it, by whatever name or
-link. What is there already stays, unless it is a file of the same kind that this program wrote, or
+link. An existing file stays, unless it is a file of the same kind that this program wrote, or
 --overwrite is given. All is checked before any work begins.
 """
 
@@ -28,7 +28,7 @@ Overwrite = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """A file or folder that is read, and what it is to a person: 'the recording'."""
+    """A file or folder that is read, and its name for the user, such as 'the recording'."""
 
     what: str
     path: Path
@@ -46,7 +46,7 @@ class Output:
 def inputs_of(
     config: 'Config | None' = None, bags: Iterable[Path] = (), **files: Path | None
 ) -> list[Input]:
-    """Return what a verb reads: a robot's files, recordings with their folders, others by name."""
+    """Return all files a verb reads: the robot's, recordings with their folders, others by name."""
     found = [Input(f'the {name}', path) for name, path in files.items() if path is not None]
     if config is not None:
         found += [Input('the configuration', config.path), Input('the URDF', config.urdf_path)]
@@ -71,7 +71,7 @@ def _parts(bag: Path) -> Iterator[Path]:
 def check_outputs(
     outputs: Sequence[Output], inputs: Sequence[Input], *, overwrite: bool = False
 ) -> None:
-    """Raise AcceptanceError naming option, file and reason where an output must not be written."""
+    """Raise AcceptanceError with option, file and reason if an output must not be written."""
     from ugv_acceptance.bag.atomic_files import check_writable, is_stream
 
     earlier: list[tuple[str, Path]] = []
@@ -105,7 +105,7 @@ def check_folder(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Raise AcceptanceError where a folder must not be made or written into."""
+    """Raise AcceptanceError if a folder must not be made or written into."""
     _check_no_input(option, path, inputs)
     for item in inputs:
         inside = _real(item.path)
@@ -129,7 +129,7 @@ def check_folder(
 
 
 def same(one: Path, other: Path) -> bool:
-    """Return whether two paths are of one file: by spelling, symbolic link or hard link."""
+    """Return whether two paths are the same file: by name, symbolic link or hard link."""
     try:
         return _real(one) == _real(other) or one.samefile(other)
     except OSError:
@@ -147,7 +147,7 @@ def _check_no_input(option: str, path: Path, inputs: Sequence[Input]) -> None:
 
 
 def _ending(output: Output, outputs: Sequence[Output]) -> str:
-    """Return which endings fit, and whose option takes the one that was given."""
+    """Return the endings that fit, and the option for which the given one would fit, as text."""
     path, endings = output.path or Path(), output.kind.endings
     told = ', '.join(endings[:-1]) + ' or ' * (len(endings) > 1) + endings[-1]
     others = (o for o in outputs if path.suffix.lower() in o.kind.endings)
@@ -156,7 +156,7 @@ def _ending(output: Output, outputs: Sequence[Output]) -> str:
 
 
 def _is_empty(path: Path) -> bool:
-    """Return whether there is nothing to lose: no file, or one without content."""
+    """Return whether nothing can be lost: there is no file, or an empty one."""
     return not path.exists() or not path.stat().st_size
 
 

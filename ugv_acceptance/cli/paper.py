@@ -1,4 +1,4 @@
-"""`ugv-acceptance paper`: every number, table and figure of the paper, computed again."""
+"""`ugv-acceptance paper`: recomputes every number, table and figure of the paper."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -73,7 +73,7 @@ def paper(
 
 
 def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
-    """Write the folder; paper.json, by which it is known, comes first."""
+    """Write the page's folder; paper.json comes first, because it marks the folder as ours."""
     import json
 
     from ugv_acceptance.bag.atomic_files import unwritable, write_text

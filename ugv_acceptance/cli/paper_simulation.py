@@ -1,4 +1,4 @@
-"""The simulations of `paper` in MuJoCo: the arm's sweep, and robots that tip or not."""
+"""The MuJoCo simulations of `paper`: the arm's sweep, and robots on a tilting plane."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""`ugv-acceptance plan`: a test plan and an operator's card, derived from the robot's model."""
+"""`ugv-acceptance plan`: derives a test plan and an operator's card from the robot's model."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -75,7 +75,7 @@ def plan(
 
 
 def _ramp(tilt: str) -> float:
-    """Return the tilt (rad) of the ramp. Raises BadConfig where no test has such a ramp."""
+    """Return the tilt (rad) of the ramp. Raises BadConfig for an angle out of range."""
     import math
 
     from ugv_acceptance import BadConfig

@@ -1,4 +1,4 @@
-"""`ugv-acceptance replay`: publish a recording on its topics."""
+"""`ugv-acceptance replay`: publishes a recording on its topics."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

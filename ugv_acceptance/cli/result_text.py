@@ -1,4 +1,4 @@
-"""A result as text in a terminal: the verdict, why, and the worst of each margin."""
+"""Prints a result in a terminal: the verdict, its reasons, and the worst of each margin."""
 
 import os
 import sys
@@ -27,7 +27,7 @@ _SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
 @contextmanager
 def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int], None]]:
-    """Show how far a recording is read (log times, ns), where a person is watching."""
+    """Show how far a recording is read (log times, ns), if the output is a terminal."""
     console = Console(file=stream)
     if not console.is_terminal:  # a disabled bar of older rich still prints an empty line
         yield lambda _: None
@@ -48,7 +48,7 @@ def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int]
 
 @contextmanager
 def while_read() -> Iterator[None]:
-    """Print while somebody reads: a closed pipe (`| head`) changes no exit code."""
+    """Print until the reader closes the pipe (`| head`), which changes no exit code."""
     try:
         yield
         sys.stdout.flush()
@@ -148,7 +148,7 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
 
 
 def _foreign(key: str, source: dict[str, Any]) -> bool:
-    """Return whether joint states came, but none that could be used: none of them had a rate."""
+    """Return whether joint states came but none was usable, as those of another robot."""
     return bool(key == 'joint_states' and source['messages'] > _FEW and not source['rate_hz'])
 
 
@@ -186,7 +186,7 @@ def _print_alerts(result: dict[str, Any], console: Console) -> None:
 
 
 def _print_effort(result: dict[str, Any], console: Console) -> None:
-    """Print plateaus of effort, those of joints that feel a payload most first."""
+    """Print measured effort beside static torque, most payload-sensitive joints first."""
     joints = [(name, plateaus) for name, plateaus in result['effort'].items() if plateaus]
     if not joints:
         console.print('no measured effort at rest to compare')

@@ -1,4 +1,4 @@
-"""`ugv-acceptance risk`: probability that a joint saturates or the robot tips."""
+"""`ugv-acceptance risk`: the probability that a joint saturates or the robot tips."""
 
 from pathlib import Path
 from typing import Annotated
@@ -28,12 +28,13 @@ def risk(
     workers: Annotated[int, typer.Option(min=1, help='Processes, from 4e6 samples on.')] = 2,
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
-    """Draw slope, heading, load, masses, posture and rates at random; count what saturates or tips.
+    """Estimate the probability that a joint saturates or the robot tips, by random sampling.
 
-    Left out, slope is even from 0 to 30 deg, heading any, the payload from 0 to the configured one,
-    rates normal with 7.2 deg/s, masses and centres of gravity as the configuration's `uncertainty`
-    says. Names to vary: slope, heading, JOINT.position, JOINT.rate, JOINT.limit, JOINT.x,
-    LINK.mass, LINK.x, payload.mass, payload.x, and the like with y and z.
+    Slope, heading, load, masses, posture and rates are drawn at random. Without --vary, the slope
+    is uniform from 0 to 30 deg, heading any, the payload from 0 to the configured one, rates normal
+    with a standard deviation of 7.2 deg/s, masses and centres of gravity as the configuration's
+    `uncertainty` says. Names to vary: slope, heading, JOINT.position, JOINT.rate, JOINT.limit,
+    JOINT.x, LINK.mass, LINK.x, payload.mass, payload.x, and the like with y and z.
 
     \b
     Examples:

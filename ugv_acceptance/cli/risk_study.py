@@ -1,4 +1,4 @@
-"""What the options of `risk` mean: what varies and how; its results as text and document."""
+"""Converts the options of `risk` to random variables, and its results to text and JSON."""
 
 import json
 import math
@@ -27,7 +27,7 @@ _CONFIGURED = re.compile(r'(?:cog_)?([xyz])_m|(mass)_kg')
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """A part of a mission: what is drawn, how often it happens, and what was left at its value."""
+    """A phase of a mission: its random variables, how often it happens, and what was not varied."""
 
     name: str
     study: Study
@@ -64,7 +64,7 @@ def phases_from(
 
 
 def doubts(phases: Sequence[Phase]) -> list[str]:
-    """Return a sentence where a payload that is drawn is mostly heavier than its robot."""
+    """Return a warning where a random payload is mostly heavier than its robot."""
     found = []
     for phase in phases:
         spread = phase.study.spreads.get('payload.mass')
@@ -113,7 +113,7 @@ def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: 
 
 
 def _uncertain(config: Config) -> tuple[dict[str, Spread], list[str]]:
-    """Return the configured +/- as even spreads, and the names that cannot be varied."""
+    """Return the configured +/- as uniform distributions, and the names that cannot be varied."""
     robot = config.settings.robot
     known, spreads, left = set(known_names(robot)), {}, []
     for name, size in config.uncertainty:
@@ -129,7 +129,7 @@ def _uncertain(config: Config) -> tuple[dict[str, Spread], list[str]]:
 
 
 def nominal(robot: Robot, key: str) -> float:
-    """Return the robot's own value of a mass (kg) or a coordinate (m): LINK.mass, JOINT.x, ..."""
+    """Return the configured mass (kg) or coordinate (m) of a name: LINK.mass, JOINT.x, ..."""
     owner, _, part = key.rpartition('.')
     if owner == 'payload':
         return robot.payload.mass if part == 'mass' else robot.payload.cog['xyz'.index(part)]
@@ -153,7 +153,7 @@ def _moves_contact(robot: Robot, joint: str) -> bool:
 
 
 def spread_from(robot: Robot, text: str) -> tuple[str, Spread]:
-    """Return name and spread of 'slope=0deg..20deg' or 'payload.mass=4kg+-0.2kg'."""
+    """Return name and distribution of 'slope=0deg..20deg' or 'payload.mass=4kg+-0.2kg'."""
     key, equals, value = text.partition('=')
     if not equals or key not in known_names(robot):
         raise BadConfig(
@@ -189,7 +189,7 @@ _ANGLES = ('slope', 'heading', '.position', '.rate')
 
 
 def phase_lines(phase: Phase, risk: Risk) -> list[str]:
-    """Return what a person reads of one phase."""
+    """Return the results of one phase as lines of text."""
     first = risk.estimates['either']
     lines = [f'{phase.name}: {first.samples:,} samples, seed {risk.seed}, 95 % intervals']
     lines += [
@@ -212,7 +212,7 @@ def phase_lines(phase: Phase, risk: Risk) -> list[str]:
 
 
 def words(name: str, spread: Spread) -> str:
-    """Return a spread in words; angles in degrees."""
+    """Return a distribution as text; angles in degrees."""
     turn = any(name == part or name.endswith(part) for part in _ANGLES)
     low, high = ((math.degrees(x) if turn else x) for x in (spread.low, spread.high))
     unit = ' deg' if turn and not name.endswith('.rate') else ' deg/s' if turn else ''
@@ -222,7 +222,7 @@ def words(name: str, spread: Spread) -> str:
 
 
 def mission_lines(phases: Sequence[Phase], risks: Sequence[Risk]) -> list[str]:
-    """Return the mission's probability: at least one failure in all phases, each so often."""
+    """Return the probability of a failure in the mission, each phase so often, as lines."""
     lines = ['mission: at least one failure, phases independent, 95 % intervals']
     for event, (low, middle, high) in mission_risk(phases, risks).items():
         lines.append(f'  {event:12}{middle:12.6f}   [{low:.6f}, {high:.6f}]')
@@ -232,7 +232,7 @@ def mission_lines(phases: Sequence[Phase], risks: Sequence[Risk]) -> list[str]:
 def mission_risk(
     phases: Sequence[Phase], risks: Sequence[Risk]
 ) -> dict[str, tuple[float, float, float]]:
-    """Return low, best and high probability an event.
+    """Return the low, best and high probability of each event in the whole mission.
 
     Each phase's interval is exact at 1 - 0.05 / phases, so all hold together at 95 % (Bonferroni);
     the mission's probability rises with each phase's.
@@ -252,7 +252,7 @@ def mission_risk(
 
 
 def as_document(phases: Sequence[Phase], risks: Sequence[Risk]) -> dict[str, Any]:
-    """Return everything for JSON."""
+    """Return all results for JSON."""
     return {
         'phases': [
             {

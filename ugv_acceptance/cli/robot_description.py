@@ -1,4 +1,4 @@
-"""A robot in one posture as plain values: what `ugv-acceptance model` shows.
+"""Describes a robot in one posture as plain values, for `ugv-acceptance model`.
 
 Keys end in their unit; an infinite number (no limit, no edge on that side) and NaN are None.
 """
@@ -83,7 +83,7 @@ def posture_from(robot: Robot, text: str) -> list[float]:
 
 
 def payload_from(robot: Robot, text: str) -> Payload:
-    """Return the payload of a mass such as '4' (kg) or '10 lb'; the robot's own where left out."""
+    """Return the payload for a mass such as '4' (kg) or '10 lb'; if empty, the robot's own."""
     mass = quantity(text, 'mass', '--payload') if text else robot.payload.mass
     if mass < 0.0:
         raise BadConfig(f'--payload: expected a mass >= 0 kg, got {mass:g}')
@@ -91,7 +91,7 @@ def payload_from(robot: Robot, text: str) -> Payload:
 
 
 def payload_doubts(robot: Robot, text: str, option: str = '--payload') -> list[str]:
-    """Return a sentence where a mass that was written is more than the robot's; else nothing."""
+    """Return a warning where the mass given is more than the robot's own; else nothing."""
     mass = quantity(text, 'mass', option) if text else 0.0
     if mass <= robot.mass:
         return []
@@ -223,7 +223,7 @@ def _outside(robot: Robot, q: list[float]) -> list[str]:
 
 
 def _overload(config: Config, load: Payload) -> list[str]:
-    """Return a sentence for each limit that cannot hold the payload in every posture."""
+    """Return a sentence for each torque limit that cannot hold the payload in every posture."""
     robot, limits = config.settings.robot, config.settings.limits.torque
     return [
         f'{worst.joint}: limit {limit:g} {worst.unit} cannot hold {load.mass:g} kg'

@@ -1,4 +1,4 @@
-"""`ugv-acceptance run`: a test plan done on a simulated or a real robot, recorded and judged."""
+"""`ugv-acceptance run`: carries out a test plan on a simulated or a real robot and judges it."""
 
 from pathlib import Path
 from typing import Annotated
@@ -55,7 +55,7 @@ def run(
         typer.Option(help='A fault of the simulated robot as of simulate, angles as 30deg.'),
     ] = None,
 ) -> None:
-    """Do a plan's steps: move, hold, record, and judge each by its recording.
+    """Carry out a plan's steps: move, hold, record, and judge each by its recording.
 
     Motion freezes at any alert a step does not expect, and when the monitor falls silent. The exit
     code is 0 for PASS, 1 for FAIL, 2 for bad input, 3 for INCONCLUSIVE or interrupted.

@@ -1,4 +1,4 @@
-"""Sets `run` up: robot, monitor, runner, the folder of the run, and what is said meanwhile."""
+"""Sets `run` up: robot, monitor, runner and folder, and prints its progress."""
 
 import fcntl
 import math
@@ -35,7 +35,7 @@ BESIDES = 6.0
 
 @dataclass(slots=True)
 class Steps:
-    """Shows the steps as they are done; `moved` takes the time (s) that passes in the run."""
+    """Shows the progress of the steps; `moved` takes the time (s) that passes in the run."""
 
     console: Console
     plan: 'Plan'
@@ -64,21 +64,21 @@ class Steps:
         self._task = self.bar.add_task('starting', total=sum(self._planned), step='')
 
     def begin(self, step: 'Step') -> None:
-        """Show the step that is done now."""
+        """Show which step is done now."""
         self._number += 1
         self._began = self._now
         text = f'step {self._number} of {len(self.waiting)}'
         self.bar.update(self._task, description=text, step=escape(step.id))
 
     def moved(self, now: float) -> None:
-        """Take the time (s) of the run."""
+        """Advance the display to a time (s) of the run."""
         self._now = now
         if self._number:
             before, planned = self._planned[: self._number - 1], self._planned[self._number - 1]
             self.bar.update(self._task, completed=sum(before) + min(now - self._began, planned))
 
     def end(self, result: Mapping[str, Any]) -> None:
-        """Print what came of the step."""
+        """Print the result of the step."""
         self.bar.update(self._task, completed=sum(self._planned[: self._number]))
         verdict, width = result['verdict'], len(str(len(self.waiting)))
         number = f'{self._number:>{width}}/{len(self.waiting)}'
@@ -92,7 +92,7 @@ class Steps:
 
 
 def raised(result: Mapping[str, Any]) -> list[str]:
-    """Return the alerts that a step raised while it was done, in one line; none: no line."""
+    """Return the alerts raised during a step as one line; without alerts, no line."""
     begin, _, end = result['window_s']
     during = [a for a in result['alerts'] if begin <= a['start_s'] <= end]
     told = dict.fromkeys('{level} {code} {subject}'.format(**a) for a in during)
@@ -100,14 +100,15 @@ def raised(result: Mapping[str, Any]) -> list[str]:
 
 
 def say_stop(console: Console, reason: str) -> None:
-    """Say at once that motion was frozen."""
+    """Print at once that motion was frozen, and why."""
     console.print(f'[bold red]STOP[/] motion is frozen: {escape(reason)}', soft_wrap=True)
 
 
 def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
-    """Return what tells a person what to do and returns whether it was done.
+    """Return a function that asks a person to do something and returns whether it was done.
 
-    Enter: done; s and Enter, or the end of the input: not done. While it waits it hears `going`.
+    Enter: done; s and Enter, or the end of the input: not done. It stops waiting once `going()` is
+    false.
     """
 
     def ask(text: str, going: Callable[[], bool]) -> bool:
@@ -129,7 +130,7 @@ def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
 
 
 def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Console) -> None:
-    """Print what came of the run: the verdict, what it covered, where it is."""
+    """Print the result of the run: verdict, coverage, folder."""
     from ugv_acceptance.run.report import approaches, counts_of
 
     verdict, covered = result['verdict'], result['coverage']
@@ -154,7 +155,7 @@ DOMAINS = range(1, 102)
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What the command line asks for; `mode` is sim, robot or operator."""
+    """The options of the command line; `mode` is sim, robot or operator."""
 
     plan: Path | None
     mode: str
@@ -204,7 +205,7 @@ def execute(asked: Asked) -> int:
 
 
 def plan_of(asked: Asked, config: 'Config') -> 'Plan':
-    """Return the plan that was named, else the short one of the robot."""
+    """Return the plan that was named, else the robot's short one."""
     from ugv_acceptance.plan.derive import Wanted, derive
     from ugv_acceptance.plan.plan import read_plan
 
@@ -214,7 +215,7 @@ def plan_of(asked: Asked, config: 'Config') -> 'Plan':
 
 
 def folder_of(asked: Asked) -> Path:
-    """Return the folder that was named, else the first of run, run-2, run-3 that is not there."""
+    """Return the folder that was named, else the first free one of run, run-2, run-3, ..."""
     if asked.out is not None or asked.resume:
         return asked.out or Path('run')
     number = 1
@@ -238,7 +239,7 @@ def steps_of(plan: 'Plan', asked: Asked) -> list['Step']:
 
 
 def _do(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> bool:
-    """Do the steps that wait; return whether that was interrupted."""
+    """Do the steps that have no result yet; return whether that was interrupted."""
     world = _offline if asked.fast else _live
     with shown.bar, world(asked, config, folder, shown) as runner:
         for step in shown.waiting:
@@ -255,7 +256,7 @@ def _do(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> bo
 
 @contextmanager
 def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> Iterator['Runner']:
-    """Start the robot (if simulated), the monitor and the runner; end them all, come what may."""
+    """Start the robot (if simulated), the monitor and the runner; always end them all."""
     from ugv_acceptance.nodes.executor import ros
     from ugv_acceptance.nodes.runner_world import Guard, spinning
     from ugv_acceptance.nodes.subprocess_node import child
@@ -286,7 +287,7 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
 def _offline(
     asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps
 ) -> Iterator['Runner']:
-    """Make robot, monitor and runner in this process and in simulated time."""
+    """Build robot, monitor and runner in this process, in simulated time."""
     from ugv_acceptance.run.actuation import Hands
     from ugv_acceptance.run.runner import Runner
     from ugv_acceptance.run.simulated_robot import VirtualRobot
@@ -314,9 +315,9 @@ def _offline(
 
 @contextmanager
 def own_domain() -> Iterator[None]:
-    """Take a ROS domain of this machine for oneself: nobody else's robot is heard or moved.
+    """Take a ROS domain for this run alone: no other robot is heard or moved.
 
-    A lock keeps out whoever asks the same way; a domain whose discovery port is taken is left.
+    A lock keeps out other runs; a domain whose discovery port is in use is not taken.
     """
     for domain in random.SystemRandom().sample(DOMAINS, len(DOMAINS)):
         path = Path(tempfile.gettempdir(), f'ugv_acceptance_domain_{domain}.lock')
@@ -341,21 +342,21 @@ def _home(config: 'Config', folder: 'RunFolder') -> tuple[float, ...]:
 
 
 def _faults(asked: Asked, config: 'Config') -> tuple['Fault', ...]:
-    """Return the faults asked for. Raises BadConfig where a text is none."""
+    """Return the faults asked for. Raises BadConfig where a text describes none."""
     from ugv_acceptance.run.fault_text import fault_from
 
     return tuple(fault_from(text, config.settings.robot) for text in asked.faults)
 
 
 def _simulated(asked: Asked, config: 'Config', folder: 'RunFolder') -> list[str]:
-    """Return the simulator's parameters."""
+    """Return the simulator's parameters as ROS arguments."""
     positions = ', '.join(map(repr, _home(config, folder)))
     given = ['-p', f'seed:={asked.seed}', '-p', f'home:=[{positions}]']
     return [*given, *(['-p', f'faults:=[{", ".join(asked.faults)}]'] if asked.faults else [])]
 
 
 def coverage(config: 'Config', folder: 'RunFolder') -> dict[str, Any]:
-    """Return the coverage of all recordings in the folder, those of before a resume too."""
+    """Return the coverage by all recordings in the folder, also those from before a resume."""
     from ugv_acceptance.run.report import coverage_of
     from ugv_acceptance.run.step_verdict import seen_in
 

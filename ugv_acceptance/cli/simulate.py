@@ -1,4 +1,4 @@
-"""`ugv-acceptance simulate`: a PackBot in MuJoCo as a recording, faster than real time."""
+"""`ugv-acceptance simulate`: records a PackBot simulated in MuJoCo, faster than real time."""
 
 import sys
 import time
@@ -85,7 +85,7 @@ def _bar(case: 'Case') -> 'Bar':
 
 
 class Bar:
-    """A progress bar of simulated seconds on a terminal, nothing elsewhere."""
+    """A progress bar of simulated seconds on a terminal; nothing elsewhere."""
 
     def __init__(self, total: float) -> None:
         from rich.console import Console
@@ -110,7 +110,7 @@ class Bar:
         self._progress.stop()
 
     def __call__(self, reached: float) -> None:
-        """Take the simulated time (s) reached."""
+        """Show the simulated time (s) reached."""
         self._progress.update(self._task, completed=reached)
 
 

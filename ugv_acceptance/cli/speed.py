@@ -1,4 +1,4 @@
-"""`ugv-acceptance speed`: joint speeds up to which the static model holds."""
+"""`ugv-acceptance speed`: prints the joint speeds up to which the static model holds."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +28,7 @@ def speed(
 ) -> None:
     """Print the speed of each joint, moving alone, up to which an F-test accepts the static model.
 
-    The monitor's `static_speed` limits come from here.
+    Use the speeds as the `static_speed` limits of the monitor's configuration.
 
     \b
     Examples:

@@ -1,7 +1,7 @@
 """How a verb ends on Ctrl-C (SIGINT) or SIGTERM, and with which exit code.
 
-What runs until then ends in order, with 0. What was to bring a result and has none ends at once,
-with 128 and the signal's number, as a shell tells of it: neither a pass nor a fail.
+A verb that runs until stopped ends in order, with 0. One that was to bring a result and has none
+ends at once, with 128 plus the signal's number, as shells do: neither a pass nor a fail.
 """
 
 import signal
@@ -16,10 +16,11 @@ AGAIN = 0.2
 
 @contextmanager
 def ended_by_signals() -> Iterator[Callable[[], int]]:
-    """Let a signal end this process wherever it is; what is open is closed, and nothing printed.
+    """Let a signal end this process at any point; open files are closed, nothing is printed.
 
-    Yield what gives the exit code once a signal came, 0 before. An exception that is raised where
-    none can be, as in a callback of an import, is lost: it is raised again until it takes.
+    Yield a function that gives the exit code once a signal came, 0 before. An exception raised
+    where it cannot propagate, as in a callback of an import, is lost: it is raised again until it
+    ends the process.
     """
     codes, hook = [0], sys.unraisablehook
 
@@ -52,7 +53,7 @@ def ended_by_signals() -> Iterator[Callable[[], int]]:
 
 @contextmanager
 def asked_to_end() -> Iterator[Callable[[], bool]]:
-    """Yield what says whether a signal came; meanwhile it ends nothing."""
+    """Yield a function that says whether a signal came; signals end nothing meanwhile."""
     came: list[int] = []
     before = {n: signal.signal(n, lambda number, _: came.append(number)) for n in SIGNALS}
     try:

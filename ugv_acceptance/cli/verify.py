@@ -1,4 +1,4 @@
-"""`ugv-acceptance verify`: compute a result again from its recording, and compare everything."""
+"""`ugv-acceptance verify`: computes a result again from its recording and compares everything."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,7 +50,7 @@ def verify(
 
 
 def said(differences: list[str], path: Path, verdict: str) -> list[str]:
-    """Return what to tell a person."""
+    """Return the outcome of the comparison as lines of text."""
     if not differences:
         return [f'[OK] VERIFIED  {path}: the same hashes, verdicts and numbers ({verdict})']
     lines = [f'  {line}' for line in differences[:MOST_SHOWN]]
@@ -60,7 +60,7 @@ def said(differences: list[str], path: Path, verdict: str) -> list[str]:
 
 
 def read_result(path: Path) -> Json:
-    """Return a result of one recording. Raises AcceptanceError where it is none of ours."""
+    """Return a result of one recording. Raises AcceptanceError where the file is none of ours."""
     import json
 
     from ugv_acceptance.offline.evaluate import RESULT_VERSION
@@ -84,9 +84,9 @@ def read_result(path: Path) -> Json:
 
 
 def _near(path: str, folder: Path, option: str) -> Path:
-    """Return a file where it was, or beside the result: on a USB stick all lie together.
+    """Return a file at its recorded path, or else beside the result, as on a USB stick.
 
-    Raises AcceptanceError where it is at neither place; `option` tells where it is now.
+    Raises AcceptanceError where it is at neither place; `option` is the option that names it.
     """
     for place in (Path(path), folder / Path(path).name):
         if place.exists():
@@ -105,7 +105,7 @@ def again(
     urdf: Path | None,
     criteria: Path | None,
 ) -> Json:
-    """Return the result computed again, from the places it names, beside it, or as given."""
+    """Return the result computed again from the files it names, beside it, or as given."""
     import json
 
     from ugv_acceptance.config import load
@@ -134,7 +134,7 @@ _LATER = ('limits_hash', 'limits_relaxed')
 
 
 def payload_of(told: Json) -> 'Payload | None':
-    """Return the payload that a result says was declared when it was made, None: no other."""
+    """Return the payload that was declared when a result was made, None if none was."""
     from ugv_acceptance.model.robot import Payload
 
     said = told.get('declared_payload')
@@ -155,7 +155,7 @@ _FREE |= {('software',), ('identity',), ('robot', 'warnings')}
 
 
 def compare(told: Any, found: Any, path: tuple[str, ...] = ()) -> list[str]:  # noqa: ANN401 - JSON
-    """Return one line for everything that differs between two results; hashes come first."""
+    """Return one line for each difference between two results; hashes come first."""
     if path in _FREE:
         return []
     where = '.'.join(path) or 'result'

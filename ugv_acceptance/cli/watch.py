@@ -1,4 +1,4 @@
-"""`ugv-acceptance watch [BAG]`: the console in a terminal, such as over SSH; what it shows."""
+"""`ugv-acceptance watch [BAG]`: shows the console in a terminal, such as over SSH."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ __all__ = ['CONTEXT', 'watch']
 
 
 def _given(path: Path | None) -> Path | None:
-    """Take an empty text, such as a launch file's default, for none."""
+    """Return None for an empty path, such as a launch file's default."""
     return None if path == Path() else path
 
 
@@ -53,7 +53,7 @@ def watch(
 ) -> None:
     """Show verdict, alerts and margins in the terminal, in the words of the console. q leaves.
 
-    Where there is no terminal, a line tells what has changed, at most one a second.
+    Without a terminal, a line is printed whenever something changes, at most one a second.
 
     \b
     Examples:
@@ -88,7 +88,7 @@ def need(*libraries: str) -> None:
 def feed_of(
     context: typer.Context, bag: Path | None, config: Path | None, urdf: Path | None
 ) -> 'Iterator[tuple[Feed, Callable[[], bool]]]':
-    """Yield what is to be shown, a recording or the live robot, and what says when to end."""
+    """Yield the feed to show, of a recording or the live robot, and a function for when to end."""
     from ugv_acceptance.config import load
 
     # Where no bag is given, click takes --ros-args for it.
@@ -107,7 +107,7 @@ def feed_of(
 
 
 def recording_feed(bag: Path, config: 'Config') -> 'RecordingFeed':
-    """Return a recording, judged, as a feed."""
+    """Return an evaluated recording as a feed."""
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.console.recording import RecordingFeed, shown_recording
 
