@@ -7,7 +7,7 @@ from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Done
 
 DIED = 'the process that judged it died (out of memory, or a crash in a library)'
-# Batches given out ahead, a worker: few runs are to be looked at again where one dies.
+# Batches sent ahead to each worker: few, so that a dying worker costs few runs a second try.
 AHEAD = 2
 # A batch is so many runs or bytes at most: short runs cost less than the way to a worker and back.
 _BATCH, _BATCH_BYTES = 16, 4 << 20

@@ -80,7 +80,7 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
     try:
         return row_of(name, done.key, store.read(folder, done.key))
     except (AcceptanceError, LookupError, TypeError, ValueError, AttributeError):
-        # What was kept is not what was written: as if it were not there.
+        # A stored result that is damaged counts as missing.
         again = judge_source(done.source, replace(brief, known=frozenset()))
         return _row(again, brief, folder)
 

@@ -23,13 +23,13 @@ from ugv_acceptance.campaign.not_judged import words
 from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Done
 
-# How long (s) a scheduler or workers that are gone are waited for.
+# How long (s) to wait for a scheduler or workers that are gone.
 WAIT_S = 60.0
 # Workers a run may fail on while it has them for itself; and how often it may be lost at all.
 _FAULTS, _LOSSES = 2, 8
-# Times (s): between looks at who works, to connect, for an answer of the scheduler, for a result.
+# Times (s): between checks of the workers; limits to connect, for an answer, for a result.
 _LOOK_S, _CONNECT_S, _ANSWER_S, _FETCH_S = 0.5, 5.0, 30.0, 10.0
-# dask lets through what its parts raise: OSError, ValueError, RuntimeError, its own cancellation.
+# dask raises whatever its parts raise: OSError, ValueError, RuntimeError, its own cancellation.
 _ANY = (Exception, CancelledError)
 
 
@@ -142,7 +142,7 @@ class _GivenOut:
             )
             self.workers = {worker: max(1, threads) for worker, threads in found.items()}
             self.trouble = f'the dask scheduler at {self.address} had no workers'
-            # A cluster that grows by need grows for this call.
+            # A cluster that scales with demand starts a worker for this call.
             self.call = None if found else self.call or self.client.submit(int, pure=False)
         except _ANY:
             self.trouble = f'no dask scheduler answered at {self.address}'
@@ -186,7 +186,7 @@ class _GivenOut:
             else:
                 left.append(run)
         if suspect or given.alone:
-            # Whoever failed alone comes last.
+            # Runs that already failed alone come last.
             self.suspects = deque(sorted((*self.suspects, *left), key=lambda one: self.faults[one]))
         elif left:
             self.waiting.appendleft(left)

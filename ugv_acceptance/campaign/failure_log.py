@@ -20,7 +20,7 @@ TERMINAL, NON_TERMINAL = 'terminal', 'non-terminal'
 FIELD, NOT_FIELD = 'field-repairable', 'not field-repairable'
 LARGEST = 20_000_000
 
-# Field -> the words it may be.
+# Field -> its permitted words.
 CHOICES = {
     'class': (*(source.value for source in FailureSource), UNKNOWN),
     'impact': (TERMINAL, NON_TERMINAL, UNKNOWN),

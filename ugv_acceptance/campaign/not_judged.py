@@ -8,8 +8,8 @@ import errno
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-# Of the machine, its network and rights, as far as this system has them. EIO is not among them: so
-# answers a bad sector.
+# Error numbers caused by machine, network or permissions, where this system has them. EIO is not
+# among them: a bad sector gives it too.
 _NAMES = (
     *('ENOMEM', 'ENOSPC', 'EDQUOT', 'EROFS', 'EFBIG', 'EMFILE', 'ENFILE', 'EAGAIN', 'EBUSY'),
     *('EINTR', 'ENOLCK', 'EACCES', 'EPERM', 'ESTALE', 'EREMOTEIO', 'ECOMM', 'ENONET', 'ENOLINK'),
@@ -25,7 +25,7 @@ def is_of_the_machine(error: BaseException, files: Iterable[Path]) -> bool:
     return any(
         isinstance(cause, (MemoryError, ConnectionError, TimeoutError, PermissionError))
         or (isinstance(cause, OSError) and cause.errno in _MACHINE)
-        # What is missing is something else, such as the folder for temporary files.
+        # Something else is missing, such as the folder for temporary files.
         or (isinstance(cause, FileNotFoundError) and all(file.exists() for file in files))
         for cause in _causes(error)
     )

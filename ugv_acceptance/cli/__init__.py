@@ -80,7 +80,7 @@ def main() -> None:
         try:
             app()
         except Exception as error:
-            # A library that was being loaded makes an error of its own of the signal.
+            # A library being imported may turn the signal into an error of its own.
             if told():
                 sys.exit(told())
             sentence = _sentence(error)

@@ -14,7 +14,7 @@ from ugv_acceptance.report.format import number_text
 
 Values = dict[str, Any]
 
-# A payload of so many times the robot's own mass is not a number anybody plans with.
+# A payload above so many times the robot's own mass is shown as no limit.
 _MANY = 10.0
 
 

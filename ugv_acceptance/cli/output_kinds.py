@@ -180,7 +180,7 @@ MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is no map', b
 CAMPAIGN = FolderKind('campaign', ('campaign.json', 'campaign.html', 'runs/*.json'), _is_campaign)
 PAPER = FolderKind('paper', ('paper.json', 'paper.html', '*.svg'), _is_paper)
 RECORDING = FolderKind('recording', (), lambda _: False, may_fill=False)
-# What is in the folder of a run, `run` looks at by itself: it may be one to continue.
+# `run` checks its folder by itself: it may be one to continue.
 RUN = FolderKind(
     'run',
     ('run.json', 'journal.jsonl', 'result.json', 'report.txt', 'report.html', 'steps/*'),

@@ -60,7 +60,7 @@ def _parts(bag: Path) -> Iterator[Path]:
     yield bag
     try:
         files = files_of(bag)[0]
-    except (AcceptanceError, OSError):  # told when it is read
+    except (AcceptanceError, OSError):  # reported when it is read
         return
     for file in files:
         yield file

@@ -17,11 +17,11 @@ COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yello
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
 _MOST_EFFORTS = 11
-# Of so many messages a rate is told, if they can be used.
+# More messages than this have a rate, if they can be used.
 _FEW = 100
-# Less payload (kg) than minus this is none: the arm is held up by something.
+# A payload (kg) estimated below minus this means that the arm rests on something.
 _LIGHT = 0.1
-# What robot failures and lost data come to, the least first.
+# Levels of alerts, the least severe first.
 _SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
 
@@ -52,7 +52,7 @@ def while_read() -> Iterator[None]:
     try:
         yield
         sys.stdout.flush()
-    except (BrokenPipeError, SystemExit):  # the second is how newer rich tells of the first
+    except (BrokenPipeError, SystemExit):  # newer rich turns the first into the second
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

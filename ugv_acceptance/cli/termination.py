@@ -33,7 +33,7 @@ def ended_by_signals() -> Iterator[Callable[[], int]]:
         error = sys.exc_info()[1]
         while error is not None and not isinstance(error, SystemExit):
             error = error.__context__
-        # While it is handled, what is open is being closed.
+        # While SystemExit is handled, open files are being closed.
         if error is None:
             raise SystemExit(codes[-1])
 

@@ -18,7 +18,7 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
-# One word a level, and what the page says where nothing is wrong or nothing is known.
+# The word for each level, and the page's sentence where nothing is wrong or nothing is known.
 WORDS = {OK: 'OK', WARN: 'CAUTION', ERROR: 'DANGER', STALE: 'NO DATA'}
 FINE = 'all margins kept'
 UNKNOWN = 'margins are not known'
@@ -198,7 +198,7 @@ def _point(p: Sequence[float]) -> list[float]:
 
 def _attitude(snapshot: Snapshot) -> Plain | None:
     x, y, z = gravity = snapshot.gravity
-    # Neither unknown nor next to nothing: something that shows where down is.
+    # Known and not near zero, so that it shows where down is.
     if not 1e-6 < math.hypot(x, y, z) < 1e6:
         return None
     roll, pitch = roll_pitch((-x, -y, -z))

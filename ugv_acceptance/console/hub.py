@@ -19,7 +19,7 @@ from ugv_acceptance.monitoring.drawing import Figure, figure_of
 def number_in(values: Mapping[str, object], name: str) -> float:
     """Return a finite number from a client's command. Raises BadSample where there is none."""
     value = values.get(name)
-    # JSON's whole numbers have no end, floats have.
+    # Integers of JSON have no largest value, floats have.
     most = sys.float_info.max
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= most:
         raise BadSample(f'{name}: expected a finite number, got {value!r:.60}')
@@ -29,7 +29,7 @@ def number_in(values: Mapping[str, object], name: str) -> float:
 # Seconds between frames and, at least, between two maps.
 FRAME = 0.05
 MAP = 0.2
-# A client that takes nothing for this long (s) is let go; more than this many are not let in.
+# A client that takes nothing for this long (s) is disconnected; most clients at a time.
 PATIENCE = 10.0
 MOST_CLIENTS = 32
 # Answers that wait for a client.

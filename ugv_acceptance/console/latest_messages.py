@@ -11,7 +11,7 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder
 from ugv_acceptance.evaluation.settings import ImuInput
 
-# What is handed on of the messages of an input, in order of arrival; there is at least one.
+# Chooses which of an input's messages are evaluated, in order of arrival; at least one came.
 Pick = Callable[[Sequence[bytes]], Sequence[bytes]]
 
 

@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.type_aliases import Floats, Times
 
-# Time between rows (ns), and stretches of a timeline.
+# Time between rows (ns), and parts of a timeline.
 STEP = 50_000_000
 STRETCHES = 400
 # Time (ns) before a moment over which the rate of an input is taken.
@@ -102,7 +102,7 @@ class TrackMaker:
         last = np.append(place[1:] != place[:-1], True)
         pairs = rows.pairs
         heard = np.stack([pairs.joints.time[pairs.of_joints], pairs.imu.time[pairs.of_imu]], axis=1)
-        # A stretch's first rows are the newest of the stretch before.
+        # The first rows of a part may repeat the newest of the part before.
         taken = self._taken + np.stack([pairs.of_joints, pairs.of_imu], axis=1)
         self._taken = taken[-1]
         columns = (rows.time, rows.known, rows.q, rows.effort, rows.gravity)

@@ -24,7 +24,7 @@ from ugv_acceptance.studies.maps import (
     utilisation_map,
 )
 
-# What a cell says; the page's colours and hatches follow this order.
+# Classes of a cell; the page's colours and hatches follow this order.
 SAFE_CELL, CAUTION_CELL, TORQUE_CELL, TIP_CELL, BOTH_CELL = range(5)
 CELLS = 73
 # Changes smaller than this (rad, m; m/s2; kg) do not make a new map.

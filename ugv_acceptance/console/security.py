@@ -85,7 +85,7 @@ class Guard:
         name = name.strip('[]')
         if name in {self.host, 'localhost'} or is_loopback(name):
             return True
-        # Bound to all addresses: a rebound name is no address.
+        # Bound to all addresses: any address may pass, a name could be DNS rebinding.
         return not is_loopback(self.host) and _is_address(name)
 
 

@@ -20,11 +20,11 @@ from ugv_acceptance.console.hub import Client, Hub
 from ugv_acceptance.console.security import App, Guard, check_address, guarded
 
 STATIC = Path(__file__).parent / 'static'
-# Bytes of a command; more is no command.
+# Most bytes of a command.
 LONGEST_COMMAND = 4096
-# What the kernel and we keep for a client (bytes): old frames are dropped, not kept for later.
+# Buffers of a client in the kernel and here (bytes): old frames are dropped, not kept for later.
 _BUFFER, _WRITTEN = 16384, 4096
-# Connections that have asked for nothing yet: more are not kept, nor one longer than this (s).
+# Most connections without a request yet, and the time (s) after which one is closed.
 MOST_SILENT, _SILENCE = 64, 15.0
 
 
@@ -61,7 +61,7 @@ async def _converse(hub: Hub, websocket: WebSocket) -> None:
     sending = asyncio.create_task(hub.serve(client, websocket.send_text))
     listening = asyncio.create_task(_listen(hub, client, websocket))
     try:
-        # Whoever is done first: the client went, sent what is no command, or takes nothing.
+        # The first to end: the client left, sent no text, or takes nothing.
         await asyncio.wait({listening, sending}, return_when=asyncio.FIRST_COMPLETED)
     finally:
         hub.clients.discard(client)
@@ -128,7 +128,7 @@ class _Server(uvicorn.Server):
     async def on_tick(self, counter: int) -> bool:
         """Check all connections, ten times a second; return whether to end."""
         now, there = time.monotonic(), list(self.server_state.connections)
-        # A WebSocket has no cycle of request and answer.
+        # Only an HTTP connection has a cycle; None before its first request.
         silent = [c for c in there if getattr(c, 'cycle', c) is None]
         self._since = {c: self._since.get(c, now) for c in silent}
         oldest = sorted(silent, key=self._since.__getitem__)

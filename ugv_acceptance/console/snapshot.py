@@ -12,7 +12,7 @@ from ugv_acceptance.model.stability import SIDES, UNKNOWN
 
 NOTHING = (math.nan,) * len(SIDES)
 NO_LOAD = Payload()
-# What stands beside a payload's topic on which nothing came.
+# Text beside a payload's topic on which nothing came.
 NO_PAYLOAD = 'optional; none was declared'
 
 

@@ -26,7 +26,7 @@ from ugv_acceptance.nodes.replay_stamps import NS, Stamped, Stamps, stamped
 
 # Seconds to wait for subscribers at the start: discovery takes one to three.
 DISCOVERY = 5.0
-# Seconds until a subscriber that we know of knows of us too, and until it has what was on its way.
+# Seconds until a matched subscriber has matched us too, and until it has the last messages.
 SETTLING = 0.7
 CLOCK = '/clock'
 # Seconds between two messages on it.
@@ -72,7 +72,7 @@ class Player:
                 self._offer(name, topic.type, profiles.get(name, Offered()))
         if not self.publishers:
             raise BadBag(f'{self.play.bag}: expected a topic that can be published: {self.skipped}')
-        # What is told once, such as a map, has an old stamp and no clock.
+        # A message published once, such as a map, has an old stamp and shows no clock.
         self._leaders = frozenset(
             name
             for name in self.publishers

@@ -38,14 +38,14 @@ from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs, qos_of
 
 MONITOR = 'acceptance_monitor'
-# Seconds without a verdict (it comes each second), and without margins while inputs arrive, after
-# which nothing that was said counts any more.
+# Seconds without a verdict (it comes each second), and without margins while inputs arrive, until
+# the monitor counts as silent.
 VERDICT_SILENCE = 2.5
 MARGIN_SILENCE = 0.5
 # Messages of an input that may wait for the next snapshot.
 _DEPTH = 400
-# Seconds between looks at what the console itself thinks of its inputs. Silence is looked at in
-# each snapshot that nothing new came for.
+# Seconds between checks of the inputs by the console itself. Silence is checked in each snapshot
+# for which nothing new came.
 _LOOK = 0.5
 
 
@@ -220,7 +220,7 @@ class ConsoleNode(Node):
             return 'the monitor is silent although its inputs arrive'
         level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
         silent = level == STALE or margins is None
-        # An alert says better what is missing, and what to do.
+        # An alert, if there is one, says better what is missing and what to do.
         told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
         return self.verdict.message if silent and not told else ''
 
@@ -289,7 +289,7 @@ def live_feed(config: Config, args: list[str] | None = None) -> Iterator[tuple[C
     """Run the console's node; yield it, and the object that says when to stop."""
     with ros(args) as stop:
         node = ConsoleNode(config)
-        # What is there now stays: the garbage collector need not look through it between frames.
+        # Objects made so far stay: the garbage collector need not check them between frames.
         gc.collect()
         gc.freeze()
         try:

@@ -27,7 +27,7 @@ from rclpy.utilities import get_rmw_implementation_identifier, ok, try_shutdown
 from ugv_acceptance import AcceptanceError
 
 BAD_INPUT = 2
-# Seconds after which a signal is heard at the latest.
+# Longest time (s) until a signal is noticed.
 PATIENCE = 0.5
 # Seconds that the executor is given; without a limit it never ends.
 LONG = 3600.0
@@ -128,7 +128,7 @@ def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> N
     # Steady: a frozen /clock must not keep the process from ending.
     timer = node.create_timer(PATIENCE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
     executor.add_node(node)
-    # What is there now stays: the garbage collector need not look through it between messages.
+    # Objects made so far stay: the garbage collector need not check them between messages.
     gc.collect()
     gc.freeze()
     # A message must not wait the usual 5 ms for a thread that works out advice.

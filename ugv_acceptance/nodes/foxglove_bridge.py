@@ -22,9 +22,9 @@ from ugv_acceptance.nodes.bag_player import message_type
 if TYPE_CHECKING:
     from rclpy.subscription import Subscription
 
-# No other address: who is far takes a tunnel (ssh -L), which asks who he is.
+# No other address: from afar use a tunnel (ssh -L), which authenticates.
 HOST, PORT = '127.0.0.1', 8765
-# Seconds between looks at who watches what, and at which topics there are.
+# Seconds between checks of the watchers, and of the topics.
 LOOK, TOPICS = 0.1, 1.0
 # Messages that are held for a slow client; then the oldest go. The robot never waits.
 BACKLOG, DEPTH = 256, 100

@@ -43,7 +43,7 @@ class Simulator(Node):
     """The simulated robot as a node; `slipped` (s) is the real time it could not keep up with."""
 
     def __init__(self, **node: Any) -> None:  # noqa: ANN401 - as Node does
-        # Where MuJoCo is absent, they say so: run() catches it here.
+        # Without MuJoCo these imports raise AcceptanceError, which run() reports.
         from ugv_acceptance.run.fault_text import fault_from  # noqa: PLC0415
         from ugv_acceptance.run.simulated_robot import VirtualRobot  # noqa: PLC0415
 

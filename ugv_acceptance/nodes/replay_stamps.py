@@ -16,13 +16,13 @@ from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Header
 
 NS = 1_000_000_000
-# The last moment (ns) that a stamp can tell.
+# The latest time (ns) that a stamp can hold.
 _LAST = 2**31 * NS - 1
 # A clock this far (ns) from the recorder's is another clock; one nearer is wrong, and stays so.
 FAR = 3600 * NS
 # Clocks far from the recorder's that differ by less (ns) are one, whose topics may be late.
 SAME = 10 * NS
-# A simulation may run faster or slower: by this much (ns) its clock may run away unfollowed.
+# A simulation may run faster or slower: drift (ns) of its clock that is not followed.
 DRIFT = NS // 2
 _HEADER = 'std_msgs/Header'
 Move = Callable[[int], int]
@@ -67,7 +67,7 @@ class Stamps:
         origin = clock.offset + self.first
 
         def move(stamp: int) -> int:
-            # Zero is no time but says that none was given.
+            # Zero means that no time was given.
             return self.began + int((stamp - origin) / self.rate) if stamp else 0
 
         return move

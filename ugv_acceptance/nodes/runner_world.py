@@ -129,11 +129,11 @@ class RosCommands:
 
 
 MONITOR = 'acceptance_monitor'
-# Seconds between two looks of the watchdog; looks without a word after which the monitor is dead,
-# and after which recorded data is handed to the system. Looks are counted, not seconds: while this
-# process itself stands still it hears nobody and blames nobody.
+# Seconds between checks of the watchdog; checks without a message after which the monitor is dead,
+# and after which recorded data is flushed. Checks are counted, not seconds: while this process
+# itself is stopped, it cannot receive, and that is not the monitor's fault.
 LOOK, SILENT, FLUSH = 0.1, 10, 5
-# A pause between joint states (s) beyond which no time counts as fed.
+# A longer pause (s) between joint states does not count in `fed`.
 GAP = 0.1
 
 
@@ -226,7 +226,7 @@ class Guard(Node):
 
         return received
 
-    # What is heard
+    # Messages received
 
     def _on_joints(self) -> Callable[[bytes], None]:
         decode = joint_state_decoder().one
@@ -235,7 +235,7 @@ class Guard(Node):
             try:
                 _, _, names, position, *_ = decode(data)
             except BadSample:
-                return  # the monitor counts and tells it
+                return  # the monitor counts and reports it
             self.positions.take(names, position)
             now = time.monotonic()
             if self._fed_at >= 0.0:
@@ -266,7 +266,7 @@ class Guard(Node):
                     self._recording.bag.flush()
         if self.brake.armed and self.dead() and not self.brake.stopped:
             silent = self._silent * LOOK
-            # It may be heard again a moment later: what it did not watch is lost all the same.
+            # It may come back a moment later: what it did not watch is lost all the same.
             self.brake.stop(f'the monitor has said nothing for {silent:.1f} s', blind=True)
 
     # The world of a runner

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from ugv_acceptance.plan.search import PATH, STEP_DEG, Arm, Mask, look, safe
 from ugv_acceptance.type_aliases import Floats
 
-# Neither the start nor any other place: no place before it.
+# Predecessor of a posture that has none: the start, or not reached.
 _NOWHERE = -9999
 
 

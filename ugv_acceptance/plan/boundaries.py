@@ -16,8 +16,8 @@ from ugv_acceptance.plan.writing import Setup, hold_step
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
 
-# What a posture is to the boundary, the band it lies in (share of the limit; deg of tilt left),
-# where it is tried, and what is done there.
+# Where a posture lies relative to the limit, its band (share of the limit; deg of tilt left),
+# where it is tested (robot or simulation), and the action.
 TORQUE = (
     ('below the warning', (0.70, 0.765), ROBOT),
     ('just inside', (0.90, 0.97), ROBOT),
@@ -32,7 +32,7 @@ TILT = (
 SIDES = ('nose-down', 'nose-up', 'right', 'left')
 # Least tilt left (deg) where torque is tested, most use of torque where tilt is.
 STEADY, STRONG = 8.0, 0.75
-# Ramps (rad) steeper than asked for, in simulation only, where nothing less reaches the boundary.
+# Steeper ramps (rad), in simulation only, for boundaries that no lesser tilt reaches.
 STEEPER = (math.radians(32.0), math.radians(37.0))
 
 

@@ -152,7 +152,7 @@ def _routed(routes: Routes, steps: Sequence[Step]) -> list[Step]:
 
 def _with_way(routes: Routes, step: Step, start: Floats) -> Step:
     if step.action not in {'hold', 'tip', 'pull'}:
-        return step  # its postures on the way are what it is for
+        return step  # the postures on the way are its purpose
     if step.where == SIMULATION:
         return step.model_copy(update={'via_deg': ()})
     arm = routes.arm

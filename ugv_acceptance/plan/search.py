@@ -18,7 +18,7 @@ from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 
-# Step (deg) of the search; least height (m) of arm and load; what the hull is wider than its feet.
+# Step (deg) of the search; least height (m) of arm and load; hull's width (m) beyond its contacts.
 STEP_DEG, CLEAR, AROUND = 5.0, 0.06, 0.12
 # Points between two postures at which a motion is checked.
 PATH = 25

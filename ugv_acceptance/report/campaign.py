@@ -9,7 +9,7 @@ from ugv_acceptance.report.format import hours_text, number_text
 from ugv_acceptance.report.regions import figure, svg_of
 from ugv_acceptance.type_aliases import Json
 
-# Runs listed one by one; campaign.json has all.
+# Most runs listed one by one; campaign.json has all.
 MOST_RUNS = 400
 MOST_FAILURES = 400
 MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?', 'BROKEN': '!', 'NOT_JUDGED': '∅'}

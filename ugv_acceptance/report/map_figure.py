@@ -23,7 +23,7 @@ WORDS = {
     'payload': ('carries the load', 'caution: little reserve', 'cannot carry it'),
     'drag': ('pulls over a fifth of its weight', 'over a tenth', 'less'),
 }
-# No joint moves so far (degrees) between messages: it went over the map's edge.
+# A larger step (degrees) between messages crossed the map's edge: no joint moves so far.
 _WRAPPED = 180.0
 # Lines of equal value beside the two boundaries.
 _LINES = {'payload': (1.0, 2.0, 3.0, 6.0, 8.0, 12.0), 'drag': (25.0, 100.0, 150.0, 200.0)}

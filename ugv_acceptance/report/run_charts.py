@@ -19,7 +19,7 @@ from ugv_acceptance.type_aliases import Floats, Json
 LINES = (('#0072b2', '-'), ('#d55e00', '--'), ('#009e73', '-.'), ('#cc79a7', ':'), ('#56b4e9', '-'))
 ALERT_COLOURS = {'WARN': '#e69f00', 'ERROR': '#d55e00', 'STALE': '#7f7f7f'}
 ALERT_HATCHES = {'WARN': '', 'ERROR': '////', 'STALE': '..'}
-# Points drawn; more are thinned to the worst of each stretch.
+# Points drawn; more are reduced to the worst of each group.
 MOST_POINTS = 1500
 
 

@@ -73,7 +73,7 @@ class RunFolder:
             self.done(s) or {'id': s.id, 'title': s.title, 'verdict': 'SKIPPED', 'reasons': []}
             for s in self.plan.steps
         ]
-        # What would pass a limit is asked of nobody but the simulation.
+        # Steps that would pass a limit are only for the simulation.
         asked = [
             found
             for step, found in zip(self.plan.steps, results, strict=True)

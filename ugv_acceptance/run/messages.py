@@ -12,7 +12,7 @@ from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recordin
 
 # 2025-06-02 09:00:00 UTC: stamps look like those of a real clock.
 EPOCH = 1_748_854_800_000_000_000
-# Seconds after which a payload is told again.
+# Seconds after which a payload is declared again.
 PAYLOAD_PERIOD = 1.0
 
 # Topic, time of receipt (ns) and content.

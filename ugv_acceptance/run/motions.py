@@ -12,9 +12,9 @@ from ugv_acceptance.plan.plan import Posture, Step, radians_of
 from ugv_acceptance.run.actuation import OPERATOR, Hands
 from ugv_acceptance.run.world import World
 
-# Seconds between two looks, and without any progress of a motion.
+# Seconds between two checks; seconds without progress after which a motion has ended.
 LOOK, GRACE = 0.02, 3.0
-# A way (rad) that counts as progress.
+# Least motion (rad) that counts as progress.
 PROGRESS = 1e-3
 REFUSED = 'the operator did not do what was asked'
 

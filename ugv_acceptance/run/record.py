@@ -22,7 +22,7 @@ from ugv_acceptance.type_aliases import Floats
 
 # Simulated seconds held in memory at a time.
 STRETCH = 5.0
-# A motor that gives all it has for this long (s) is saturated; shorter is a jolt.
+# A motor at its limit for this long (s) is saturated; shorter is a jolt.
 SATURATED_FOR = 0.1
 TOPICS = (
     ('/joint_states', 'sensor_msgs/msg/JointState', Qos(reliability='best_effort')),

@@ -22,7 +22,7 @@ from ugv_acceptance.run.motions import REFUSED, Moves, holds
 from ugv_acceptance.run.step_verdict import INCONCLUSIVE, SKIPPED, Done, judge_step
 from ugv_acceptance.run.world import Brake, World
 
-# Seconds for alerts to be over, and recorded after a stop.
+# Longest wait (s) for alerts to end; time (s) recorded after a stop.
 CALM, AFTER = 10.0, 1.0
 # Times a step is tried that showed nothing because messages were missing.
 ATTEMPTS = 5
@@ -136,7 +136,7 @@ class Runner:
     def _prepare(self, step: Step) -> str:
         """Bring the robot home and set it up where a step needs it; return what was wrong."""
         setup = (step.ground, step.payload_kg)
-        # What is only simulated begins at the start, where no way home has to be safe.
+        # A step of the simulation begins at the start: no path home has to be safe.
         if self._lying or (step.where == SIMULATION and setup != self._setup):
             self._setup, self.moves.trail = None, []
             if not self.hands.stand_up():
@@ -196,7 +196,7 @@ class Runner:
         wrong = wrong or self._act(step)
         done = self._done(begin, hold, wrong if holds(step) else '')
         if self.brake.stopped:
-            # That it stands still from now on is in the recording too.
+            # The recording also shows that it stands still from now on.
             self.world.wait(AFTER)
         return done
 

@@ -136,7 +136,7 @@ class Offline:
                 stamp, _, turned, omega, force, covariance, *_ = self._imu.one(data)
                 evaluator.imu(now, stamp, turned, covariance, omega, force)
         except BadSample:
-            return  # as the monitor does; the recording's judge counts it
+            return  # as the monitor does; the evaluation of the recording counts it
         self._look()
 
     def _look(self) -> None:

@@ -20,7 +20,7 @@ PASS, FAIL, INCONCLUSIVE, SKIPPED = 'PASS', 'FAIL', 'INCONCLUSIVE', 'SKIPPED'
 VERDICTS = (FAIL, INCONCLUSIVE, SKIPPED, PASS)
 # Less than this share of the hold evaluated: nothing was shown.
 LEAST = 0.95
-# Past its tipping point by more than this (deg), a robot does not merely lean.
+# A robot past its tipping point by more than this (deg) has tipped over.
 FALLEN = 10.0
 
 
@@ -133,7 +133,7 @@ def decide(
         return FAIL, [f'stopped: {done.stopped}']
     if share < LEAST and not any(p.startswith('STALE') for p in step.alerts.must):
         unknown.append(f'only {share:.0%} of the hold could be evaluated')
-    # What was not raised may have been due while nothing was seen.
+    # An alert may have been due while margins were unknown.
     wrong = [*unwanted, *([done.wrong] if done.wrong else [])]
     if wrong or (missing and not unknown):
         return FAIL, [*missing, *wrong, *unknown]

@@ -19,7 +19,7 @@ TIPPED = np.radians(2.0)
 # Turn (rad) beyond which nothing catches the robot any more.
 OVER = np.radians(30.0)
 # Rates (rad/s) at which the plane tilts, each to find the tilt closer, and how far (rad) before the
-# result of the last the next one starts. A slow plane leaves little between tipping and its notice.
+# result of the last the next one starts. On a slow plane tipping is noticed at nearly its tilt.
 RATES = (np.radians(12.0), np.radians(2.0), np.radians(0.2), np.radians(0.05))
 BACK = (np.radians(7.0), np.radians(2.0), np.radians(0.5))
 # Tilt (rad) at which a search ends.

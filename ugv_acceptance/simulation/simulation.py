@@ -132,7 +132,7 @@ class Simulation:
                 self._moves[k] = _move(at, targets[name], command.speed, now)
         for k, speed in enumerate(command.drive or ()):
             before = self._drive[k]
-            # The same speed told again, as remote controls do, does not begin a new ramp.
+            # The same speed repeated, as by remote controls, does not begin a new ramp.
             if speed != before.start + before.change:
                 self._drive[k] = _move(before.at(now)[0], speed, command.drive_rate, now)
         if command.slope is not None:

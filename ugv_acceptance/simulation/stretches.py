@@ -14,9 +14,9 @@ from ugv_acceptance.simulation.simulation import BUILD, Simulation
 from ugv_acceptance.simulation.vehicle import Build
 from ugv_acceptance.type_aliases import Floats
 
-# Share of a motor's limit from which it gives all it has.
+# Share of a motor's limit from which it counts as saturated.
 _ALL = 1.0 - 1e-9
-# Warnings of MuJoCo after which it starts from its first state again.
+# Warnings after which MuJoCo has reset itself to its first state.
 _UNSTABLE = tuple(
     int(kind)
     for kind in (

@@ -16,7 +16,7 @@ from ugv_acceptance.type_aliases import Floats
 
 FIXED = Build(base='fixed', motors=False)
 FREE = Build(wheels=True, timestep=0.0005, contact_time=0.005)
-# Own frequency (rad/s) of the servos that hold the free vehicle's joints to the motion.
+# Natural frequency (rad/s) of the servos that hold the free vehicle's joints to the motion.
 STIFF = 500.0
 # Time (s) for the free vehicle to come to rest, and then for the joint to come to speed.
 SETTLE, LEAD = 1.0, 0.5

@@ -18,9 +18,9 @@ from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.shape import numbers
 from ugv_acceptance.type_aliases import Floats
 
-# Mass (kg) and inertia (kg m2) of what has none: MuJoCo wants a moving body to have some.
+# Mass (kg) and inertia (kg m2) of links without any: MuJoCo needs some of moving bodies.
 LEAST = 1e-12
-# Own frequency (rad/s) of the position servos on the inertia they see at the zero posture, or on
+# Natural frequency (rad/s) of the position servos on the inertia of the zero posture, or on
 # this (kg m2, kg) if that is more: a flipper's drive also lifts the robot.
 SERVO, SERVO_INERTIA = 50.0, 2.0
 # One wheel's velocity servo: gain (N m s/rad) and most torque (N m); its brake holds as much.

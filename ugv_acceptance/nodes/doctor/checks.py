@@ -17,7 +17,7 @@ from ugv_acceptance.model.robot import Joint, Vector
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
 OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
-# Clocks may differ this much (s) before it is worth a word.
+# Difference of clocks (s) that is not reported.
 CLOCK_SLACK = 1.0
 # The slowest input (Hz) that leaves time to react, and the tilt (rad) a floor may have.
 SLOWEST = 10.0
@@ -144,7 +144,7 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
         if not _within(joint, q):
             text = f'at {q:.3f}, limits {joint.lower:.3f} to {joint.upper:.3f}'
             do = f'check joints.{name}.sign and offset'
-            # An endless joint has no limits: at any angle it says nothing of the unit.
+            # A continuous joint has no limits: its angle does not show a wrong unit.
             in_degrees = how.sign * math.radians(told) + how.offset
             if joint.kind != 'prismatic' and _within(joint, in_degrees):
                 do += '; are degrees sent in place of radians?'

@@ -23,7 +23,7 @@ from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 KEPT = 5000
 # Seconds until all publishers should be known; then the listening begins.
 DISCOVERY = 4.0
-# What a monitor calls its margins, whatever it is called itself.
+# Names of a monitor's margin topics, whatever the node's own name.
 _MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
 
 
@@ -119,7 +119,7 @@ def _subscribe(node: Node, topic: Topic, decoder: Decoder[Any]) -> Heard:
     def take(data: Any) -> None:  # noqa: ANN401 - bytes, for it is raw
         heard.take(decoder.one, data)
 
-    # Best effort, volatile: hears every publisher, whatever the configuration says.
+    # Best effort, volatile: matches every publisher, whatever the configuration says.
     anything = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
     node.create_subscription(
         message_type(topic.type),

@@ -26,7 +26,7 @@ MOST = 100
 # Messages kept at most, however fast they come.
 KEPT = 200_000
 
-# Seconds after which what was written is handed to the system, and to wait for a thread's end.
+# Seconds between flushes; time (s) to wait for a thread's end.
 FLUSH, PATIENCE = 0.25, 10.0
 
 Take = Callable[[bytes], None]

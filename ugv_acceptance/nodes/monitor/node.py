@@ -57,7 +57,7 @@ from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 
 NAME = 'acceptance_monitor'
 INACTIVE = 'the monitor is not active'
-# Takes (alert or verdict, what is said).
+# Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
 
@@ -120,7 +120,7 @@ class Monitor(LifecycleNode):
         return self._transition(self._deactivate)
 
     def _transition(self, step: Callable[[], None]) -> TransitionCallbackReturn:
-        # rclpy swallows what a transition raises, so it is said here.
+        # rclpy swallows exceptions of a transition, so they are logged here.
         self.problem = ''
         try:
             step()
@@ -211,7 +211,7 @@ class Monitor(LifecycleNode):
             self._margins.look_for_listeners()
         self.say()
 
-    # What is said
+    # Published messages
 
     def verdict(self) -> Status:
         """Return the present verdict: STALE in every state but active."""

@@ -18,7 +18,7 @@ from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.black_box import BlackBox, Channel
 
 DOINGS = ('acknowledge', 'shelve', 'unshelve', 'reset')
-# Who acknowledges by the service, which does not say.
+# The name for acknowledgements by the service, which gives none.
 SERVICE = 'service'
 LONGEST_TEXT = 500
 # Seconds of shelving where none are given.

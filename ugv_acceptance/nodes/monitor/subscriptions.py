@@ -28,11 +28,11 @@ _DURABILITY = {
     'volatile': DurabilityPolicy.VOLATILE,
     'transient_local': DurabilityPolicy.TRANSIENT_LOCAL,
 }
-# What ROS calls a node while its publisher is known and its name is not yet.
+# ROS's placeholder for a node whose name is not known yet.
 _UNKNOWN = 'NODE_NAME_UNKNOWN'
-# Seconds between looks for publishers after one has come or gone, looks, and ns to wait for a name.
+# After a publisher came or went: seconds between checks, their number, ns to wait for a name.
 _SOON, _LOOKS, _NAMED = 0.1, 10, 1_000_000_000
-# Looks in a row, one a second, at which an effort must be opposed: an arm may be held for a moment.
+# Checks in a row, one a second, that must find an effort opposed: an arm may be held a moment.
 _OPPOSED = 5
 
 
@@ -93,7 +93,7 @@ class Inputs:
             session.faults.set(session.clock.now(), 'MESSAGES_LOST', name, count)
 
         def matched(_: object) -> None:
-            # The event may come after the end of what it is of.
+            # The event may come after its subscription was destroyed.
             if self.subscriptions:
                 self._look_soon()
 
