@@ -1,4 +1,4 @@
-"""Advice tried out: the simulated robot does as it was told, and its margins are watched."""
+"""Tries advice out: the simulated robot follows it, and its margins are compared."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ STANDS, LEANS = math.radians(2.0), 2.0
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Advice that was followed: the margin it was for, in the simulation before and after.
+    """A trial of advice: the margin the advice is for, in the simulation before and after.
 
     In rad of tilt, or N m (N) between limit and what the motor was measured to give. `least` is the
     smallest tilt left (rad) to any side on the way, -inf where there was no margin at all.
@@ -48,7 +48,7 @@ class Trial:
 
     @property
     def tipped(self) -> bool:
-        """Whether the robot had no tilt left on the way."""
+        """Whether the robot lost all its tilt margin on the way."""
         return not self.least > 0.0
 
 
@@ -71,7 +71,7 @@ def trials(settings: Settings, count: int, seed: int, kinds: tuple[str, ...]) ->
 
 
 def _stands(settings: Settings, case: TipCase) -> bool:
-    """Return whether the robot stands on its tracks and holds its arm, with a margin to tell it."""
+    """Return whether the robot stands on its tracks and holds its arm, with a margin left."""
     s, c = math.sin(case.tilt), math.cos(case.tilt)
     across = (s * math.cos(case.heading), s * math.sin(case.heading), -c)
     down = settings.robot.gravity * np.array(across)
@@ -100,7 +100,7 @@ def _trial(settings: Settings, case: TipCase, kinds: tuple[str, ...]) -> Trial |
 
 
 def _follow(simulation: Simulation, advice: Advice, load: Payload) -> Iterator[None]:
-    """Do what the advice says, with this load from then on, and yield every TICK on the way."""
+    """Follow the advice, with this load (kg) from then on, and yield every TICK on the way."""
     now = simulation.time
     if advice.kind == 'payload':
         simulation.apply(Command(now, payload=load))
@@ -117,7 +117,7 @@ def _follow(simulation: Simulation, advice: Advice, load: Payload) -> Iterator[N
 
 
 def _turn(simulation: Simulation, advice: Advice) -> Iterator[None]:
-    """Turn on the spot until the robot faces where it should, or does not turn, as people do."""
+    """Turn on the spot until the robot faces the advised way or does not turn any more."""
     amount = advice.amount
     wanted = math.copysign(YAW_RATE, amount)
     simulation.apply(Command(simulation.time, drive=(0.0, wanted)))
@@ -131,7 +131,7 @@ def _turn(simulation: Simulation, advice: Advice) -> Iterator[None]:
 
 
 def _wait(simulation: Simulation, seconds: float) -> Iterator[None]:
-    """Let time pass, and yield every TICK."""
+    """Simulate `seconds`, and yield every TICK."""
     for _ in range(math.ceil(seconds / TICK)):
         simulation.advance(TICK)
         yield
@@ -154,7 +154,7 @@ def _least(settings: Settings, simulation: Simulation, load: Payload) -> float:
 
 
 def _margin(settings: Settings, simulation: Simulation, advice: Advice, load: Payload) -> float:
-    """Return the margin the advice is for: tilt left there, or what the motor has left."""
+    """Return the margin the advice is for: tilt left (rad), or the motor's reserve (N m; N)."""
     q, down, effort = _state(simulation)
     if advice.margin not in SIDES:
         j = settings.robot.joint_names.index(advice.margin)

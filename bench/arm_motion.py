@@ -1,4 +1,4 @@
-"""Where the static map starts to lie: a joint moved at speed on a slope, static against simulated.
+"""Compares the static margin of a moving joint with simulation, to find the speed that limits it.
 
 The static margin of a motion is the least force-angle of the postures it passes; the truth is
 whether the simulated robot, its joints held to the motion, leaves its stance.
@@ -26,7 +26,7 @@ from ugv_acceptance.simulation.vehicle import (
 from ugv_acceptance.type_aliases import Floats
 
 BUILD = Build(friction=20.0, timestep=0.00125, contact_time=0.0026, impratio=100.0)
-# Own frequency (rad/s) of the servos: they hold the joints to the motion; stiffer ones hop.
+# Natural frequency (rad/s) of the servos: they hold the joints to the motion; stiffer ones hop.
 STIFF = 60.0
 # Time (s) to come to rest before, and to watch after a motion.
 SETTLE, WATCH = 0.6, 1.0
@@ -57,7 +57,7 @@ def path_of(robot: Robot, motion: ArmMotion) -> Floats:
 
 
 def static_margin(robot: Robot, motion: ArmMotion) -> float:
-    """Return the least force-angle (rad) on the way; NaN where the robot is raised on its flippers.
+    """Return the least force-angle (rad) on the way; NaN where flippers raise the robot.
 
     Raised, it pitches, so that the slope alone does not tell gravity in `base_link`.
     """
@@ -104,7 +104,7 @@ def _at_rest(vehicle: Vehicle, motion: ArmMotion) -> mujoco.MjData:
 
 
 def _ramp(time: float, ramp: float) -> Floats:
-    """Return way (s) and rate of a smooth start to unit speed within `ramp` (s)."""
+    """Return distance (s) and rate of a smooth start to unit speed within `ramp` (s)."""
     if time > ramp:
         return np.array([time - ramp / 2.0, 1.0])
     phase = np.pi * max(time, 0.0) / ramp
@@ -161,7 +161,7 @@ def _random_motion(robot: Robot, rng: np.random.Generator, joints: Sequence[str]
 def tips_all(
     robot: Robot, motions: Sequence[ArmMotion], speed: float, ramp: float, workers: int = 2
 ) -> list[bool]:
-    """Return what `tips` says of each motion, worked on by `workers` processes."""
+    """Return `tips` of each motion, computed by `workers` processes."""
     n = len(motions)
     with Workers(workers, mp_context=get_context('spawn')) as pool:
         return list(pool.map(tips, [robot] * n, motions, [speed] * n, [ramp] * n, chunksize=8))

@@ -1,8 +1,8 @@
-"""Does the advice help? Random cases in which a margin is too small, and the robot does as told.
+"""Does the advice help: random cases with too small a margin, in which the robot follows it.
 
-The share of cases in which the margin the advice is for is larger afterwards, in the simulation;
-how many robots tipped on the way, and how near the others came to it; how far the gain came out as
-promised; and what it costs to find the advice.
+Prints the share of cases in which the margin the advice is for is larger afterwards, in the
+simulation; how many robots tipped on the way, and how near the others came to it; how far the gain
+came out as promised; and what it costs to find the advice.
 
     python bench/bench_advice.py [trials of each kind] [kinds]
 """
@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def gains(found: Sequence[Trial], *, tips: bool) -> str:
-    """Return the median gain that was promised, and that came."""
+    """Return the median gain that was promised, and the one that was measured, as text."""
     chosen = [t for t in found if (t.advice.margin in SIDES) is tips]
     if not chosen:
         return '-'
@@ -60,7 +60,7 @@ def gains(found: Sequence[Trial], *, tips: bool) -> str:
 
 
 def least_of(found: Sequence[Trial]) -> str:
-    """Return the least tilt of all trials on the way, beside that at the start of those."""
+    """Return the least tilt of all trials on the way, and at their start, as text."""
     worst = min(found, key=lambda t: t.least)
     began = (
         f', {math.degrees(worst.before):.1f} at its start' if worst.advice.margin in SIDES else ''

@@ -28,7 +28,7 @@ BAGS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a campaign took: wall and CPU seconds (of judging alone), bags, bytes, hours."""
+    """The cost of a campaign: wall and CPU seconds (of judging alone), bags, bytes, hours."""
 
     wall: float
     cpu: float
@@ -50,7 +50,7 @@ def measure(folder: Path, workers: int) -> Measured:
 
 
 def write_bags(folder: Path, count: int, seconds: float) -> None:
-    """Write one simulated shift, and copies of it: each is judged, as if it were another."""
+    """Write one simulated shift, and differing copies of it so that each is judged."""
     config = load()
     case = case_of('work', config.settings.robot, 1, seconds)
     record(config, case, 1, folder / 'run_0')
@@ -59,7 +59,7 @@ def write_bags(folder: Path, count: int, seconds: float) -> None:
 
 
 def line(name: str, found: Measured) -> str:
-    """Return a line of the table."""
+    """Return one line of the table."""
     rate = 3600.0 / found.wall
     return (
         f'{name:12s} {found.wall:7.1f} {found.cpu:7.1f} {found.bags * rate:10.0f}'

@@ -1,7 +1,7 @@
-"""How often a noisy margin about its limit calls the operator: our alerts beside a bare threshold.
+"""How often a noisy margin about its limit raises an alert: our rules against a bare threshold.
 
 A tilt that swings one degree about the warning limit for ten minutes at 50 Hz, measured with a
-noise of half a degree. What is found is the number of alerts raised.
+noise of half a degree. The number of alerts raised is counted.
 
     python bench/bench_chatter.py [swings a minute ...]
 """
@@ -23,7 +23,7 @@ SEED = 6
 
 
 def hovering(limit: float, swings: float) -> np.ndarray:
-    """Return minus the tilt left (rad), the value that is watched, swinging about its limit."""
+    """Return the watched value, minus the tilt left (rad), swinging about its limit."""
     time = np.arange(0.0, LENGTH, 1.0 / RATE)
     swing = SWING * np.sin(2.0 * math.pi * swings / 60.0 * time)
     return limit + swing + np.random.default_rng(SEED).normal(0.0, NOISE, len(time))

@@ -76,7 +76,7 @@ def main() -> None:
 
 
 def robot_moves(robot: Live) -> None:
-    """Let the arm swing for as long as the bench lasts, so that maps and numbers change."""
+    """Move the arm for as long as the bench lasts, so that maps and numbers change."""
 
     def swing() -> None:
         k = 0
@@ -92,7 +92,7 @@ def robot_moves(robot: Live) -> None:
 
 
 def painted(page: Page) -> None:
-    """Print how old what is seen is, and what was not seen while maps are made anew."""
+    """Print the age of what the page shows, and the frames missed while maps are recomputed."""
     page.run(RECORDER)
     began = time.monotonic()
     time.sleep(SECONDS)
@@ -112,7 +112,7 @@ def painted(page: Page) -> None:
 
 
 def frozen(robot: Live, page: Page) -> None:
-    """Print how long after the last frame the page says that a stopped server is silent."""
+    """Print how long after a stopped server's last frame the page shows that it is silent."""
     page.run(WATCHER)
     robot.console.send_signal(signal.SIGSTOP)
     time.sleep(2.0)
@@ -127,13 +127,13 @@ def quantile(values: list[float], share: float) -> float:
 
 
 def spent(process: Process) -> float:
-    """Return the seconds of processor a process has used."""
+    """Return the CPU seconds that a process has used."""
     fields = Path(f'/proc/{process.pid}/stat').read_text().rpartition(')')[2].split()
     return (int(fields[11]) + int(fields[12])) / TICK
 
 
 def share(what: str, processes: list[Process]) -> list[float]:
-    """Print and return each process's share of a core over SECONDS."""
+    """Print and return each process's share of a core (measured for SECONDS)."""
     before = [spent(p) for p in processes]
     time.sleep(SECONDS)
     shares = [100 * (spent(p) - b) / SECONDS for p, b in zip(processes, before, strict=True)]
@@ -142,7 +142,7 @@ def share(what: str, processes: list[Process]) -> list[float]:
 
 
 def compare(robot: Live) -> None:
-    """Print what ten clients change."""
+    """Print the CPU share of monitor and console without and with ten clients."""
     share('monitor | console, one client', [robot.monitor, robot.console])
     stop, counts = Event(), [0] * CLIENTS
 
@@ -170,7 +170,7 @@ def compare(robot: Live) -> None:
 
 
 def crowd(robot: Live) -> None:
-    """Print what silent and deaf clients change for a monitor, and for one that reads."""
+    """Print the effect of clients that ask nothing or read nothing on monitor and other clients."""
     delays('monitor, message to margins', robot)
     with ExitStack() as stack:
         for make in (deaf,) * DEAF + (silent,) * SILENT:
@@ -201,7 +201,7 @@ def delays(what: str, robot: Live) -> None:
 
 @contextmanager
 def listening(robot: Live) -> Iterator[list[float]]:
-    """Run a monitor of its own beside; the list holds its latencies (ns) afterwards."""
+    """Run a second monitor beside; the list holds its latencies (ns) afterwards."""
     heard: list[float] = []
     program = str(ROOT / 'bench' / 'live_listener.py')
     with running(sys.executable, program, 'monitor', domain=robot.domain) as process:

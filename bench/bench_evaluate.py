@@ -1,4 +1,4 @@
-"""What judging a recording costs: CPU a message and peak memory, beside the floor of reading it.
+"""Cost of judging a recording: CPU per message and peak memory, beside the cost of reading alone.
 
 Makes (or takes) recordings of 6 joints at 200 Hz and an IMU at 400 Hz, then measures each stage
 in a process of its own: unpacking alone (the floor), columns, margins and alerts, the whole of
@@ -58,7 +58,7 @@ def margins(folder: Path) -> Stage:
 
 
 def whole(folder: Path) -> Stage:
-    """Do all that `evaluate` does but print: hash, margins, alerts, criteria, summary."""
+    """Do all that `evaluate` does except printing: hash, margins, alerts, criteria, summary."""
     recording, config = open_recording(folder), load()
     return lambda: evaluate(recording, config=config)
 

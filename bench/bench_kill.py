@@ -1,7 +1,7 @@
-"""kill -9 of a run at random moments: what was left each time. `python bench/bench_kill.py`.
+"""Kills a run at random moments (kill -9) and checks what is left: `python bench/bench_kill.py`.
 
 For every kill: seconds it ran and what it was doing (from its journal), steps with a result,
-recordings that can be read, whether what is closed is whole, seconds between the last message
+recordings that can be read, whether closed ones are complete, seconds between the last message
 recorded and the kill, whether robot and monitor ended too, and whether the run could be continued.
 A kill between two recordings can lose no message; one before the folder is there leaves nothing.
 """
@@ -31,7 +31,7 @@ PATIENCE, GOAL = 5.0, 1.0
 
 @dataclass(frozen=True)
 class Left:
-    """What a killed run has left."""
+    """The state that a killed run has left behind."""
 
     doing: str
     steps: int
@@ -109,7 +109,7 @@ def kill(out: Path, after: float) -> Left:
 
 
 def doing(out: Path) -> str:
-    """Return what the journal says the run was doing."""
+    """Return what the run was doing, by its journal."""
     journal = out / 'journal.jsonl'
     if not journal.is_file():
         return 'not begun'

@@ -46,7 +46,7 @@ def once(mode: str, rates: tuple[int, int], seconds: float) -> dict[str, float]:
 
 
 def told(process: 'subprocess.Popen[str]') -> Any:  # noqa: ANN401 - JSON
-    """Return the line of JSON that a process prints."""
+    """Return the line of JSON that a process prints, decoded."""
     if process.stdout is None:
         sys.exit('expected a process whose output is read')
     return json.loads(process.stdout.readline())

@@ -33,7 +33,7 @@ TURN = [[-math.pi, math.pi]] * 2
 
 
 def plain(x: np.ndarray, y: np.ndarray) -> Mask:
-    """Return the paper's map as one writes it down: equations (1) and (2) on a meshgrid."""
+    """Return the paper's map written in the simplest way: equations (1) and (2) on a meshgrid."""
     theta1, theta2 = np.meshgrid(x, y, indexing='ij')
     a, b = PAPER.moment1, PAPER.moment2
     tau1 = a * np.cos(theta1) + b * np.cos(theta1 + theta2)

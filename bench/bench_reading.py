@@ -1,4 +1,4 @@
-"""How fast a bag becomes columns, against the floor of reading it and against other readers.
+"""Speed of reading a bag into columns, against unpacking alone and against other readers.
 
 Makes a rosbag2 folder (JointState of 6 joints at 200 Hz, Imu at 400 Hz, values quantised like real
 sensors, 1 MiB chunks with checksums), then runs every reader in turn, each in a process of its own.
@@ -94,7 +94,7 @@ def imu_rows(times: NDArray[np.int64], rng: np.random.Generator) -> Rows:
 
 
 def make(folder: Path, seconds: float, compression: Compression, *, heavy: bool) -> int:
-    """Record the bag; the number of messages of joints and IMU."""
+    """Record the bag; return the number of messages of joints and IMU."""
     rng = np.random.default_rng(1)
     count = 0
     pool = rng.integers(0, 256, 1 << 24, dtype=np.uint8).tobytes()
@@ -125,7 +125,7 @@ Unpack = Callable[[str, memoryview, memoryview], None]
 
 
 def system_lz4() -> Unpack | None:
-    """The system's own liblz4, the least that a frame can cost; None where there is none."""
+    """The system's own liblz4, the least cost of unpacking a frame; None where there is none."""
     found = ctypes.util.find_library('lz4')
     if found is None:
         return None

@@ -1,7 +1,7 @@
-"""Does it warn in time? Labelled runs on both cores: `python bench/bench_scenarios.py`.
+"""Do alerts come in time: labelled runs on both cores; `python bench/bench_scenarios.py`.
 
-Prints recall of critical events, warning time before them by kind (p5, p50), critical alerts for
-nothing an hour of quiet work by kind, the same for predictions, and how fast the simulation was.
+Prints recall of critical events, warning time before them by kind (p5, p50), false critical alerts
+per hour of quiet work by kind, the same for predictions, and how fast the simulation was.
 In parts: `--runs 0 --hours 5 --seed 30 --json b.json`; then `--runs 0 --hours 0 --add *.json`.
 """
 
@@ -138,7 +138,7 @@ def percentiles(left: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> list
 
 
 def early(found: list[Labelled]) -> None:
-    """Print critical alerts of runs meant to be critical in which nothing happened after all."""
+    """Print false critical alerts in runs meant to be critical."""
     calm = [r for r in found if not r.events]
     alerts = Counter(code for r in calm for _, code, _ in r.for_nothing)
     told = ', '.join(f'{n} {code}' for code, n in alerts.most_common()) or 'none'
@@ -146,7 +146,7 @@ def early(found: list[Labelled]) -> None:
 
 
 def silence(work: list[Labelled]) -> None:
-    """Print what was said for nothing in quiet work."""
+    """Print false alerts in quiet work."""
     if not work:
         return
     hours = sum(r.seconds for r in work) / 3600.0

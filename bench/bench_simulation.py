@@ -1,4 +1,4 @@
-"""How much faster than real time a vehicle is simulated and recorded: one core, and both.
+"""Speed of simulating and recording a vehicle, as a factor of real time: on one core, and on both.
 
 A run is recorded with the IMU at 400 Hz and the joints at 200 Hz into a rosbag2 folder (MCAP, zstd,
 CRC). CPU seconds for one run, wall seconds for a batch on two processes; medians of rounds in turn.
@@ -62,7 +62,7 @@ def kept(name: str, seconds: float, seed: int) -> float:
 
 
 def bare(seconds: float) -> float:
-    """Return CPU seconds of the vehicle stepped in one call: what recording adds to."""
+    """Return CPU seconds of the vehicle alone, stepped in one call without sensors or recording."""
     vehicle = vehicle_of(config().settings.robot, BUILD)
     data = mujoco.MjData(vehicle.model)
     start = time.process_time()

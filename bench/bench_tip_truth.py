@@ -55,7 +55,7 @@ def quasi_static(robot: Robot, count: int) -> None:
 
 
 def print_errors(judged: Sequence[Judged]) -> None:
-    """Print what the model's margin is when the simulation tips, and the cases where it is far."""
+    """Print the model's margin when the simulation tips, and the cases far from zero."""
     left, tilt = (np.degrees([getattr(j, name) for j in judged]) for name in ('left', 'error'))
     print(f'when the simulated robot tips ({np.isfinite(left).sum()} cases), deg:')
     print_spread('margin the model still shows', left[np.isfinite(left)])

@@ -81,7 +81,7 @@ def bring(robot: Live, page: Page, state: str, level: str) -> None:
 
 
 def go(robot: Live, posture: tuple[float, ...]) -> None:
-    """Move slowly to a posture and stay, so that nothing is foretold of the motion any more."""
+    """Move slowly to a posture and stay until no prediction of the motion is active."""
     for k in range(1, STEPS + 1):
         pairs = zip(POSTURES['ok'], posture, strict=True)
         *q, roll = (a + (b - a) * k / STEPS for a, b in pairs)

@@ -1,4 +1,4 @@
-"""Seeded runs with known truth: what happened, what was said before it, and what for nothing."""
+"""Seeded runs labelled with the truth: critical events, alerts before them, and false alerts."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Recording
 from ugv_acceptance.type_aliases import Floats
 
 TIP, SATURATION = 'tip-over', 'saturation'
-# Alerts that tell of each kind of event: the level is near, or comes at the present rate.
+# Alerts that announce each kind of event: the level is near, or is predicted.
 TELL = {
     TIP: ('TIP_OVER', 'TIP_AHEAD'),
     SATURATION: ('TORQUE_LIMIT', 'TORQUE_AHEAD', 'EFFORT_LIMIT', 'MOTOR_WEAK'),
@@ -53,7 +53,7 @@ JOINTS, IMU = 100.0, 200.0
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something critical that really happened at `time` (s), and what was said of it.
+    """A critical event that really happened at `time` (s), and the alerts about it.
 
     `warned`, `alarmed` and `predicted` (s) are when the first alert, the critical one and the
     prediction came that were there when it happened; infinite where none was. `impact` says that
@@ -71,7 +71,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Labelled:
-    """A run with its truth: `events` in order, and what was said where there was none.
+    """A run with its true `events`, in order, and its false alerts.
 
     `for_nothing` lists (level, code, subject) of critical alerts with which no event came,
     `warnings` those of level WARN.
@@ -86,12 +86,12 @@ class Labelled:
 
     @property
     def predictions_for_nothing(self) -> int:
-        """How many predictions came with no event."""
+        """The number of predictions after which no event came."""
         return sum(code in AHEAD for _, code, _ in self.warnings)
 
 
 def cases(config: Config, count: int, seed: int) -> Iterator[tuple[str, int, Case]]:
-    """Yield about `count` cases (kind, seed, case) in which something may happen."""
+    """Yield about `count` cases (kind, seed, case) in which an event may happen."""
     robot = config.settings.robot
     shares = [(kind, '', '', n) for kind, n in MIX.items()]
     shares += [(k, f, s, (100 - sum(MIX.values())) // len(FAULTY)) for k, f, s in FAULTY]
@@ -114,7 +114,7 @@ def work_cases(config: Config, hours: float, seed: int) -> Iterator[tuple[str, i
 
 
 def label(config: Config, kind: str, seed: int, case: Case) -> Labelled:
-    """Simulate and evaluate a case; return what happened and what was said."""
+    """Simulate and evaluate a case; return its events and its alerts."""
     (recording,) = play(config, case, seed, length=np.inf)
     evaluator = RecordedEvaluator(config.settings)
     evaluator.start(EPOCH)
@@ -168,7 +168,7 @@ def hit(config: Config, recording: Recording, time: float) -> bool:
 
 
 def batch_of(config: Config, recording: Recording, case: Case, seed: int) -> Batch:
-    """Return what the evaluation takes of a recording: its messages as they arrive, as columns."""
+    """Return a recording's messages as the evaluation takes them: columns in order of arrival."""
     rng = np.random.default_rng(seed)
     corruption = Corruption(case.faults, config.settings.robot.joint_names)
     joints, imu = corruption.joints(recording.joints), corruption.imu(recording.imu)
@@ -218,7 +218,7 @@ def _payloads(config: Config, recording: Recording, case: Case) -> PayloadColumn
 
 
 def _said(event: Event, log: Sequence[Alert]) -> Event:
-    """Return the event with when it was told of, by alerts that were there when it happened."""
+    """Return the event with the times (s) of the alerts that were active when it happened."""
     at = EPOCH + round(event.time * 1e9)
     there = [
         a
@@ -246,7 +246,7 @@ Said = tuple[tuple[str, str, str], ...]
 
 
 def _for_nothing(log: Sequence[Alert], events: Sequence[Event]) -> tuple[Said, Said]:
-    """Return the critical alerts and the warnings of a run in which nothing critical happened."""
+    """Return the critical alerts and the warnings of a run that belong to no event."""
     said = [] if events else [(LEVELS[a.rule.level], a.rule.code, a.rule.subject) for a in log]
     critical = tuple(one for one in said if one[0] != 'WARN')
     return critical, tuple(one for one in said if one[0] == 'WARN')

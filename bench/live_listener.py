@@ -1,4 +1,4 @@
-"""One way to listen to the load of bench_live.py; prints CPU, latencies and counts as JSON."""
+"""One of the listeners compared by bench_live.py; prints CPU, latencies and counts as JSON."""
 
 import json
 import struct
@@ -33,7 +33,7 @@ class Tally:
         self.cpu = 0.0
 
     def seen(self, stamp: int) -> None:
-        """Take the stamp (ns) of a message that is dealt with."""
+        """Record the latency of a handled message by its stamp (ns)."""
         self.latencies.append(time.time_ns() - stamp)
         if len(self.latencies) == WARM:
             self.cpu = time.process_time()
@@ -49,7 +49,7 @@ class Tally:
 
 
 def empty(tally: Tally, *, raw: bool) -> Node:
-    """Return a node that only listens."""
+    """Return a node that only subscribes."""
     node = rclpy.create_node('empty')
     qos = best_effort(DEPTH)
     take = tally.raw if raw else tally.decoded
@@ -59,7 +59,7 @@ def empty(tally: Tally, *, raw: bool) -> Node:
 
 
 def monitor(tally: Tally) -> Node:
-    """Return the monitor, which tells of every margin."""
+    """Return the monitor, which publishes every margin."""
     node = Monitor()
     node.bring_up()
     session = node.session

@@ -80,7 +80,7 @@ def make(made: Run, into: Path) -> str:
 
 
 def spoil(into: Path, names: list[str]) -> None:
-    """Add what fleets have: a copy, a file that breaks off, and one that is no recording."""
+    """Add the faults of real fleets: a copy, a truncated file, and one that is no recording."""
     shutil.copytree(into / names[0], into / 'copies' / 'run_0000_again')
     whole = next((into / names[-1]).glob('*.mcap')).read_bytes()
     broken = into / 'damaged'

@@ -1,4 +1,4 @@
-"""A monitor as one writes it first: decoded messages, small NumPy arrays, publishing every time.
+"""The simplest possible monitor, for comparison: decoded messages, NumPy, publishing every time.
 
 Torques by the paper's two-link equations, tilt left by Papadopoulos and Rey over four corners; no
 alerts, no staleness, no payload, no checks. It stands beside the real one in bench_live.py.

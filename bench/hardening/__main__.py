@@ -1,4 +1,4 @@
-"""Prints what was tried, what must hold, and what was measured: `python -m bench.hardening`.
+"""Runs the hardening trials and prints requirement and result of each: `python -m bench.hardening`.
 
 `--only 1,2` chooses rows, `--share` takes a part of each; the exit code is 1 where a row did not
 hold or broke off. Two lines of rows, ten minutes over DDS and what is done to whole processes, run
@@ -57,7 +57,7 @@ def started(words: list[str]) -> 'subprocess.Popen[bytes]':
 
 
 def tried(row: Row, share: float) -> bool:
-    """Try a row and print its outcomes; return whether none failed."""
+    """Run a row and print its outcomes; return whether none failed."""
     start, held = time.perf_counter(), True
     for measured, good in outcomes(row, share):
         held = held and good is not False
@@ -68,7 +68,7 @@ def tried(row: Row, share: float) -> bool:
 
 
 def outcomes(row: Row, share: float) -> Iterable[Outcome]:
-    """Yield a row's outcomes; one that breaks off has failed, and the others still run."""
+    """Yield a row's outcomes; an exception counts as a failure, and other rows still run."""
     try:
         yield from row.run(share)
     except Exception as error:  # noqa: BLE001 - whatever it is, it is a trial that failed

@@ -1,4 +1,4 @@
-"""Trials of files left behind: by kill -9 at random moments, on a full disk, on a read-only one."""
+"""Trials of files left by a process killed at a random moment, and of full or read-only disks."""
 
 import tempfile
 from collections.abc import Callable, Iterable
@@ -27,7 +27,7 @@ def kills(share: float) -> Iterable[Outcome]:
 
 
 def disks(_share: float) -> Iterable[Outcome]:
-    """Write onto disks that are full or read-only."""
+    """Write to disks that are full or read-only."""
     for state in ('full', 'read-only'):
         yield in_folder(lambda folder, of=state: full_disk.verbs(PASS, folder, of))  # type: ignore[misc]
         yield in_folder(lambda folder, of=state: full_disk.watched(folder, of))  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""Trials of messages: by the million, for a day, of wrong clocks, broken drivers, parameters."""
+"""Trials of messages: millions of mutated ones, a whole day, wrong clocks, broken drivers."""
 
 from collections.abc import Iterable
 
@@ -9,25 +9,25 @@ from hardening.outcome import Outcome
 
 
 def mutants(share: float) -> Iterable[Outcome]:
-    """Take a million mutants of each input."""
+    """Decode and evaluate a million mutated messages of each input."""
     return decoding.trial(int(1_000_000 * share)).values()
 
 
 def day(share: float) -> Iterable[Outcome]:
-    """Evaluate a day."""
+    """Evaluate a simulated day of messages with faults in it."""
     yield long_day.trial(int(86_400 * share))
 
 
 def clocks(_share: float) -> Iterable[Outcome]:
-    """Try every wrong clock."""
+    """Evaluate messages with every kind of wrong clock."""
     return wrong_clocks.outcomes()
 
 
 def values(_share: float) -> Iterable[Outcome]:
-    """Send every broken message."""
+    """Evaluate every kind of broken message."""
     return broken.outcomes()
 
 
 def parameters(share: float) -> Iterable[Outcome]:
-    """Put 10,000 sets to a running monitor."""
+    """Set 10,000 random sets of parameters on a running monitor."""
     yield parameter_sets.trial(int(10_000 * share))

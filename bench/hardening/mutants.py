@@ -1,4 +1,4 @@
-"""Mutants of a source: one small change of one expression each.
+"""Mutants of a source for mutation testing: one small change of one expression each.
 
 A comparison, an operator, a constant, a sign or a choice is turned into another; a number over 1000
 is doubled, for one more would be lost in it. Decorators are left as they are: `slots` and `frozen`

@@ -73,13 +73,13 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Which tests ran a line of a file, and how long each takes."""
+    """The tests that ran each line of a file, and how long each takes."""
 
     tests: Mapping[str, Lines]
     seconds: dict[str, float]
 
     def of(self, mutant: Mutant) -> list[str]:
-        """Return the tests to try a mutant by: its file's own, then the quickest; to PATIENCE."""
+        """Return the tests to try a mutant with, its file's own first, then the quickest."""
         by_line = self.tests.get(mutant.file, {})
         lines = [str(line) for line in mutant.lines if any(by_line.get(str(line), ()))]
         ran = {test for line in lines or by_line for test in by_line[line] if test}
@@ -91,7 +91,7 @@ class Reach:
 
 
 def copied(folder: Path) -> Path:
-    """Return a copy of what tests need."""
+    """Return a copy of the files that the tests need."""
     for part in PARTS:
         shutil.copytree(ROOT / part, folder / part)
     shutil.copy(ROOT / 'pyproject.toml', folder)
@@ -99,7 +99,7 @@ def copied(folder: Path) -> Path:
 
 
 def forked(work: Callable[[], int], copy: Path) -> int:
-    """Start `work` in a copy of this process and of the code; return its process's number."""
+    """Start `work` in a forked copy of this process and of the code; return its process id."""
     pid = os.fork()
     if pid:
         return pid
@@ -151,13 +151,13 @@ def measure(copy: Path, chosen: Iterable[str]) -> int:
 
 
 def state() -> str:
-    """Return a number of the code and the tests as they stand."""
+    """Return a hash of the code and the tests as they stand."""
     paths = sorted(path for part in PARTS[:2] for path in (ROOT / part).rglob('*.py'))
     return hashlib.sha256(b''.join(path.read_bytes() for path in paths)).hexdigest()[:16]
 
 
 def trial(copy: Path, mutant: Mutant, tests: list[str]) -> tuple[int, Callable[[], None]]:
-    """Start the tests of a mutant; return the process's number and what undoes the change."""
+    """Start the tests of a mutant; return the process id and a function that undoes the change."""
     path = copy / PACKAGE / mutant.file
     whole = path.read_text('utf-8')
     path.write_text(mutated(whole, mutant.place), 'utf-8')

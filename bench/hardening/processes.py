@@ -1,4 +1,4 @@
-"""Trials of whole processes: killed at random moments, and with their code changed."""
+"""Trials of whole processes: runs killed at random moments, and mutation testing of the code."""
 
 import re
 import subprocess

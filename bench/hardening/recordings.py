@@ -1,4 +1,4 @@
-"""Trials of files: recordings damaged and read in several ways, robots of an attacker."""
+"""Trials of files: damaged recordings, one recording read in several ways, hostile robot files."""
 
 import tempfile
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ CONFORMANCE = ROOT.parent / 'shared' / 'bags' / 'conformance'
 
 
 def damaged(share: float) -> Iterable[Outcome]:
-    """Cut at every byte, flip 10,000 bits, 4,000 wrong lengths, bombs of 1 GiB, 656 files."""
+    """Read files cut at every byte, with 10,000 flipped bits, wrong lengths, bombs of 1 GiB."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder)
         yield damage.cuts(path, round(1 / share), PATIENCE)
@@ -29,7 +29,7 @@ def damaged(share: float) -> Iterable[Outcome]:
 
 
 def same(_share: float) -> Iterable[Outcome]:
-    """Judge the three recordings that ship."""
+    """Judge the three recordings that ship in several ways that must not change the result."""
     for name in ('packbot_pass', 'packbot_fail', 'packbot_gap'):
         with tempfile.TemporaryDirectory() as folder:
             yield sameness.trial(ROOT / 'bags' / name, Path(folder))

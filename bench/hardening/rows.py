@@ -1,4 +1,4 @@
-"""The table of trials: what is tried, what must hold, and what runs it."""
+"""The table of hardening trials: what is tried, what must hold, and the function that runs it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

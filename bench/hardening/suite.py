@@ -18,7 +18,7 @@ LEAST_ELSEWHERE = 85
 
 
 def of_tests(*chosen: str, words: str = '') -> Callable[[float], Iterable[Outcome]]:
-    """Return a trial that runs these files of test/, of which those that match `words`."""
+    """Return a trial that runs these files of test/, limited to tests that match `words`."""
 
     def run(_share: float) -> Iterable[Outcome]:
         yield passed(chosen, words)
@@ -27,7 +27,7 @@ def of_tests(*chosen: str, words: str = '') -> Callable[[float], Iterable[Outcom
 
 
 def passed(chosen: Iterable[str], words: str = '', *options: str) -> Outcome:
-    """Run tests and return how many passed."""
+    """Run tests and return how many passed as an outcome."""
     command = [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', *options]
     command += [str(Path('test', name)) for name in chosen]
     command += ['-k', words] if words else []

@@ -1,4 +1,4 @@
-"""Trials over real DDS, between real processes: silence, strangers, loss, minutes of real time."""
+"""Trials over real DDS, between real processes: silent inputs, second publishers, lost messages."""
 
 import tempfile
 from collections.abc import Iterable
@@ -13,12 +13,12 @@ SOAK, SHORTEST = 600.0, 20.0
 
 
 def real_time(share: float) -> Iterable[Outcome]:
-    """Watch a robot for ten minutes."""
+    """Watch a robot in real time for ten minutes."""
     yield soak.trial(max(SHORTEST, SOAK * share))
 
 
 def silences(share: float) -> Iterable[Outcome]:
-    """End an input in each way ten times; let it never speak; offer another quality of service."""
+    """Silence an input in each way ten times; one that never starts; one whose QoS differs."""
     for way in silence.ENDS:
         yield silence.trial(way, max(1, round(10 * share)))
     for kind in ('mute', 'silent joints', 'silent imu'):
