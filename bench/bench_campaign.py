@@ -50,7 +50,7 @@ def measure(folder: Path, workers: int) -> Measured:
 
 
 def write_bags(folder: Path, count: int, seconds: float) -> None:
-    """Write one simulated shift, and differing copies of it so that each is judged."""
+    """Write one simulated shift and copies of it; each is judged as if it were another run."""
     config = load()
     case = case_of('work', config.settings.robot, 1, seconds)
     record(config, case, 1, folder / 'run_0')

@@ -63,7 +63,7 @@ def arguments(row: tuple[str, tuple[str, ...], str, str], angle: str, out: Path)
 
 
 def test_every_option_that_tells_of_an_angle_is_in_the_table() -> None:
-    """A new option with an angle is tested as these are."""
+    """Every option whose help speaks of an angle is tested here."""
     told = {
         (verb, option)
         for verb in VERBS
@@ -77,7 +77,7 @@ def test_every_option_that_tells_of_an_angle_is_in_the_table() -> None:
 def test_a_bare_number_is_no_angle(
     row: tuple[str, tuple[str, ...], str, str], tmp_path: Path
 ) -> None:
-    """Exit code 2 and one line with what was typed and both spellings; nothing is written."""
+    """An angle without unit ends with 2 and one line with both spellings; nothing is written."""
     bare = '17'
     words = [word.replace('17/s', '17') for word in arguments(row, bare, tmp_path)]
     done = ugv(*words)
@@ -94,7 +94,7 @@ def test_a_bare_number_is_no_angle(
 def test_degrees_and_radians_of_one_angle_give_the_same(
     row: tuple[str, tuple[str, ...], str, str], tmp_path: Path
 ) -> None:
-    """The same bytes in what is printed and written."""
+    """An angle in degrees and the same in radians give the same output, byte for byte."""
     found = []
     for name, angle in (('first', '17deg'), ('second', f'{math.radians(17)!r}rad')):
         out = tmp_path / name
@@ -117,13 +117,13 @@ def test_a_fault_of_a_run_is_read_as_one_of_simulate() -> None:
 
 
 def test_zero_is_the_same_in_both_units() -> None:
-    """It needs none."""
+    """An angle of 0 needs no unit."""
     robot = load().settings.robot
     assert posture_from(robot, 'shoulder_joint=0,elbow_joint=-0.0') == [0.0, 0.0, 0.0, 0.0]
 
 
 def test_a_mission_s_angles_take_their_unit(tmp_path: Path) -> None:
-    """What stands in its file is written as on the command line."""
+    """Angles in a mission's file take their unit, as on the command line."""
     mission = tmp_path / 'mission.json'
     for phase in ({'posture': 'shoulder_joint=17'}, {'vary': {'slope': '0deg..17'}}):
         mission.write_text(json.dumps({'phases': [phase]}))
@@ -133,7 +133,7 @@ def test_a_mission_s_angles_take_their_unit(tmp_path: Path) -> None:
 
 
 def test_a_joint_that_slides_takes_a_length_with_its_unit() -> None:
-    """Metres or millimetres cannot be told from a bare number either."""
+    """The position of a prismatic joint takes its unit: a bare number is refused."""
     lift = Joint('lift', 'prismatic', 'base_link', 'mast')
     robot = Robot('r', (Link('base_link', 1.0), Link('mast', 1.0)), (lift,), ('lift',))
     assert posture_from(robot, 'lift=25cm') == posture_from(robot, 'lift=250 mm') == [0.25]
@@ -158,7 +158,7 @@ def test_a_joint_that_slides_takes_a_length_with_its_unit() -> None:
 def test_a_payload_heavier_than_the_robot_is_doubted(
     words: tuple[str, ...], tmp_path: Path
 ) -> None:
-    """One line on standard error; the numbers are computed all the same."""
+    """A payload heavier than the robot prints a warning; the numbers are computed."""
     done = ugv(*(word.replace('OUT', str(tmp_path)) for word in words))
     told = [line for line in done.stderr.splitlines() if 'warning' in line]
     assert len(told) == 1
@@ -169,7 +169,7 @@ def test_a_payload_heavier_than_the_robot_is_doubted(
 
 
 def test_a_doubted_payload_is_doubted_in_what_is_written(tmp_path: Path) -> None:
-    """The JSON documents and the map's picture say so too."""
+    """The warning of a doubtful payload is also in JSON documents and a map's picture."""
     for words in (
         ('model', '--json', '--payload', '4000'),
         ('speed', '--json', '--payload', '4000', '--samples', '11'),
@@ -184,5 +184,5 @@ def test_a_doubted_payload_is_doubted_in_what_is_written(tmp_path: Path) -> None
 
 @pytest.mark.parametrize('payload', ['4', '4000 g', '24'])
 def test_a_payload_the_robot_may_carry_is_not_doubted(payload: str) -> None:
-    """Nothing is said of what is possible."""
+    """A payload that the robot may carry gives no warning."""
     assert 'warning' not in ugv('speed', '--payload', payload, '--samples', '11').stderr

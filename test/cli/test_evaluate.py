@@ -56,7 +56,7 @@ def write_run(
 def test_nobody_reads_what_is_printed(
     name: str, code: int, repository: Path, tmp_path: Path
 ) -> None:
-    """A pipe that is closed, as by `| head`, costs no file, says no word, changes no exit code."""
+    """A closed pipe, as by `| head`, changes no exit code, prints nothing and loses no file."""
     files = [tmp_path / name for name in ('r.json', 'r.html', 'r.xml')]
     options = [
         x for pair in zip(('--json', '--report', '--junit'), files, strict=True) for x in pair
@@ -79,7 +79,7 @@ def test_nobody_reads_what_is_printed(
 def test_the_runs_that_ship_give_their_verdicts(
     name: str, code: int, verdict: str, repository: Path, tmp_path: Path
 ) -> None:
-    """In the exit code, in the first line, and in the JSON with all that it promises."""
+    """The recordings that ship give their verdicts in exit code, first line and JSON."""
     found = tmp_path / 'result.json'
     done = evaluate(repository / 'bags' / name, '--json', found)
     assert done.returncode == code, done.stderr
@@ -97,7 +97,7 @@ def test_the_runs_that_ship_give_their_verdicts(
 
 
 def test_a_posture_beyond_the_limit_fails_for_that_joint(tmp_path: Path) -> None:
-    """The paper's arm with 4 kg needs 74.8 N m at full reach, of 50."""
+    """The paper's arm with 4 kg at full reach fails: 74.8 N m of 50."""
     found = tmp_path / 'result.json'
     done = evaluate(write_run(tmp_path / 'run', STRETCHED), '--json', found)
     assert done.returncode == 1
@@ -107,14 +107,14 @@ def test_a_posture_beyond_the_limit_fails_for_that_joint(tmp_path: Path) -> None
 
 
 def test_a_silent_imu_is_no_pass(tmp_path: Path) -> None:
-    """A quarter of the run without attitude."""
+    """A run whose IMU is silent for a quarter of the time does not pass."""
     done = evaluate(write_run(tmp_path / 'run', silent=(1.0, 2.0), seconds=4.0))
     assert done.returncode == 3
     assert 'no message from imu' in done.stdout
 
 
 def test_a_recording_that_breaks_off_is_no_pass(repository: Path, tmp_path: Path) -> None:
-    """An eighth of a good run, whether or not metadata.yaml says how much there was."""
+    """A truncated recording of a good run does not pass, with or without metadata.yaml."""
     run = Path(shutil.copytree(repository / 'bags' / 'packbot_pass', tmp_path / 'run'))
     file = run / 'packbot_pass_0.mcap'
     file.write_bytes(file.read_bytes()[:60_000])
@@ -125,7 +125,7 @@ def test_a_recording_that_breaks_off_is_no_pass(repository: Path, tmp_path: Path
 
 
 def test_a_recording_with_a_part_missing_is_no_pass(repository: Path, tmp_path: Path) -> None:
-    """The files that are there are whole, but metadata.yaml tells of more."""
+    """A recording does not pass if metadata.yaml lists more files than are there."""
     run = write_run(tmp_path / 'run')
     shutil.copy(repository / 'bags' / 'packbot_pass' / 'metadata.yaml', run)
     (run / 'run_0.mcap').rename(run / 'packbot_pass_0.mcap')
@@ -135,14 +135,14 @@ def test_a_recording_with_a_part_missing_is_no_pass(repository: Path, tmp_path: 
 
 
 def test_less_than_a_second_is_no_pass(tmp_path: Path) -> None:
-    """Nothing can be seen to be silent in it."""
+    """A recording shorter than 1 s does not pass: no silence could be noticed in it."""
     done = evaluate(write_run(tmp_path / 'run', seconds=0.9))
     assert done.returncode == 3
     assert 'duration: 0.89 s; length of the recording at least 1 s' in done.stdout
 
 
 def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
-    """They came: who is told only of silence looks for a dead driver."""
+    """Joint states of another robot's joints are reported as that, not as silence."""
     done = evaluate(write_run(tmp_path / 'run', names=['a', 'b', 'c', 'd']))
     assert done.returncode == 3
     assert '/joint_states: 150 messages' in done.stdout
@@ -150,7 +150,7 @@ def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
 
 
 def test_csv_has_one_row_a_message(tmp_path: Path) -> None:
-    """With a header, unknown margins empty, and the same worst value as the result."""
+    """The CSV has a header and a row per message, and the worst value of the result."""
     table, found = tmp_path / 'margins.csv', tmp_path / 'result.json'
     evaluate(write_run(tmp_path / 'run'), '--csv', table, '--json', found)
     rows: list[dict[str, Any]] = list(csv.DictReader(table.read_text().splitlines()))
@@ -168,7 +168,7 @@ def test_csv_has_one_row_a_message(tmp_path: Path) -> None:
 
 
 def test_the_same_bag_gives_the_same_bytes(tmp_path: Path) -> None:
-    """Twice the same result."""
+    """Evaluating a recording twice gives the same bytes of result."""
     run = write_run(tmp_path / 'run', STRETCHED)
     texts = []
     for k in range(2):
@@ -178,7 +178,7 @@ def test_the_same_bag_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_of_several_bags_the_worst_counts(tmp_path: Path) -> None:
-    """A failure beside a pass fails; a bag that cannot be read does not hide it."""
+    """Of several bags the worst verdict counts; an unreadable one does not hide a FAIL."""
     runs = [write_run(tmp_path / 'good'), write_run(tmp_path / 'bad', STRETCHED)]
     found = tmp_path / 'result.json'
     assert evaluate(*runs, tmp_path / 'none', '--json', found).returncode == 1
@@ -249,7 +249,7 @@ def test_effort_of_a_foreign_recording_shows_its_payload(
 
 
 def test_no_recording_of_others_crashes_or_hangs(shared_bags: Path, tmp_path: Path) -> None:
-    """Each gives a verdict, or one line that says why not."""
+    """Every recording made by others gives a verdict or one line that says why not."""
     bags = sorted(
         {path.parent if (path.parent / 'metadata.yaml').exists() else path
          for folder in shared_bags.iterdir() if folder.is_dir() and folder.name != 'conformance'

@@ -31,7 +31,7 @@ def run(*arguments: str) -> str:
 
 @pytest.mark.parametrize('kind', ['torque', 'rollover', 'payload', 'drag'])
 def test_every_map_in_every_form(kind: str, tmp_path: Path) -> None:
-    """Four maps as SVG, PNG, CSV and NPZ."""
+    """Each of the four maps can be written as SVG, PNG, CSV and NPZ."""
     files = [tmp_path / f'map.{ending}' for ending in ('svg', 'png', 'csv', 'npz')]
     run(kind, *SMALL, *(x for file in files for x in ('--out', str(file))))
     assert files[0].read_text().startswith('<svg')
@@ -72,7 +72,7 @@ def test_orientation_posture_and_payload_count(tmp_path: Path) -> None:
 
 
 def test_thresholds_move_the_areas(tmp_path: Path) -> None:
-    """With failure at 50 % and caution at 40 % more of the map fails."""
+    """With --caution 40 % and --failure 50 % more of the torque map fails."""
     out = ('--out', str(tmp_path / 'map.csv'))
     usual = run('torque', *SMALL, *out)
     strict = run('torque', *SMALL, *out, '--caution', '40', '--failure', '50')
@@ -81,7 +81,7 @@ def test_thresholds_move_the_areas(tmp_path: Path) -> None:
 
 
 def test_the_assumptions_are_said(tmp_path: Path) -> None:
-    """Attitude, payload, other joints and limits."""
+    """A map states its attitude, payload, other joints and limits."""
     text = run('rollover', *SMALL, '--orientation', 'nose-up', '--out', str(tmp_path / 'map.csv'))
     assert 'pitch -30°; payload 4 kg; turret_joint 0°, flipper_joint 0°' in text
 

@@ -67,7 +67,7 @@ def test_the_payload_that_is_left_is_exact() -> None:
 
 
 def test_a_posture_changes_torques() -> None:
-    """An arm straight up needs none."""
+    """An arm straight up needs no torque."""
     joints = {
         joint['name']: joint for joint in described('--posture', 'shoulder_joint=90deg')['joints']
     }
@@ -98,13 +98,13 @@ def test_an_inverted_robot_has_no_margins() -> None:
 
 
 def test_a_payload_replaces_the_configured_one() -> None:
-    """In pounds too."""
+    """--payload replaces the configured payload, in kg or pounds."""
     assert described('--payload', '10 lb')['payload']['mass_kg'] == pytest.approx(4.5359237)
     assert described('--payload', '0')['warnings'] == []
 
 
 def test_json_has_no_infinity() -> None:
-    """What is not limited is null, so that any reader of JSON takes it."""
+    """In JSON a number without limit is null, so that any reader takes it."""
     text = output_of('--json')
     json.loads(text, parse_constant=pytest.fail)
     joints = {joint['name']: joint for joint in json.loads(text)['joints']}
@@ -132,7 +132,7 @@ def test_a_wrong_option_is_refused(arguments: dict[str, str], sentence: str) -> 
 
 
 def test_a_foreign_robot_needs_its_urdf() -> None:
-    """Its configuration ships, its URDF does not: the error says what to give."""
+    """A configuration that ships without its URDF gives an error that names --urdf."""
     with pytest.raises(BadConfig, match='--urdf'):
         load(Path('abitobot'))
 
@@ -147,7 +147,7 @@ def test_a_prismatic_joint_is_shown_in_metres_and_newtons(shared_bags: Path) -> 
 
 @pytest.mark.parametrize('shoulder', ['90deg', '89.99999999deg', '89.9deg', '-90deg', '90.01deg'])
 def test_a_load_no_joint_feels_is_no_number(shoulder: str) -> None:
-    """Of an arm upright the limits allow nothing that a person could carry to it or read."""
+    """An upright arm, which feels no load, shows no number for the load that is allowed."""
     text = output_of('--posture', f'shoulder_joint={shoulder}')
     assert 'no joint limit bounds it in this posture; tipping may, see below' in text
     assert max(len(digits) for digits in re.findall(r'\d+', text.split('sha256')[1][20:])) < 7
@@ -165,5 +165,5 @@ def test_tables_fit_whatever_is_carried(payload: str) -> None:
 
 
 def test_rounding_bears_no_load() -> None:
-    """In the document the largest load of an upright arm is null: nothing bounds it."""
+    """The largest load of an upright arm is null in JSON: nothing bounds it."""
     assert described('--posture', 'shoulder_joint=90deg')['payload']['largest_kg'] is None

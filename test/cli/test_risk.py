@@ -44,7 +44,7 @@ def test_a_person_reads_probability_convergence_and_what_matters() -> None:
 
 
 def test_a_seed_gives_the_same_numbers() -> None:
-    """And another seed others."""
+    """One seed gives the same numbers again, and another seed gives others."""
     assert document('--seed', '4') == document('--seed', '4')
     assert document('--seed', '4')['phases'] != document('--seed', '5')['phases']
 
@@ -128,7 +128,7 @@ def test_wrong_options_are_named(arguments: tuple[str, ...], words: str) -> None
     ],
 )
 def test_a_wrong_mission_is_named(text: str, words: str, tmp_path: Path) -> None:
-    """File, phase and key."""
+    """An error in a mission's file names file, phase and key."""
     mission = tmp_path / 'mission.json'
     mission.write_text(text)
     with pytest.raises(BadConfig, match=re.escape(words)):

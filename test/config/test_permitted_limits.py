@@ -81,7 +81,7 @@ def test_with_a_reason_it_is_taken_and_warned_of(of: Permitted, tmp_path: Path) 
 
 @each
 def test_no_reason_permits_what_cannot_be_meant(of: Permitted, tmp_path: Path) -> None:
-    """Beyond the second range even a reason does not help."""
+    """A value beyond the second range is refused even with a reason in unsafe_limits."""
     text = yaml_of(of, 2.0 * of.ceiling, f'unsafe_limits: {WHY}\n')
     with pytest.raises(BadConfig, match='unsafe_limits'):
         load(write_robot(tmp_path, text))
@@ -98,7 +98,7 @@ def test_the_ends_of_a_range_are_inside_it(of: Permitted, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize('reason', ['""', '"  "', '"a\\nb"', f'"{"x" * 201}"', '1', 'true'])
 def test_a_reason_that_says_nothing_is_refused(reason: str, tmp_path: Path) -> None:
-    """Empty, blank, of several lines, too long, no text: one line with file and key."""
+    """A reason that is empty, blank, too long, of several lines or no text is refused."""
     with pytest.raises(BadConfig, match=r'two\.yaml:\d+: unsafe_limits: ') as error:
         load(write_robot(tmp_path, f'{YAML}unsafe_limits: {reason}\n'))
     assert '\n' not in str(error.value)
@@ -115,7 +115,7 @@ def test_what_ships_is_inside_the_ranges() -> None:
 def test_silence_above_two_seconds_is_always_stale(
     period: int, after: float, periods: float
 ) -> None:
-    """Whatever the input's own period (ms), live and of columns."""
+    """An input silent for more than 2 s is stale, whatever its period, live and of columns."""
     one, many = (InputTimeout(Delays(stale_after=after, stale_periods=periods)) for _ in range(2))
     times = T0 + np.arange(2 * WINDOW) * period * MS
     for now in times.tolist():
@@ -126,7 +126,7 @@ def test_silence_above_two_seconds_is_always_stale(
 
 
 def test_other_delays_count_at_once() -> None:
-    """What was learnt of the period is judged by them without waiting for more messages."""
+    """New delays count at once for a period that is already known."""
     fresh = InputTimeout(Delays())
     for k in range(WINDOW + 1):
         fresh.message(T0 + k * 100 * MS)
@@ -165,7 +165,7 @@ def judged(folder: Path, config: Path) -> dict[str, Any]:
 
 
 def test_a_pass_under_relaxed_limits_says_so(tmp_path: Path) -> None:
-    """In its reasons, its doubts, its alerts and a field of its own: which limits, and why."""
+    """A PASS under relaxed limits names them and the reason, in result, doubts and alerts."""
     result = judged(tmp_path / 'run', wide(tmp_path / 'robot'))
     assert result['verdict'] == 'PASS'
     assert any(WHY in reason for reason in result['reasons'])
@@ -183,7 +183,7 @@ def test_a_pass_under_relaxed_limits_says_so(tmp_path: Path) -> None:
 
 
 def test_a_run_inside_the_ranges_says_nothing_of_it(tmp_path: Path) -> None:
-    """Of limits inside their ranges there is only the hash."""
+    """With limits inside their ranges a result holds only the limits' hash."""
     (tmp_path / 'robot').mkdir()
     result = judged(tmp_path / 'run', write_robot(tmp_path / 'robot'))
     assert result['limits_relaxed'] is None
@@ -192,7 +192,7 @@ def test_a_run_inside_the_ranges_says_nothing_of_it(tmp_path: Path) -> None:
 
 
 def test_relaxed_limits_are_told_live_as_of_a_bag(tmp_path: Path) -> None:
-    """The same alerts with the same times, messages one by one or as columns."""
+    """Relaxed limits raise the same alerts live and of a recording."""
     bag = open_bag(record(tmp_path / 'run'))
     settings = load(wide(tmp_path / 'robot')).settings
     offline = judge(Recording(bag), settings)[1].evaluator.watch.log
@@ -213,7 +213,7 @@ def test_relaxed_limits_are_told_live_as_of_a_bag(tmp_path: Path) -> None:
 
 
 def test_a_result_of_before_is_still_verified(tmp_path: Path) -> None:
-    """A result without the new fields differs in nothing; one with another hash differs."""
+    """`verify` accepts a result from before the limits' hash; another hash is a difference."""
     (tmp_path / 'robot').mkdir()
     result = judged(tmp_path / 'run', write_robot(tmp_path / 'robot'))
     old = {k: v for k, v in result.items() if not k.startswith('limits_')}
@@ -225,7 +225,7 @@ def test_a_result_of_before_is_still_verified(tmp_path: Path) -> None:
 
 @each
 def test_the_hash_tells_each_limit(of: Permitted) -> None:
-    """Another value of any limit, delay or threshold is another hash; the same is the same."""
+    """The limits' hash changes with every limit, delay and threshold."""
     if of.part == 'robot':
         return
     settings = load().settings
@@ -239,7 +239,7 @@ def test_the_hash_tells_each_limit(of: Permitted) -> None:
 
 
 def test_the_hash_tells_each_joints_limit_and_no_rounding() -> None:
-    """A torque limit changes it; the last digits of a number do not."""
+    """The limits' hash changes with a joint's limit, but not with a number's last digits."""
     settings = load().settings
     found = {limits_hash(settings)}
     for j in range(len(settings.limits.torque)):

@@ -28,7 +28,7 @@ def test_there_is_a_flood_just_where_more_than_ten_come_in_ten_minutes(starts: l
 
 
 def test_an_hour_with_six_alerts_is_manageable() -> None:
-    """One in ten minutes on average; the seventh is one too many."""
+    """Six alerts in an hour are manageable by EEMUA 191; the seventh is one too many."""
     starts = [k * WINDOW for k in range(6)]
     assert alarm_rates(starts, 0, 6 * WINDOW).manageable
     assert not alarm_rates([*starts, 5], 0, 6 * WINDOW).manageable
@@ -47,12 +47,12 @@ def test_a_flood_lasts_from_the_eleventh_alert_until_four_are_left() -> None:
 
 
 def test_ten_alerts_are_no_flood() -> None:
-    """However near together."""
+    """Ten alerts in ten minutes are no flood, however close together they come."""
     assert alarm_rates(seconds(*[0.0] * 10), 0, 7200 * S).floods == ()
 
 
 def test_an_alert_ten_minutes_later_finds_the_window_empty() -> None:
-    """The first leaves as the second comes; a nanosecond earlier there are two."""
+    """An alert leaves the ten-minute window exactly 600 s later."""
     assert alarm_rates([0, WINDOW], 0, 2 * WINDOW).peak == 1
     assert alarm_rates([0, WINDOW - 1], 0, 2 * WINDOW).peak == 2
 
@@ -78,7 +78,7 @@ def test_five_in_ten_minutes_keep_a_flood_going() -> None:
 
 @pytest.mark.parametrize(('minutes', 'average'), [(20, 2.0), (10, 4.0), (5, 4.0), (0, 4.0)])
 def test_a_run_shorter_than_ten_minutes_counts_as_ten(minutes: int, average: float) -> None:
-    """Four alerts in twenty, ten, five minutes and none."""
+    """The alarm rate of a run shorter than ten minutes is per ten minutes."""
     rates = alarm_rates(seconds(1.0, 2.0, 3.0, 4.0), 100 * S, minutes * 60 * S)
     assert (rates.raised, rates.average, rates.peak) == (4, average, 4)
 
@@ -91,7 +91,7 @@ def test_a_flood_is_not_manageable_however_long_the_run() -> None:
 
 
 def test_the_result_counts_times_from_the_start() -> None:
-    """In seconds; the run begins at 100 s."""
+    """Alarm floods in a result are dated in seconds from the recording's start."""
     assert rates_result(seconds(*range(11)), 100 * S, 1200 * S) == {
         'raised': 11,
         'per_10_min': 5.5,
@@ -102,7 +102,7 @@ def test_the_result_counts_times_from_the_start() -> None:
 
 
 def test_no_alert_is_manageable() -> None:
-    """Nothing raised, nothing counted."""
+    """A recording without an alert is manageable, with every count 0."""
     assert rates_result([], 0, 60 * S) == {
         'raised': 0, 'per_10_min': 0.0, 'peak_in_10_min': 0, 'floods_s': [], 'manageable': True,
     }  # fmt: skip

@@ -19,7 +19,7 @@ def times(parts: list[MarginRows], spacing: int = 10, *, standing: bool = False)
 
 
 def test_the_first_row_of_a_slot_is_taken() -> None:
-    """Whatever stretch it comes in; a slot whose first row is unknown gives none."""
+    """Of each time slot the first row is kept; a slot whose first row is unknown gives none."""
     assert times([made([0, 4, 9, 10]), made([]), made([13, 25]), made([29, 31])]) == [0, 10, 25, 31]
     assert times([made([12, 15])]) == [12]
     assert times([made([0, 4, 10], known=[False, True, True])]) == [10]
@@ -53,7 +53,7 @@ def test_a_sample_holds_what_was_measured_and_computed() -> None:
 
 
 def test_of_more_than_forty_thousand_every_second_remains() -> None:
-    """And the spacing doubles: so it is with those that come after, in the slot begun too."""
+    """Beyond 40,000 samples every second one is kept and the spacing doubles."""
     time = 10 * np.arange(40_001)
     assert times([made(time[:-1])]) == time[:-1].tolist()
     assert times([made(time)]) == time[::2].tolist()

@@ -1,4 +1,4 @@
-"""What is told at the very limits of time and value: live and of a recording, by hand-made runs."""
+"""Alerts at the exact limits of time and value, equal live and in a recording."""
 
 import math
 from collections.abc import Sequence
@@ -63,7 +63,7 @@ def _facts(a: Alert) -> tuple[str, int, int | None, float]:
     ],
 )  # fmt: skip
 def test_a_speed_at_its_limit_is_too_fast(rate: float, found: Any) -> None:
-    """In both directions, after its delay."""
+    """A joint speed equal to its limit raises the alert after its delay, in both directions."""
     limits = replace(FREE, speed=(0.6, math.inf))
     run = run_of(1.0, joints=Joints(0, velocity=(rate, 9.0)))
     chosen = settings(limits=limits, delays=QUICK)
@@ -71,7 +71,7 @@ def test_a_speed_at_its_limit_is_too_fast(rate: float, found: Any) -> None:
 
 
 def test_a_robot_on_two_points_has_no_support() -> None:
-    """From its first margins on, after the delay of a tilt; on four there is nothing to say."""
+    """A robot on two contact points raises NO_SUPPORT after the delay of a tilt."""
     chosen, run = settings(limits=FREE, delays=QUICK), run_of(1.0)
     assert told(run, T0 + S, 'NO_SUPPORT', chosen) == []
     robot = replace(chosen.robot, contacts=chosen.robot.contacts[:2])
@@ -80,7 +80,7 @@ def test_a_robot_on_two_points_has_no_support() -> None:
 
 
 def test_sliding_is_told_from_the_warning_limit_on() -> None:
-    """A friction of 0.3 holds to 16.7 degrees: 1.7 are left at 15."""
+    """With a friction of 0.3, which holds to 16.7 degrees, a slope of 15 raises the warning."""
     lean = tilted(math.radians(15.0))
     run = run_of(1.0, imu=Imu(0, lean, acceleration=upright(lean)))
     left = math.atan(0.3) - math.radians(15.0)
@@ -98,10 +98,7 @@ def test_a_message_on_its_deadline_is_not_late(
     late: int,
     stale: bool,  # noqa: FBT001
 ) -> None:
-    """A tenth of a second after the last, both every 20 ms before; a nanosecond later it is.
-
-    Margins are known up to the deadline, itself included, whichever input asks.
-    """
+    """A message exactly at its deadline is in time; one nanosecond later its input was stale."""
     run = run_of(2.0, imu_hz=50.0)
     start = T0 + (MS if silent is Imu else 0)
     last = start + 1480 * MS
@@ -127,7 +124,7 @@ def test_a_message_on_its_deadline_is_not_late(
 
 
 def test_a_torque_is_told_at_two_levels() -> None:
-    """An arm that reaches out from 0.5 s to 1 s: 4 kg at 0.5 m, 1 kg at 1.35 m, 1 kg at 1.4 m."""
+    """A torque raises WARN and then ERROR as an arm reaches out from 0.5 s to 1 s."""
     run: list[Message] = [Imu(T0 - S)]
     for m in run_of(2.0):
         out = 500 <= (m.time - T0) // MS < 1000
@@ -140,7 +137,7 @@ def test_a_torque_is_told_at_two_levels() -> None:
 
 @pytest.mark.parametrize(('room', 'count'), [(-0.01, 0), (0.001, 1), (0.01, 2)])
 def test_a_tilt_is_told_at_two_levels(room: float, count: int) -> None:
-    """Ground that leans by 20 degrees from 1 s on; the limits are 5 mrad apart."""
+    """A tilt raises WARN and then ERROR on ground that leans by 20 degrees from 1 s on."""
     lean, chosen = tilted(math.radians(20.0)), settings()
     gravity = -np.array(upright(lean))
     left = float(margins(chosen.robot, (0.0, 0.0), gravity).angle.min())
@@ -157,7 +154,7 @@ def test_a_tilt_is_told_at_two_levels(room: float, count: int) -> None:
 
 @pytest.mark.parametrize('lost', [math.nan, math.inf])
 def test_an_acceleration_that_cannot_be_is_told_until_it_can(lost: float) -> None:
-    """Of the message itself: the low-pass forgets it."""
+    """An impossible acceleration raises an alert while it comes, and never enters the low-pass."""
     run = [
         replace(m, acceleration=(lost, 0.0, 9.81))
         if isinstance(m, Imu) and 500 <= (m.time - T0) // MS < 700
@@ -168,7 +165,7 @@ def test_an_acceleration_that_cannot_be_is_told_until_it_can(lost: float) -> Non
 
 
 def test_a_clock_that_is_off_is_told_until_it_is_right() -> None:
-    """By two seconds; its jump back is one more wrong stamp."""
+    """Stamps off by 2 s raise CLOCK until they are right; the jump back is wrong once more."""
     run = [
         replace(m, stamp=m.time - 2 * S)
         if isinstance(m, Joints) and 500 <= (m.time - T0) // MS < 700
@@ -179,7 +176,7 @@ def test_a_clock_that_is_off_is_told_until_it_is_right() -> None:
 
 
 def test_a_joint_that_was_never_named_is_missing_not_invalid() -> None:
-    """Nobody has said anything wrong."""
+    """A joint that no message ever named is missing; it is not reported as invalid."""
     run = [
         replace(m, names=('lift',), position=(0.1,)) if isinstance(m, Joints) else m
         for m in run_of(1.0)
@@ -189,14 +186,14 @@ def test_a_joint_that_was_never_named_is_missing_not_invalid() -> None:
 
 
 def test_a_recording_that_ends_in_silence_has_a_gap_to_its_end() -> None:
-    """From the deadline on; not where it ends at the deadline."""
+    """A gap that lasts to a recording's end counts from the input's deadline on."""
     for rest, gaps in ((100 * MS, []), (100 * MS + 1, [(T0 + 1080 * MS, T0 + 1080 * MS + 1)])):
         _, evaluator = recorded(settings(), [run_of(1.0)], T0 + 980 * MS + rest)
         assert evaluator.gaps[0] == gaps
 
 
 def test_who_has_not_said_when_it_began_misses_nothing_before_the_first_message() -> None:
-    """Neither live nor in a recording; what falls silent later is stale."""
+    """Without a start time no input is missed before its first message; later silence is stale."""
     evaluator, other = LiveEvaluator(settings()), RecordedEvaluator(settings())
     messages = run_of(1.0)
     for m in messages:
@@ -214,7 +211,7 @@ def test_a_joint_is_missing_when_its_last_message_is_older_than_silence_may_be(
     late: int,
     missing: bool,  # noqa: FBT001
 ) -> None:
-    """A tenth of a second at 50 Hz, though the other joint comes on."""
+    """A joint is missing 0.1 s after its last message at 50 Hz, though other joints still come."""
     run: list[Message] = [
         replace(m, names=('lift',), position=(0.1,))
         if isinstance(m, Joints) and m.time > T0 + S
@@ -231,7 +228,7 @@ def test_a_joint_is_missing_when_its_last_message_is_older_than_silence_may_be(
 
 
 def test_a_payload_that_cannot_be_is_told_and_leaves_the_one_before() -> None:
-    """Until one comes that can, and after its delay."""
+    """An impossible payload raises an alert, and the payload before it stays in force."""
     run = sorted(
         [*run_of(2.0), Carry(T0 + 500 * MS + 1, -1.0), Carry(T0 + 800 * MS + 1, 2.0)],
         key=lambda m: m.time,
@@ -246,7 +243,7 @@ def test_a_payload_that_cannot_be_is_told_and_leaves_the_one_before() -> None:
 
 
 def test_positions_that_cannot_be_are_told_until_they_can() -> None:
-    """From the message on; cleared as long after as any fault."""
+    """Impossible positions raise an alert from their message on until valid ones have come."""
     run = [
         replace(m, position=(math.nan, 0.0))
         if isinstance(m, Joints) and 500 <= (m.time - T0) // MS < 700
@@ -257,7 +254,7 @@ def test_positions_that_cannot_be_are_told_until_they_can() -> None:
 
 
 def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
-    """Row by row for an arm that reaches to any side on ground that leans to any; in parts."""
+    """A recording's margins equal the model's row by row, whatever arm, slope and parts."""
     robot = tracked()
     names = robot.joint_names
     chosen = Settings(
@@ -297,7 +294,7 @@ def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
 
 
 def test_a_live_robot_tells_its_level_rates_efforts_and_orientations() -> None:
-    """The most severe of what is active; what the joints report in robot convention."""
+    """A live evaluator gives the most severe active level, and rates and efforts in robot signs."""
     evaluator = LiveEvaluator(settings(limits=replace(FREE, speed=(0.6, math.inf)), delays=QUICK))
     evaluator.start(T0)
     for m in run_of(0.5, joints=Joints(0, velocity=(0.5, 0.1), effort=(0.02, 7.0))):

@@ -94,7 +94,7 @@ def test_margins_and_alerts_are_equal(
     specific_force: bool,  # noqa: FBT001 - drawn
     slow: bool,  # noqa: FBT001 - drawn: joints so slow that positions leap
 ) -> None:
-    """Whatever comes, in whatever batches, whenever the clock ticks."""
+    """Any messages give the same margins and alerts live and recorded, in any batches."""
     imu = ImuInput(
         attitude=attitude, specific_force=specific_force, position=(0.1, 0.0, 0.2),
         agreement_delay=0.05, frame='imu_link',
@@ -126,7 +126,7 @@ def test_long_runs_are_equal_too(cuts: list[int], seed: int) -> None:
 @hypothesis.settings(max_examples=60)
 @given(streams(), st.lists(st.integers(0, 120), max_size=5), st.floats(0.05, 0.6))
 def test_sliding_is_the_same_too(messages: list[Message], cuts: list[int], friction: float) -> None:
-    """With a friction of the ground: who slides before he tips is told live and afterwards."""
+    """With a known friction, sliding before tipping raises the same alerts live and recorded."""
     limits = Limits((45.0, 30.0), friction=friction, tip_warn=0.3)
     compare(settings(limits=limits, delays=Delays(tip_on=0.02, off=0.1)), messages, cuts, [], S)
 
@@ -163,7 +163,7 @@ def test_a_payload_counts_from_the_next_joint_state_on() -> None:
 
 @pytest.mark.parametrize('absent', [Joints, Imu])
 def test_an_absent_input_is_never_ok(absent: type) -> None:
-    """Without joints or without IMU there are no margins, all of the time."""
+    """Without joint states or without IMU no margin is ever known."""
     messages = [m for m in run_of(3.0) if not isinstance(m, absent)]
     seen, alerts = live(settings(), messages, T0 + 3 * S, [T0 + 600 * MS])
     assert all(margins is None for _, margins in seen)
@@ -197,7 +197,7 @@ def test_half_of_the_joints_gone_makes_margins_unknown() -> None:
 
 
 def test_a_position_that_is_not_a_number_makes_margins_unknown() -> None:
-    """Not the joint's last value, nor zero."""
+    """A position of NaN makes the margins unknown: neither the last value nor 0 is used."""
     messages = [*run_of(1.0), Joints(T0 + S, position=(math.nan, 0.0)), Imu(T0 + S + MS)]
     seen, alerts = live(settings(), messages, T0 + S + MS)
     assert [margins for _, margins in seen[-2:]] == [None, None]

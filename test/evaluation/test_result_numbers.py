@@ -48,7 +48,7 @@ def test_a_result_is_told_in_seconds_newton_metres_and_degrees() -> None:
 
 
 def test_nothing_seen_is_nothing_told() -> None:
-    """No time, no tilt, no edge; a recording without length is not covered."""
+    """A recording without margins has None for every worst value, and a coverage of 0."""
     found = result_of(Summary(TOLD), [], T0, 0)
     assert found['coverage']['fraction'] == 0.0
     assert found['stability']['min_angle_deg'] is None

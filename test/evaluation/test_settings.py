@@ -19,7 +19,7 @@ def documented(repository: Path, key: str) -> list[str]:
 
 
 def test_defaults_are_those_of_the_documentation(repository: Path) -> None:
-    """Who configures nothing gets what the table says."""
+    """The default settings equal the table in docs/robot_configuration.md."""
     limits, delays, imu, joint = Limits((1.0,)), Delays(), ImuInput(), JointInput('x')
     deg = math.degrees
     found: dict[str, tuple[Any, ...]] = {

@@ -102,13 +102,13 @@ def test_a_column_is_the_worst_of_fifty_milliseconds() -> None:
 
 
 def test_a_recording_from_zero_on_has_its_first_column() -> None:
-    """As simulated time begins; nothing recorded gives no column."""
+    """A recording that begins at time 0 keeps its first column; an empty one has none."""
     assert recorded_strips([made([0, 10 * MS])]).time.tolist() == [0.0]
     assert recorded_strips([]).torque.shape == (0, 2)
 
 
 def test_columns_double_in_width_from_150001_on() -> None:
-    """Two become one: larger torque, smaller tilt, later posture; and once more when full again."""
+    """From 150,001 columns on, two become one: larger torque, smaller tilt, later posture."""
     time = 50 * MS * np.arange(150_001)
     torque = np.column_stack((np.arange(150_001) % 7, -np.ones(150_001)))
     angle = np.repeat(np.arange(150_001.0)[:, None] % 5, 4, axis=1)

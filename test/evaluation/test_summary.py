@@ -155,7 +155,7 @@ def test_every_rule_has_words_and_advice() -> None:
 
 
 def test_a_robot_past_tipping_is_said_to_be() -> None:
-    """Not that a negative tilt is left."""
+    """A negative tilt left is told as past the tipping point, not as tilt left."""
     told = settings()
     rule = Rule('TIP_OVER', 'right', ERROR, -math.radians(5), -math.radians(6), 0, 0)
     past = describe(Alert(rule, T0, math.radians(35.0)), told)
@@ -165,7 +165,7 @@ def test_a_robot_past_tipping_is_said_to_be() -> None:
 
 
 def test_a_force_is_told_in_newtons() -> None:
-    """Of a prismatic joint; of others in newton metres."""
+    """A prismatic joint's force is told in N, a revolute joint's torque in N m."""
     told = settings()
     words = [
         describe(Alert(Rule('TORQUE_LIMIT', name, WARN, 1.0, 0.5, 0, 0), T0, 20.0), told)
@@ -180,10 +180,7 @@ FINE = (1.0, 1.0, 1.0, 1.0)
 
 
 def test_time_in_violation_counts_from_the_limit_on() -> None:
-    """Each row holds until the next, the last until its deadline or the end, unknown ones never.
-
-    Half of 40 N m and 30 N are allowed; 0.1 rad are left to any side.
-    """
+    """Each known row counts until the next, the last until its deadline or the end."""
     rows = made(
         [0, 1, 3, 7, 15],
         until=[1, 3, 7, 15, 31],
@@ -243,7 +240,7 @@ def test_the_worst_is_kept_of_each_joint_and_side_with_its_time() -> None:
 
 
 def test_states_are_counted_over_the_rows_that_are_known() -> None:
-    """One that never was is not named."""
+    """Contact states are counted over known rows; a state that never was is not named."""
     summary = Summary(HALF)
     summary.add(made([0, 1, 2], state=[0, 1, 2], known=[True, True, False]))
     summary.add(made([3, 4], state=[1, len(STATES) - 1]))
@@ -251,7 +248,7 @@ def test_states_are_counted_over_the_rows_that_are_known() -> None:
 
 
 def test_nothing_was_seen_before_the_first_row() -> None:
-    """A summary begins with nothing, also where a run has no message."""
+    """The summary of a recording without messages is that of nothing seen."""
     empty = Summary(HALF)
     empty.finish(S)
     assert (empty.evaluated, empty.messages, empty.tip_violation) == (0, 0, 0)

@@ -31,7 +31,7 @@ TWO, TRACKED = settings().robot, tracked()
     [(0.123, 'extend the slide by 12 cm'), (-0.2, 'retract the slide by 20 cm')],
 )
 def test_a_slide_is_extended_and_retracted(amount: float, said: str) -> None:
-    """In centimetres."""
+    """A prismatic joint is advised to extend or retract by centimetres."""
     assert words(TWO, 'slide', amount, (0.0, 0.0)) == said
 
 
@@ -45,7 +45,7 @@ def test_a_slide_is_extended_and_retracted(amount: float, said: str) -> None:
     ],
 )
 def test_a_lift_is_raised_lowered_or_swung(q: float, amount: float, said: str) -> None:
-    """By where the centre of gravity goes: up, down, or across."""
+    """A motion is called raise, lower or swing by where it moves the centre of gravity."""
     assert words(TWO, 'lift', amount, (q, 0.0)) == said
 
 
@@ -82,7 +82,7 @@ def test_a_turret_is_turned(amount: float, side: str) -> None:
     ],
 )  # fmt: skip
 def test_a_turn_says_what_the_robot_faces(downhill: float, faces: str) -> None:
-    """Within 30 degrees of downhill or uphill."""
+    """A turn names downhill or uphill where the robot ends within 30 degrees of it."""
     x, y = math.cos(math.radians(downhill)), math.sin(math.radians(downhill))
     found = turn_words(-1.0, np.array((x, y, -9.0)))
     assert found == f'turn the robot slowly by 57 deg to the right{faces}'
@@ -90,7 +90,7 @@ def test_a_turn_says_what_the_robot_faces(downhill: float, faces: str) -> None:
 
 
 def test_a_load_is_set_down_and_how_much_of_it_is_too_much() -> None:
-    """Where the posture holds all of it, only that."""
+    """Setting down names the excess in kg, unless the posture holds all of the load."""
     assert load_words(4.0, None) == load_words(4.0, 4.0) == 'set the load of 4.0 kg down'
     heavy = 'set the load down: 4.0 kg is 1.5 kg too heavy in this posture'
     assert load_words(4.0, 2.5) == heavy

@@ -59,7 +59,7 @@ def test_a_path_is_sixteen_even_steps_from_now() -> None:
 
 @pytest.mark.parametrize(('at', 'ways'), [(1.6, [-1.0]), (-1.5, [1.0]), (1.7, [-1.0])])
 def test_a_joint_at_its_end_moves_only_back(at: float, ways: list[float]) -> None:
-    """No path leads out of the joint's range, nor stands still."""
+    """No path leaves a joint's range, and no path stands still."""
     paths = joint_paths(TOLD, np.array((at, 0.0)), np.array(DOWN), NO_TORQUE)
     assert [np.sign(p.amount[-1]) for p in paths if p.subject == 'lift'] == ways
 
@@ -89,7 +89,7 @@ def test_an_arm_does_not_come_nearer_the_ground_than_six_centimetres() -> None:
 
 
 def test_an_arm_that_lies_low_may_rise() -> None:
-    """Below six centimetres only what leads lower is forbidden."""
+    """Below 6 cm above the ground only motions that lead lower are forbidden."""
     q = np.array((-math.asin(0.28 / 1.1), 0.0))  # the load at 2 cm
     up, down = joint_paths(TOLD, q, np.array(DOWN), NO_TORQUE)[:2]
     assert not up.forbidden.any()
@@ -101,7 +101,7 @@ def test_an_arm_that_lies_low_may_rise() -> None:
 
 @pytest.mark.parametrize(('slope', 'count'), [(0.0499, 0), (0.0501, 2)])
 def test_turning_is_for_slopes(slope: float, count: int) -> None:
-    """From a slope of 0.05 (its sine) on."""
+    """Turning on the spot is tried only on slopes of at least 0.05 (the sine of the angle)."""
     angle = math.asin(slope)
     down = 9.81 * np.array((math.sin(angle), 0.0, -math.cos(angle)))
     assert len(list(turn_paths(TOLD.robot, STILL, down, Payload()))) == count
@@ -125,7 +125,7 @@ def test_a_turn_goes_half_around_either_way_in_steps_of_five_degrees() -> None:
 
 @pytest.mark.parametrize(('across', 'slips'), [(5.9, False), (6.3, True)])
 def test_a_robot_on_one_track_does_not_turn(across: float, slips: bool) -> None:  # noqa: FBT001
-    """A quarter of the weight on the lighter track: closed form, from where gravity meets it."""
+    """Turning needs a quarter of the weight on the lighter track; the bound is in closed form."""
     down = np.array((1.0, across, -9.0))
     cog = centre_of_gravity(TOLD.robot, STILL, Payload())
     y = cog[2] * across / 9.0  # tracks at +-0.3 m
@@ -157,7 +157,7 @@ def test_the_last_joint_of_an_arm_without_a_load_counts() -> None:
 
 
 def test_a_joint_that_cannot_move_has_no_path() -> None:
-    """Nor has a robot of such joints any."""
+    """A joint without a range to move in has no path, nor has a robot of such joints."""
     fixed = tuple(replace(j, lower=0.0, upper=0.0) for j in TOLD.robot.joints)
     still = replace(TOLD, robot=replace(TOLD.robot, joints=fixed))
     assert joint_paths(still, STILL, np.array(DOWN), NO_TORQUE) == []
@@ -191,7 +191,7 @@ def test_the_joint_of_an_arm_that_is_its_lowest_point_counts() -> None:
 
 
 def test_a_robot_that_slips_where_it_stands_does_not_turn() -> None:
-    """Though a step to the left would be enough."""
+    """A robot that slips at its heading gets no turn, though a small one would be enough."""
     cog = centre_of_gravity(TOLD.robot, STILL, Payload())
     across = 0.15 * 9.0 / cog[2] + 0.02
     left, _ = turn_paths(TOLD.robot, STILL, np.array((1.0, across, -9.0)), Payload())

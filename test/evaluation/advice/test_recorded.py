@@ -76,7 +76,7 @@ def test_advice_is_that_of_the_moment_the_alert_was_raised(cuts: list[int]) -> N
 
 
 def test_of_many_alerts_the_most_severe_are_advised(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cost of a run is bounded: beyond MOST there is what helps in general."""
+    """Beyond a fixed number of alerts a recording's advice is general, to bound the cost."""
     monkeypatch.setattr(alert_advice, 'MOST', 3)
     alerts, told = told_of(swaying(), [])
     advised = [alert.rule.level for alert in alerts if id(alert) in told]
@@ -102,7 +102,7 @@ def adviser(log: list[Alert], load: Payload = LOAD) -> AlertAdvice:
 
 
 def test_the_row_of_the_very_moment_counts() -> None:
-    """The first one too; else the one before, if need be the last of the stretch before."""
+    """Advice uses the row of the alert's moment, else the last row before it, of any part."""
     log = [Alert(TORQUE, 1 * S, 40.0), Alert(TORQUE, 5 * S // 2, 40.0)]
     gathered = adviser(log)
     gathered.add(rows((1, 2, 3), q=(LOW, HIGH, LOW), gravity=(SLOPE,) * 3))
@@ -119,7 +119,7 @@ def test_the_row_of_the_very_moment_counts() -> None:
 
 
 def test_what_is_raised_before_any_row_or_after_the_last_is_no_failure() -> None:
-    """Before it nothing is known; after it the last row counts."""
+    """An alert before all rows gets no computed advice; one after the last row uses that row."""
     log = [Alert(TORQUE, S // 2, 40.0)]
     gathered = adviser(log)
     assert gathered.sentences() == {}
@@ -130,7 +130,7 @@ def test_what_is_raised_before_any_row_or_after_the_last_is_no_failure() -> None
 
 
 def test_the_payload_is_that_of_the_time_the_joints_were_heard() -> None:
-    """Half a second before the row."""
+    """Advice uses the payload in force when the row's joint states came, not the row's own time."""
     log, asked = [Alert(TORQUE, 2 * S, 40.0)], []
 
     def payload_at(time: int) -> Payload:
@@ -144,7 +144,7 @@ def test_the_payload_is_that_of_the_time_the_joints_were_heard() -> None:
 
 
 def test_fifty_alerts_are_advised_the_most_severe_and_then_the_first() -> None:
-    """Of sixty, each of which has advice."""
+    """Of sixty alerts fifty get computed advice: the most severe, and of equal ones the first."""
     warnings = [Alert(TORQUE, k * S, 40.0) for k in range(40)]
     errors = [Alert(replace(TORQUE, level=ERROR), (40 + k) * S, 50.0) for k in range(20)]
     log = [*warnings, *errors]
@@ -154,7 +154,7 @@ def test_fifty_alerts_are_advised_the_most_severe_and_then_the_first() -> None:
 
 
 def test_other_alerts_are_left_alone() -> None:
-    """What to do about lost data is no matter of margins."""
+    """Alerts that are not about margins, such as lost data, get no computed advice."""
     log = [Alert(replace(TORQUE, code='INPUT_STALE'), S, 1.0)]
     gathered = adviser(log)
     gathered.add(rows((1, 2), q=(LOW, LOW), gravity=(SLOPE,) * 2))

@@ -88,7 +88,7 @@ def test_advice_gains_what_it_says_and_costs_no_other_margin_its_limit(
 def test_what_is_enough_comes_first(
     q: tuple[float, ...], slope: tuple[float, float], mass: float
 ) -> None:
-    """Advice that ends the warning stands first, of that turns last, and then the fastest first."""
+    """Advice that ends the warning comes first, of that turns last, and then the fastest."""
     told = advise(PACKBOT, q, gravity_on_slope(9.81, *slope).tolist(), Payload(mass))
     enough = [a.enough for a in told]
     assert enough == sorted(enough, reverse=True)
@@ -101,7 +101,7 @@ def test_what_is_enough_comes_first(
 def test_advice_is_only_for_what_is_known_and_wrong(
     q: tuple[float, ...], slope: tuple[float, float]
 ) -> None:
-    """Who is advised has margins, and one of them is below its warning limit."""
+    """Advice is given only if the margins are known and one of them is below its warning limit."""
     down, load_ = gravity_on_slope(9.81, *slope), Payload(4.0)
     found = margins(PACKBOT.robot, q, down, load_)
     worst = scores_of(PACKBOT, found.torque, found.angle).min()
@@ -158,7 +158,7 @@ def test_an_arm_is_not_laid_on_the_ground() -> None:
 
 
 def test_a_warning_of_a_motor_is_not_hidden_by_a_tilt_that_is_fine() -> None:
-    """Only margins below their warning limit compete; of those a tip-over is spoken of first."""
+    """Only margins below their warning limit get advice; among those a tip-over comes first."""
     told = advise(STEADY, STRETCHED, LEVEL, Payload(2.0))
     assert {a.margin for a in told} == {'shoulder_joint'}
     assert {a.margin for a in advise(PACKBOT, STRETCHED, LEVEL, Payload(4.0))} == {'front'}

@@ -49,7 +49,7 @@ def test_a_score_is_one_at_warn_and_zero_at_error() -> None:
 
 
 def test_limits_that_lie_together_keep_half_a_degree_apart() -> None:
-    """A warning where the error is has a span of 0.5 degrees, or a fiftieth of the torque."""
+    """WARN and ERROR limits that coincide are scored with a span of 0.5 deg, or 2 % of torque."""
     close = Limits((40.0, math.inf), torque_warn=1.0, tip_warn=0.1, tip_error=0.1)
     angle = np.full(4, 0.1 + math.radians(0.5))
     found = scores_of(replace(TOLD, limits=close), np.array((39.2, 0.0)), angle)
@@ -69,24 +69,24 @@ def test_limits_that_lie_together_keep_half_a_degree_apart() -> None:
     ],
 )
 def test_the_margin_spoken_of_first(scores: tuple[float, ...], worst: int) -> None:
-    """Past ERROR before WARN, of those a tilt before a torque, then the least."""
+    """Margins past ERROR come before those past WARN, then tilts before torques, then the least."""
     assert advice._most_severe(np.array(scores)) == worst
 
 
 def test_a_path_stops_where_it_is_enough() -> None:
-    """At the first step that is clear of the warning's deadband."""
+    """A path ends at the first step that clears the warning's deadband."""
     assert end(0.5, 1.05, 1.2, 1.5) == (2, 1.2, True)
 
 
 def test_a_path_that_is_not_enough_stops_where_nearly_all_is_gained() -> None:
-    """At 95 % of the most: of 0.8 gained, from 0.76 on."""
+    """A path that never is enough ends at the first step with 95 % of its largest gain."""
     assert end(0.5, 0.9, 0.97, 1.0, 0.6) == (2, 0.97, False)
     assert end(0.5, 0.9, 0.95, 1.0, 0.6) == (3, 1.0, False)
 
 
 @pytest.mark.parametrize(('gained', 'counts'), [(0.09, False), (0.11, True)])
 def test_a_path_that_gains_next_to_nothing_is_none(gained: float, counts: bool) -> None:  # noqa: FBT001
-    """A tenth of the way from ERROR to WARN is the least."""
+    """A path that gains less than a tenth of the span from ERROR to WARN is not advised."""
     assert (end(0.2 + gained) is not None) == counts
 
 
@@ -103,7 +103,7 @@ def test_a_path_ends_before_what_it_must_not() -> None:
 
 
 def test_a_margin_that_is_low_may_stay_as_low() -> None:
-    """What warns already must only not become worse."""
+    """Advice may leave another margin that already warns as low as it is, but not lower it."""
     scores = np.full((2, 6), GOOD)
     scores[:, 0], scores[:, 4] = (0.5, 1.5), (0.7, 0.7)
     start = case((0.2, GOOD, GOOD, GOOD, 0.7, GOOD), 0)
@@ -118,7 +118,7 @@ def told(kind: str, seconds: float, gain: float, *, enough: bool) -> Advice:
 
 
 def test_advice_is_ordered_by_use() -> None:
-    """Enough, no turn, fastest; else what gains most, turns last."""
+    """Advice that is enough comes first, turns last, then the fastest; else the largest gain."""
     order = [
         told('joint', 1.0, 0.1, enough=True),
         told('payload', 10.0, 0.5, enough=True),
@@ -146,7 +146,7 @@ def test_a_load_set_down_gains_what_the_model_says_of_the_empty_hand() -> None:
 
 
 def test_a_load_that_is_light_is_not_spoken_of() -> None:
-    """Nor one of no mass: setting it down gains less than a tenth of the span, 0.8 N m."""
+    """Setting down is not advised if it gains less than a tenth of the span from ERROR to WARN."""
     for mass in (0.0, 0.07):
         kinds = [a.kind for a in advise(TOLD, (0.0, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)))]
         assert 'payload' not in kinds
@@ -163,7 +163,7 @@ def test_a_load_that_is_light_is_not_spoken_of() -> None:
     ],
 )
 def test_enough_is_beyond_the_deadband_of_the_warning(of: str, worst: int, enough: float) -> None:
-    """Else the alert would stay."""
+    """Advice counts as enough only if it passes the warning's deadband, which ends the alert."""
     (found,) = advice._cases(TOLD, [(0.0, 0.0)], [DOWN], Payload(), [of])
     assert found is not None
     assert (found.worst, found.subject, found.tips) == (worst, of, worst < 4)
@@ -172,7 +172,7 @@ def test_enough_is_beyond_the_deadband_of_the_warning(of: str, worst: int, enoug
 
 
 def test_a_robot_that_stands_on_nothing_gets_no_advice() -> None:
-    """Without contact points no margin is known, whatever the torque."""
+    """A robot without contact points has no known margins, and gets no advice."""
     floating = replace(TOLD, robot=replace(TOLD.robot, contacts=()))
     assert advise(floating, (0.0, 0.0), DOWN, Payload(9.0), of='lift') == ()
     assert advise(TOLD, (0.0, 0.0), DOWN, Payload(9.0), of='lift') != ()
@@ -185,7 +185,7 @@ def at_level(mass: float) -> tuple[float, float]:
 
 
 def test_a_margin_at_its_warning_limit_needs_no_advice() -> None:
-    """WARN begins below it; one digit more of load, and there is some."""
+    """A margin equal to its warning limit gets no advice; a margin just below it does."""
     use, _ = at_level(1.0)
     load = Payload(1.0, (0.1, 0.0, 0.0))
     for warn, quiet in ((use, True), (math.nextafter(use, 0.0), False)):
@@ -195,7 +195,7 @@ def test_a_margin_at_its_warning_limit_needs_no_advice() -> None:
 
 
 def test_a_load_whose_absence_reaches_the_limit_is_enough() -> None:
-    """Exactly: the empty hand is at the warning limit, or one digit past it."""
+    """Setting the load down is enough if the empty gripper is exactly at the warning limit."""
     empty, _ = at_level(0.0)
     for warn, enough in ((empty, True), (math.nextafter(empty, 0.0), False)):
         limits = replace(LIMITS, torque_warn=warn, torque_error=2.0)
@@ -217,7 +217,7 @@ def kinds(limits: Limits, of: str, down: tuple[float, float, float] = SLOPE) -> 
 
 
 def test_turning_is_for_a_tilt_that_only_warns() -> None:
-    """Not for one that is at its ERROR limit or past it, nor for a motor."""
+    """A turn is advised for a tilt between WARN and ERROR, not past ERROR and not for a motor."""
     found = margins(TOLD.robot, np.array((0.2, 0.0)), SLOPE, Payload(1.0))
     front = float(found.angle[0])
     warns = Limits((99.0, 99.0), tip_warn=front + 0.1, tip_error=math.nextafter(front, 0.0))
@@ -231,14 +231,14 @@ def test_turning_is_for_a_tilt_that_only_warns() -> None:
 
 @pytest.mark.parametrize(('worst', 'gain'), [(1, 0.5 * 0.2), (4, 0.5 * 0.2 * 40.0)])
 def test_a_gain_is_told_in_the_unit_of_its_margin(worst: int, gain: float) -> None:
-    """Half the way from ERROR to WARN: of 0.2 rad, or of a fifth of 40 N m."""
+    """A gain in score is converted to the margin's unit: rad for a tilt, N m for a torque."""
     told = case((0.25,) * 6, worst)
     assert advice._gain(told, 0.75) == pytest.approx(gain)
     assert told.tips is (worst == 1)
 
 
 def test_the_edges_of_where_to_stop() -> None:
-    """Just enough, just nearly all, just too little gained, just within the slack."""
+    """A path stops exactly at the limits of enough, of nearly all, of too little, and of slack."""
     enough = 1.1 + SLACK
     assert end(0.5, enough, 1.5) == (1, enough, True)
     assert end(0.5, 0.95, 1.0, start=0.0) == (1, 0.95, False)
@@ -253,7 +253,7 @@ def test_the_edges_of_where_to_stop() -> None:
 
 
 def test_a_slide_gains_newtons_and_a_turning_joint_newton_metres() -> None:
-    """On a slope of 0.5 rad the slide holds 2 kg by the sine; the words name the joint."""
+    """Advice about a prismatic joint tells its gain in N, about a revolute one in N m."""
     told = replace(TOLD, limits=Limits((60.0, 10.0), torque_error=1.1))
     down = (9.81 * math.sin(-0.5), 0.0, -9.81 * math.cos(0.5))
     load = Payload(1.0, (0.1, 0.0, 0.0))
@@ -266,7 +266,7 @@ def test_a_slide_gains_newtons_and_a_turning_joint_newton_metres() -> None:
 
 
 def test_a_tilt_is_told_in_degrees() -> None:
-    """Setting 5 kg down gains what the model says of the empty hand."""
+    """Advice about a tilt tells its gain in degrees, that of the model with the load set down."""
     told = replace(TOLD, limits=Limits((99.0, 99.0), tip_warn=0.9, tip_error=0.1))
     gain = at_level(0.0)[1] - at_level(5.0)[1]
     found = advise(told, (0.0, 0.0), DOWN, Payload(5.0, (0.1, 0.0, 0.0)), of='front')
@@ -280,7 +280,7 @@ def test_a_tilt_is_told_in_degrees() -> None:
 
 
 def test_an_arm_that_is_too_heavy_itself_can_hold_nothing() -> None:
-    """All of the load is too heavy then, not more."""
+    """If the arm alone exceeds its limit, all of the load is too heavy, and not more than that."""
     told = replace(TOLD, limits=Limits((25.0, 99.0)))
     found = advise(told, (0.0, 0.0), DOWN, Payload(3.0, (0.1, 0.0, 0.0)), of='lift')
     (load,) = [a for a in found if a.kind == 'payload']
@@ -289,7 +289,7 @@ def test_an_arm_that_is_too_heavy_itself_can_hold_nothing() -> None:
 
 @pytest.mark.parametrize(('mass', 'told'), [(0.05, False), (0.08, True)])
 def test_setting_down_what_gains_next_to_nothing_is_not_told(mass: float, told: bool) -> None:  # noqa: FBT001
-    """A tenth of the way from 28.8 to 36 N m is 0.72; 1.1 m away a kg makes 10.8."""
+    """Setting down is not advised below a tenth of the span from ERROR to WARN: 0.72 N m here."""
     weak = replace(TOLD, limits=replace(LIMITS, torque=(36.0, math.inf)))
     found = advise(weak, (0.0, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)), of='lift')
     assert found

@@ -21,7 +21,7 @@ G = 9.81
 
 @pytest.mark.parametrize(('apart', 'wrong'), [(S, 0.0), (S + 1, 1.0), (-S, 0.0), (-S - 1, 1.0)])
 def test_two_clocks_may_differ_by_a_second(apart: int, wrong: float) -> None:
-    """A nanosecond more is a fault; alone and in columns."""
+    """A stamp may differ from receipt time by 1 s; a nanosecond more is a CLOCK fault."""
     assert InputTimeout(Delays()).clock(T0, T0 + apart) == wrong
     times = np.array([T0])
     assert InputTimeout(Delays()).clocks(times, times + apart).tolist() == [wrong]
@@ -29,7 +29,7 @@ def test_two_clocks_may_differ_by_a_second(apart: int, wrong: float) -> None:
 
 @pytest.mark.parametrize(('jump', 'wrong'), [(S, 0.0), (S + 1, 1.0), (-S, 0.0), (-S - 1, 1.0)])
 def test_a_stamp_may_jump_by_a_second(jump: int, wrong: float) -> None:
-    """Between messages 10 ms apart; stamps half a second early and late are near enough."""
+    """Stamps may jump by 1 s between messages 10 ms apart; more is a CLOCK fault."""
     start = -jump // 2
     fresh = InputTimeout(Delays())
     assert fresh.clock(T0, T0 + start) == 0.0
@@ -42,7 +42,7 @@ def test_a_stamp_may_jump_by_a_second(jump: int, wrong: float) -> None:
 
 @pytest.mark.parametrize(('after', 'wrong'), [(500 * MS, 0.0), (500 * MS + 1, 1.0)])
 def test_a_stamp_may_stand_for_half_a_second(after: int, wrong: float) -> None:
-    """The same stamp again and again is a frozen clock; alone and in columns."""
+    """A stamp that repeats for more than 0.5 s is a frozen clock, alone and in columns."""
     fresh = InputTimeout(Delays())
     fresh.clock(T0, T0)
     fresh.message(T0)
@@ -55,7 +55,7 @@ def test_a_stamp_may_stand_for_half_a_second(after: int, wrong: float) -> None:
     ('period', 'limit'), [(10, 100), (33, 100), (40, 120), (600, 1800), (1000, 2000)]
 )
 def test_silence_is_three_periods_but_at_least_a_tenth(period: int, limit: int) -> None:
-    """Half a second until 32 intervals were seen, and never more than 2 s; ms."""
+    """An input is stale after 3 periods, between 0.1 and 2 s; until 32 intervals after 0.5 s."""
     fresh, columns = InputTimeout(Delays()), InputTimeout(Delays())
     times = T0 + np.arange(33) * period * MS
     for now in times[:32]:
@@ -71,7 +71,7 @@ def test_silence_is_three_periods_but_at_least_a_tenth(period: int, limit: int) 
 
 
 def test_silence_counts_from_the_start_until_a_message_came() -> None:
-    """Who has not begun to listen misses nothing."""
+    """Before its first message an input's silence counts from the start of the evaluation."""
     fresh = InputTimeout(Delays())
     assert fresh.deadline is None
     fresh.started = T0
@@ -94,7 +94,7 @@ def tracked(*messages: Imu, **chosen: Any) -> list[tuple[tuple[float, ...], bool
     ('size', 'known'), [(1.1499, True), (1.1501, False), (0.8501, True), (0.8499, False)]
 )
 def test_an_accelerometer_shows_up_within_fifteen_hundredths_of_g(size: float, known: bool) -> None:  # noqa: FBT001
-    """Larger or smaller it says nothing about the attitude."""
+    """An acceleration tells the attitude only if its length is within 15 % of g."""
     ((gravity, unusable),) = tracked(
         Imu(T0, (0.0,) * 4, acceleration=(0.0, 0.0, size * G), covariance_0=-1.0)
     )
@@ -103,7 +103,7 @@ def test_an_accelerometer_shows_up_within_fifteen_hundredths_of_g(size: float, k
 
 
 def test_an_orientation_is_believed_while_nothing_is_said_against_it() -> None:
-    """Its gravity, not that of an accelerometer that moves; or that of the accelerometer alone."""
+    """Gravity comes from the orientation, unless it is an identity the accelerometer denies."""
     roll = 0.02
     leaning = (math.sin(roll / 2), 0.0, 0.0, math.cos(roll / 2))
     ((auto, _),) = tracked(Imu(T0, leaning))
@@ -118,7 +118,7 @@ def test_an_orientation_is_believed_while_nothing_is_said_against_it() -> None:
 
 @pytest.mark.parametrize(('norm', 'used'), [(1.009, 1), (1.011, 0), (0.991, 1), (0.989, 0)])
 def test_a_quaternion_is_one_within_a_hundredth(norm: float, used: int) -> None:
-    """Single precision and rounding; what is longer or shorter tells nothing."""
+    """A quaternion whose norm is more than 1 % off 1 is not used as an orientation."""
     told = settings(ImuInput(attitude='orientation'))
     tracker = ImuTracker(told, RuleSet(told).attitude)
     half = norm * math.sqrt(0.5)
@@ -129,7 +129,7 @@ def test_a_quaternion_is_one_within_a_hundredth(norm: float, used: int) -> None:
 
 @pytest.mark.parametrize(('share', 'known'), [(0.51, True), (0.49, False)])
 def test_a_specific_force_below_half_of_g_is_a_fall(share: float, known: bool) -> None:  # noqa: FBT001
-    """Nothing is computed from it."""
+    """A specific force below half of g counts as free fall, and gives no margins."""
     ((gravity, unusable),) = tracked(
         Imu(T0, acceleration=(0.0, 0.0, share * G)), specific_force=True
     )
@@ -139,7 +139,7 @@ def test_a_specific_force_below_half_of_g_is_a_fall(share: float, known: bool) -
 
 
 def test_the_low_pass_is_carried_for_a_second() -> None:
-    """exp(-t / 0.2) of the old is left after t; nothing after more, or where time stands."""
+    """The low-pass keeps exp(-t / 0.2 s) of its old value, and begins anew after a gap of 1 s."""
     for step, keep in ((S, math.exp(-5.0)), (S + 1, 0.0), (100 * MS, math.exp(-0.5)), (0, 0.0),
                        (-1, 0.0)):  # fmt: skip
         low = LowPass(0.2)
@@ -159,7 +159,7 @@ def test_an_acceleration_beyond_a_kilometre_per_second_squared_is_none(
     size: float,
     known: bool,  # noqa: FBT001
 ) -> None:
-    """By its length, on every axis; the next one counts from new."""
+    """An acceleration longer than 1000 m/s2 is ignored, on any axis; the next one counts anew."""
     low = LowPass(0.2)
     found = low.step(T0, size * np.eye(3)[axis])
     assert math.isfinite(found[0]) == known
@@ -191,7 +191,7 @@ def test_signals_are_watched_at_the_limits_of_the_configuration() -> None:
 
 
 def test_a_value_on_the_limit_is_bad_and_on_the_deadband_not_yet_good() -> None:
-    """`on` itself raises, `off` itself does not clear, and delays end at their nanosecond."""
+    """A value at `on` raises an alert, one at `off` does not clear it; delays are exact to 1 ns."""
     log: list[Any] = []
     signal = Signal(Rule('X', 'y', WARN, 2.0, 1.0, 10, 20), log)
     signal.step(0, 1.9999)
@@ -242,7 +242,7 @@ def test_a_live_robot_is_ok_until_the_nanosecond_an_input_is_stale() -> None:
 
 
 def test_other_limits_count_from_the_next_message_on() -> None:
-    """A payload of the new settings replaces the declared one only where it is another."""
+    """New settings count from the next message; their payload only if it is another than before."""
     evaluator = live()
     evaluator.carry(T0 + S, 2.0, (0.0, 0.0, 0.0), 'hand')
     carried = evaluator.payload
@@ -255,7 +255,7 @@ def test_other_limits_count_from_the_next_message_on() -> None:
 
 
 def test_the_period_is_the_middle_of_thirty_two_intervals() -> None:
-    """Squares in ms, in any order: (16^2 + 17^2) / 2 = 272.5 ms; alone, in columns, in pieces."""
+    """An input's period is the median of 32 intervals, in single messages, columns and parts."""
     intervals = np.random.default_rng(2).permutation(np.arange(1, 33) ** 2) * MS
     times = T0 + np.concatenate(([0], np.cumsum(intervals)))
     one = InputTimeout(Delays())

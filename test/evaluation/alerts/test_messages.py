@@ -66,10 +66,10 @@ def test_an_alert_is_one_sentence_with_its_numbers(
     ],
 )
 def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
-    """Past the tipping point is what is below zero."""
+    """A tilt left of 0 is told as left; only a negative one is past the tipping point."""
     assert tilt_left(degrees) == said
 
 
 def test_what_helps_is_told_beside_what_happened() -> None:
-    """By the code alone."""
+    """Each alert code has its advice, whatever the subject."""
     assert advice('INPUT_STALE').startswith('check that its driver runs')

@@ -1,4 +1,4 @@
-"""Warnings ahead: straight lines that end in time, motors that give all, encoders that stand."""
+"""Predictions over time: margins that end soon, motors that are too weak, encoders that freeze."""
 
 import math
 from dataclasses import replace
@@ -72,7 +72,7 @@ def test_a_margin_that_shrinks_slowly_is_told_late() -> None:
 
 
 def test_a_declared_load_is_no_rate() -> None:
-    """All margins step when a payload is declared; nobody predicts from that."""
+    """A step of all margins when a payload is declared gives no prediction."""
     rows = [message(t, 0.0) for t in grid(2.0)]
     rows[100].append(Carry(T0 + S + 2 * MS, 1.2))
     assert times(run(rows), 'TIP_AHEAD') == []

@@ -1,4 +1,4 @@
-"""Warnings ahead from hand-made looks, 50 ms apart: each number at which they begin and end."""
+"""Predictions from hand-made samples 50 ms apart: the exact numbers at which they begin and end."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -66,34 +66,34 @@ def steps(*values: float) -> Numbers:
 
 @EACH
 def test_an_end_a_second_away_is_told(each: int) -> None:
-    """Of 0.1525 rad 0.1 rad/s leave 0.975 s after eleven looks, 1.025 after ten."""
+    """A tip-over is predicted from 1 s before it on: with 0.975 s left, not with 1.025 s."""
     found = Looks(tilt=lambda k: 0.1525 - 0.005 * k).told(20, each)
     assert found == [('TIP_AHEAD', 'front', 11.0, None)]
 
 
 @EACH
 def test_a_rate_needs_five_looks(each: int) -> None:
-    """However near the end is."""
+    """No prediction is made from fewer than five samples, however near the limit is."""
     found = Looks(tilt=lambda k: 0.05 - 0.005 * k).told(6, each)
     assert found == [('TIP_AHEAD', 'front', 4.0, None)]
 
 
 @EACH
 def test_what_is_gone_is_gone_at_any_rate(each: int) -> None:
-    """No tilt left and none lost any more: the warning stays."""
+    """A prediction stays when no tilt is left, though none is lost any more."""
     assert Looks(tilt=lambda _: 0.0).told(9, each) == [('TIP_AHEAD', 'front', 4.0, None)]
 
 
 @pytest.mark.parametrize(('rate', 'told'), [(0.0174, False), (0.0176, True)])
 def test_a_tilt_that_is_lost_slowly_is_no_warning(rate: float, told: bool) -> None:  # noqa: FBT001
-    """A degree a second, 0.0175 rad/s, is the least; 0.9 s are left."""
+    """A tilt lost at less than 1 deg/s (0.0175 rad/s) gives no prediction."""
     found = Looks(tilt=lambda k: rate * (1.2 - 0.05 * k)).told(7)
     assert bool(found) is told
 
 
 @pytest.mark.parametrize(('before', 'told'), [(0.0074062500000000005, True), (0.0074, False)])
 def test_the_least_rate_itself_counts(before: float, told: bool) -> None:  # noqa: FBT001
-    """0.0035 rad in 0.2 s, to the last bit."""
+    """A tilt lost at exactly the least rate gives a prediction."""
     tilt = np.linspace(before, 0.00390625, 5).tolist()
     assert bool(Looks(tilt=steps(*tilt)).told(5)) is told
 
@@ -101,7 +101,7 @@ def test_the_least_rate_itself_counts(before: float, told: bool) -> None:  # noq
 @pytest.mark.parametrize(('rate', 'told'), [(1.19, False), (1.21, True)])
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 def test_a_torque_that_grows_slowly_is_no_warning(rate: float, sign: float, told: bool) -> None:  # noqa: FBT001
-    """Three hundredths of 40 N m a second are the least, either way."""
+    """A torque that grows by less than 3 % of its limit a second gives no prediction."""
     found = Looks(torque=lambda k: sign * (40.0 - rate * (1.2 - 0.05 * k))).told(7)
     assert bool(found) is told
     assert not told or found[0][:2] == ('TORQUE_AHEAD', 'lift')
@@ -109,7 +109,7 @@ def test_a_torque_that_grows_slowly_is_no_warning(rate: float, sign: float, told
 
 @pytest.mark.parametrize(('apart', 'told'), [(100.0, True), (101.0, False)])
 def test_a_rate_over_more_than_four_tenths_of_a_second_is_none(apart: float, told: bool) -> None:  # noqa: FBT001
-    """Four looks of 0.1 s are the longest; 0.6 s are left."""
+    """Samples more than 0.1 s apart give no rate, because four intervals span at most 0.4 s."""
     found = Looks(tilt=lambda k: 0.05 - 0.05 * k * apart / 1000.0, at=lambda k: k * apart).told(9)
     assert bool(found) is told
 
@@ -122,7 +122,7 @@ def test_a_rate_is_that_of_the_time_between_looks() -> None:
 
 @pytest.mark.parametrize(('share', 'told'), [(0.59, True), (0.61, False)])
 def test_a_loss_that_comes_for_the_most_part_at_once_is_a_jump(share: float, told: bool) -> None:  # noqa: FBT001
-    """0.1 rad are lost in four looks, so much of it in the last; 0.1 rad are left."""
+    """A margin of which more than 60 % is lost in one interval has jumped: no prediction."""
     rest = (1.0 - share) / 3.0
     lost = np.cumsum((0.0, rest, rest, rest, share)) * 0.1
     assert bool(Looks(tilt=steps(*(0.2 - lost).tolist())).told(5)) is told
@@ -133,7 +133,7 @@ def test_a_loss_that_comes_for_the_most_part_at_once_is_a_jump(share: float, tol
 def test_a_warning_ahead_ends_where_a_second_and_a_half_are_left(
     left: float, end: float | None, each: int
 ) -> None:
-    """The tilt falls ever more slowly, at last by 0.02 rad/s."""
+    """A prediction ends once more than 1.5 s are left at the present rate."""
     lost = np.cumsum((0, 5, 5, 5, 5, 4, 3, 2, 2, 1, 1, 1, 1)) * 1e-3
     tilt = 0.02 * left + lost[-1] - lost
     assert Looks(tilt=steps(*tilt.tolist())).told(13, each) == [('TIP_AHEAD', 'front', 4.0, end)]
@@ -151,13 +151,13 @@ def test_a_warning_ahead_ends_where_a_second_and_a_half_are_left(
 def test_an_effort_of_four_fifths_of_its_limit_is_told(
     efforts: tuple[float, ...], start: float, end: float | None, each: int
 ) -> None:
-    """32 of 40 N m; below 30 it is over."""
+    """An effort of 80 % of its limit raises a warning; below 75 % it ends."""
     found = Looks(effort=steps(*efforts)).told(len(efforts), each)
     assert found == [('EFFORT_LIMIT', 'lift', start, end)]
 
 
 def test_an_effort_without_a_limit_is_never_too_much() -> None:
-    """Whatever it is."""
+    """A joint without an effort limit never gets an effort warning."""
     assert Looks(effort=steps(1e6, 1e9), limit=(math.inf, 20.0)).told(9) == []
 
 
@@ -217,7 +217,7 @@ def test_an_even_effort_while_the_need_grows_is_a_weak_motor(
 
 @pytest.mark.parametrize(('largest', 'weak'), [(6.0, True), (6.1, False)])
 def test_six_tenths_of_the_growth_may_come_at_once(largest: float, weak: bool) -> None:  # noqa: FBT001
-    """Of 10 N m, between two looks."""
+    """A motor is judged weak only if at most 60 % of the need's growth came in one interval."""
     need = steps(0.0, largest, 7.0, 7.5, 8.0, 8.5, 9.0, 9.5, 9.75, 10.0)
     found = Looks(torque=need, effort=lambda _: 20.0).told(10)
     assert (('MOTOR_WEAK', 'lift', 9.0, None) in found) is weak
@@ -271,7 +271,7 @@ def frozen(each: int, count: int = 8, **looks: Numbers) -> list[float]:
 def test_a_position_that_stands_for_six_looks_while_effort_changes_is_frozen(
     change: float, each: int
 ) -> None:
-    """By 0.15 of 40 N m, either way, since the first look."""
+    """An encoder is frozen if six samples are equal while effort changed by 15 % of the limit."""
     assert frozen(each, effort=steps(10.0, 10.0 + change)) == [6.0]
     assert frozen(each, effort=steps(10.0, 10.0 + 0.998 * change)) == []
 
@@ -301,7 +301,7 @@ def test_a_change_counts_since_the_position_last_moved(
 
 @EACH
 def test_a_position_that_moves_again_ends_it(each: int) -> None:
-    """At look 11, by one bit."""
+    """A frozen encoder's alert ends when the position changes by one bit."""
     q = [0.5] * 11 + [math.nextafter(0.5, 1.0)]
     found = Looks(q=steps(*q), effort=steps(10.0, 17.0)).told(14, each)
     assert found == [('ENCODER_FROZEN', 'lift', 6.0, 11.0)]
@@ -309,7 +309,7 @@ def test_a_position_that_moves_again_ends_it(each: int) -> None:
 
 @EACH
 def test_a_weak_joint_that_moves_is_not_frozen(each: int) -> None:
-    """Even one whose limit is 2 N m, whatever its effort does."""
+    """A joint that moves never has a frozen encoder, even with a small effort limit."""
     found = Looks(torque=lambda _: 0.2, effort=lambda k: 0.5 * (k % 3), limit=(2.0, 2.0)).told(
         12, each
     )
@@ -365,7 +365,7 @@ def test_who_never_lets_time_pass_keeps_the_last_thousand_looks() -> None:
 
 
 def test_the_signals_are_those_of_sides_and_joints() -> None:
-    """Four sides, and four warnings a joint."""
+    """Predictions are watched for four sides and with four warnings for each joint."""
     rules = [signal.rule for signal in quiet([]).signals()]
     sides = [(rule.code, rule.subject) for rule in rules[:4]]
     assert sides == [('TIP_AHEAD', side) for side in ('front', 'left', 'rear', 'right')]

@@ -30,10 +30,7 @@ def test_sliding_is_watched_where_the_friction_is_known() -> None:
 
 
 def test_the_way_to_gravity_is_watched_with_the_delay_of_the_imu() -> None:
-    """Only a foreign frame needs no more than that of any fault; agreement has half for deadband.
-
-    The acceleration may be 15 % from g.
-    """
+    """Attitude faults use the IMU's on-delay, a foreign frame the delay of any other fault."""
     of = RuleSet(settings(ImuInput(agreement=0.2, agreement_delay=1.5), DELAYS)).attitude
     found = [rule(s) for s in (of.frame, of.orientation, of.strange, of.disagreement)]
     assert found == [
@@ -62,7 +59,7 @@ def test_a_strange_acceleration_is_a_warning_to_who_asks_for_the_orientation_alo
 
 
 def test_faults_of_inputs_have_their_level_and_delay() -> None:
-    """Silence is told at once: how long it lasted is known already."""
+    """Each input fault has its level and on-delay; silence, already measured, has no delay."""
     watch = RuleSet(settings(delays=DELAYS))
     for subject, of in (('joint_states', watch.joints), ('imu', watch.imu)):
         assert [rule(s) for s in (of.stale, of.invalid, of.clock)] == [
@@ -88,7 +85,7 @@ def test_what_is_active_comes_with_the_most_severe_first() -> None:
 
 
 def test_every_signal_is_listed_once() -> None:
-    """One a code, subject and level; all write into the same log."""
+    """There is one signal for each code, subject and level, and all write to the same log."""
     watch = RuleSet(settings())
     rules = [(s.rule.code, s.rule.subject, s.rule.level) for s in watch.signals()]
     assert len(set(rules)) == len(rules)

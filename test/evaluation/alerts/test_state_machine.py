@@ -109,7 +109,7 @@ def test_alerts_are_those_of_the_table(
 def test_columns_give_the_alerts_of_single_samples(
     case: tuple[list[int], list[float], int], on_delay: int, off_delay: int, cuts: list[int]
 ) -> None:
-    """However a recording is cut into batches."""
+    """Columns give the same alerts as single samples, however a recording is cut into batches."""
     told = rule(on_delay, off_delay)
     assert fed(told, *case, cuts) == stepped(told, *case)
 
@@ -132,22 +132,22 @@ def test_the_passing_of_time_changes_no_dates(
 
 
 def test_a_value_in_the_deadband_keeps_an_alert() -> None:
-    """Good is only what is below the lower limit."""
+    """An alert ends only when the value is below the lower limit, not within the deadband."""
     assert stepped(rule(0, 0), [10, 20, 30], [1.0, 0.5, 0.49], 40) == [(10, 30, 1.0)]
 
 
 def test_a_short_excursion_raises_nothing() -> None:
-    """Shorter than the on-delay."""
+    """A value that is bad for less than the on-delay raises no alert."""
     assert stepped(rule(100, 0), [10, 109], [5.0, 0.0], 1000) == []
 
 
 def test_an_alert_that_falls_due_between_samples_has_that_date() -> None:
-    """Not the date of the sample that makes it known; the same for its end."""
+    """Start and end of an alert are when they fell due, not when a sample made them known."""
     assert stepped(rule(100, 50), [10, 500, 2000], [5.0, 0.0, 0.0], 3000) == [(110, 550, 5.0)]
 
 
 def test_not_a_number_changes_nothing() -> None:
-    """It neither raises nor clears, and is no peak."""
+    """NaN neither raises nor clears an alert, and is never its peak."""
     values = [2.0, math.nan, math.nan, 0.0]
     assert stepped(rule(0, 0), [1, 2, 3, 4], values, 9) == [(1, 4, 2.0)]
     assert stepped(rule(0, 0), [1, 2], [math.nan, math.nan], 9) == []
@@ -201,7 +201,7 @@ def test_no_excursion_longer_than_the_on_delay_is_hidden(seed: int, period: floa
 
 
 def test_a_value_that_stays_as_bad_raises_what_is_due() -> None:
-    """At its own sample: nobody waits for a timer."""
+    """An alert that is due is raised at the next sample, without a timer."""
     signal = Signal(rule(100, 0), [])
     for now in (0, 99):
         signal.step(now, 5.0)
@@ -224,10 +224,10 @@ def test_a_value_that_stays_as_bad_raises_what_is_due() -> None:
 def test_runs_are_the_stretches_on_one_side(
     values: tuple[float, ...], expected: list[tuple[int, int, bool]], *, raw: bool
 ) -> None:
-    """What is in the deadband, or no number, belongs to what was before."""
+    """A sample within the deadband, or NaN, counts to the side of the sample before it."""
     assert list(runs(rule(0, 0), np.array(values), raw=raw)) == expected
 
 
 def test_the_first_value_of_a_part_may_be_the_worst() -> None:
-    """Of a stretch that began in the part before."""
+    """The peak of an alert from the part before may be the first value of the next part."""
     assert fed(rule(0, 0), [1, 2, 3], [2.0, 9.0, 3.0], 5, [1]) == [(1, None, 9.0)]

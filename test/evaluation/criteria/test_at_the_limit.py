@@ -46,7 +46,7 @@ def alerts_of(limits: Limits) -> set[tuple[str, str]]:
 
 
 def test_a_torque_exactly_at_its_limit_is_one_too_many() -> None:
-    """One digit more of limit, and nothing is said."""
+    """A torque equal to its limit raises the alert; with the next larger float as limit, none."""
     code = ('TORQUE_LIMIT', 'lift')
     assert code in alerts_of(Limits((TORQUE, 300.0), torque_warn=1.0))
     more = math.nextafter(TORQUE, math.inf)
@@ -54,7 +54,7 @@ def test_a_torque_exactly_at_its_limit_is_one_too_many() -> None:
 
 
 def test_a_tilt_exactly_at_its_limit_is_too_little() -> None:
-    """One digit less of limit, and nothing is said."""
+    """A tilt left equal to its limit raises the alert; with the next smaller limit, none."""
     code = ('TIP_OVER', 'front')
     assert code in alerts_of(Limits((99.0, 300.0), tip_warn=FRONT, tip_error=0.01))
     less = math.nextafter(FRONT, 0.0)
@@ -63,7 +63,7 @@ def test_a_tilt_exactly_at_its_limit_is_too_little() -> None:
 
 @pytest.mark.parametrize(('jump', 'told'), [(1.99, False), (2.01, True)])
 def test_a_joint_that_leaps_ten_times_faster_than_it_can_is_lost(jump: float, told: bool) -> None:  # noqa: FBT001
-    """The slide makes 1 m/s: 10 m/s are looked for once a second, over what has passed since."""
+    """A position that changes at ten times the joint's greatest speed is unknown."""
     robot = settings().robot
     wide = replace(robot, joints=tuple(replace(j, lower=-99.0, upper=99.0, velocity=0.1)
                                        for j in robot.joints))  # fmt: skip
@@ -84,7 +84,7 @@ def slow_slide() -> Any:
 
 @pytest.mark.parametrize(('apart', 'told'), [(0.49, False), (0.5, True)])
 def test_positions_are_compared_half_a_second_apart_or_more(apart: float, told: bool) -> None:  # noqa: FBT001
-    """Nearer together, a little jitter would look like a leap; the one before stays."""
+    """Jumps are sought between positions at least 0.5 s apart; nearer ones are only jitter."""
     watch = RuleSet(slow_slide())
     merger = JointMerger(slow_slide(), watch.jump_signals)
     for at, q in ((T0 + S - int(apart * 1e9) // 2, 0.0), (T0 + S + int(apart * 1e9) // 2, 0.9)):
@@ -94,7 +94,7 @@ def test_positions_are_compared_half_a_second_apart_or_more(apart: float, told: 
 
 
 def test_columns_see_the_leaps_that_messages_show() -> None:
-    """Random walks of both joints, named together or alone, in two shapes: rows and alerts."""
+    """Columns and single messages find the same implausible jumps in random walks of two joints."""
     rng = np.random.default_rng(12)
     for _ in range(5):
         steps = rng.choice((0.0, 0.3, 3.0), 300, p=(0.9, 0.05, 0.05)) * rng.choice((-1.0, 1.0), 300)
@@ -121,7 +121,7 @@ def test_columns_see_the_leaps_that_messages_show() -> None:
 
 
 def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
-    """Torques that have a limit, tip-over, support, and what the data have to be."""
+    """Criteria made without a file have version 1 and cover torques, tip-over, support and data."""
     found = default_criteria(replace(settings(), limits=Limits((40.0, math.inf), torque_error=0.9)))
     assert found.version == 1
     data = ['coverage', 'duration', 'whole file', 'all messages']
@@ -131,7 +131,7 @@ def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
 
 
 def test_independent_samples_are_counted_from_neighbours() -> None:
-    """Worth n (1 - r) / (1 + r): for 1, 2, 3, 4 r is a quarter; of one number again and again n."""
+    """n samples with neighbour correlation r are worth n (1 - r) / (1 + r) independent ones."""
     assert independent_samples(np.array((1.0, 2.0, 3.0, 4.0))) == pytest.approx(4.0 * 0.75 / 1.25)
     assert independent_samples(np.array((1.0, -1.0, 1.0, -1.0))) == 4.0
     assert independent_samples(np.ones(7)) == 7.0
@@ -141,7 +141,7 @@ def test_independent_samples_are_counted_from_neighbours() -> None:
 
 
 def test_as_many_samples_as_unknowns_have_no_interval() -> None:
-    """One more has one: Student's t of one degree, by its textbook formula."""
+    """A fit has no interval with as many samples as unknowns; with one more it is Student's t."""
     x = np.array((1.0, 2.0, 4.0))
     assert least_squares(x[:1, None], x[:1]) is None
     assert least_squares(np.zeros((3, 1)), x) is None

@@ -31,7 +31,7 @@ LIMITS = Limits((40.0, 30.0), torque_error=0.9, tip_error=0.2)
 def test_what_is_left_to_a_limit_is_negative_in_violation(
     value: float, left: float, *, below: bool
 ) -> None:
-    """Of a limit of 5, from either side."""
+    """The distance to a limit is negative in violation, for upper and lower limits."""
     assert Value('torque', 'lift', below=below, limit=5.0).distance(value) == left
 
 
@@ -65,7 +65,7 @@ def test_without_a_file_every_limit_holds_at_every_moment() -> None:
 
 
 def test_a_joint_without_a_limit_is_not_judged() -> None:
-    """No criterion speaks of it."""
+    """A joint without a torque limit gets no criterion."""
     found = default_criteria(settings(limits=Limits((math.inf, 30.0))))
     assert [c.name for c in found.criteria if isinstance(c.demand, Value)] == [
         'torque slide',
@@ -74,7 +74,7 @@ def test_a_joint_without_a_limit_is_not_judged() -> None:
 
 
 def test_the_checksum_is_that_of_the_criteria_as_json() -> None:
-    """With sorted keys: the order in which fields are written down says nothing."""
+    """The criteria's checksum is that of their JSON with sorted keys, in whatever order."""
     found = default_criteria(settings(limits=LIMITS))
     plain = [{**asdict(c), 'kind': type(c.demand).__name__} for c in found.criteria]
     text = json.dumps(plain, sort_keys=True)
@@ -84,7 +84,7 @@ def test_the_checksum_is_that_of_the_criteria_as_json() -> None:
 
 
 def test_a_criterion_may_treat_bounds_as_it_likes() -> None:
-    """Its own method comes before the set's."""
+    """A criterion's own method for uncertainty comes before the method of the set."""
     plain = Criterion('c', DataDemand('coverage'))
     told = CriteriaSet('', 1, (plain,), '', uncertainty='worst_case')
     assert told.uncertainty_of(plain) == 'worst_case'
@@ -92,7 +92,7 @@ def test_a_criterion_may_treat_bounds_as_it_likes() -> None:
 
 
 def test_data_of_any_number_meet_a_demand_without_bounds() -> None:
-    """And make a run inconclusive, not failed, unless said otherwise."""
+    """A demand on data without bounds is always met; unless told otherwise it never fails a run."""
     demand = DataDemand('gaps')
     assert demand.least < -1e300
     assert demand.most > 1e300

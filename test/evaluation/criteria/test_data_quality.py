@@ -58,18 +58,18 @@ def test_a_number_of_an_input_is_asked_of_one_or_both(
 
 @pytest.mark.parametrize(('protected', 'share'), [('all', 1.0), ('part', 0.5), ('none', 0.0)])
 def test_checksums_of_some_chunks_count_half(protected: str, share: float) -> None:
-    """All chunks, some, or none."""
+    """The checksum quantity is 1 if all chunks have one, 0.5 if some have, 0 if none has."""
     result = RESULT | {'bag': RESULT['bag'] | {'protected': protected}}
     assert measured_of('protected', None, result) == {'run': share}
 
 
 def test_a_file_that_breaks_off_counts_one() -> None:
-    """What was salvaged of it is told elsewhere."""
+    """A recording that breaks off counts as 1 in the quantity for salvaged files."""
     result = RESULT | {'bag': RESULT['bag'] | {'salvaged': {'bytes': 0}}}
     assert measured_of('salvaged', None, result) == {'run': 1.0}
 
 
 def test_only_times_and_rates_have_a_unit() -> None:
-    """Counts and shares have none."""
+    """Of the data quantities only times and rates have a unit."""
     units = {name: unit_of(name) for name in DATA if unit_of(name)}
     assert units == {'duration': 's', 'rate': 'Hz', 'longest_gap': 's'}

@@ -179,7 +179,7 @@ def test_dwell_is_the_longest_stretch_within_the_limit(cuts: list[int]) -> None:
 def test_known_time_does_not_depend_on_the_pieces(
     messages: list[Message], cuts: list[int], window: Window | None
 ) -> None:
-    """And over the whole recording it is the time of a value that is always known."""
+    """The time of known margins does not depend on how a recording is cut into parts."""
     criteria = [
         Criterion('alert', AlertDemand(raised=False), window=window),
         Criterion('value', Value('position', 'lift', below=True, limit=9.0), window=window),

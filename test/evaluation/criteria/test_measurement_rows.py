@@ -68,7 +68,7 @@ def value(*args: Any, **options: Any) -> ValueMeasure:
 def test_time_is_counted_within_the_window(
     window: Window | None, evaluated: float, violated: float, samples: int
 ) -> None:
-    """Rows at 0, 1, 2 and 3 s that hold a second each; those at 1 and 2 s are in violation."""
+    """Time evaluated and in violation counts only inside a criterion's window."""
     found = value(BELOW, [rows((0, 1, 2, 3), (1.0, 6.0, 7.0, 2.0))], window)
     assert (found.evaluated / S, found.violation.total / S) == (evaluated, violated)
     assert found.samples == samples
@@ -76,7 +76,7 @@ def test_time_is_counted_within_the_window(
 
 @pytest.mark.parametrize(('demand', 'at'), [(BELOW, (5.0, 4.999)), (ABOVE, (0.5, 0.501))])
 def test_the_limit_itself_is_a_violation(demand: Value, at: tuple[float, float]) -> None:
-    """From either side."""
+    """A value equal to its limit violates the criterion, from either side."""
     told = rows((0, 1), torque=at, q=[(x, 0.0) for x in at])
     assert value(demand, [told]).violation.total == S
 
@@ -100,7 +100,7 @@ def test_the_last_row_of_a_part_holds_until_the_next(later: float, held: float) 
 
 
 def test_what_is_not_known_takes_no_time() -> None:
-    """Neither NaN nor a row without margins."""
+    """Rows with NaN or without margins add no evaluated time."""
     told = rows((0, 1, 2), (9.0, math.nan, 1.0), known=(False, True, True))
     found = value(BELOW, [told])
     assert (found.evaluated, found.samples, found.violation.total) == (S, 1, 0)
@@ -109,7 +109,7 @@ def test_what_is_not_known_takes_no_time() -> None:
 
 
 def test_the_first_violation_is_the_first_row_beyond_the_limit() -> None:
-    """Not the worst of its stretch; later stretches do not replace it."""
+    """The first violation is the first row beyond the limit, not the worst; later ones stay out."""
     found = value(BELOW, [rows((0, 1, 2), (1.0, 5.5, 9.0)), rows((3, 4), (8.0, 9.5))])
     assert found.first is not None
     assert (found.first.time, found.first.value) == (S, 5.5)
@@ -119,14 +119,14 @@ def test_the_first_violation_is_the_first_row_beyond_the_limit() -> None:
 
 
 def test_a_violation_before_the_window_is_none() -> None:
-    """The first one in it counts."""
+    """A violation before a criterion's window does not count; the first inside it does."""
     found = value(BELOW, [rows((0, 1, 2), (9.0, 1.0, 6.0))], (0.5, 9.0))
     assert found.first is not None
     assert found.first.time == 2 * S
 
 
 def test_a_row_at_the_end_of_the_window_takes_no_time() -> None:
-    """Its violation is none, though it is a sample."""
+    """A row exactly at the window's end is a sample but adds no time and no violation."""
     found = value(BELOW, [rows((0, 1, 2), (1.0, 6.0, 1.0))], (0.0, 1.0))
     assert (found.samples, found.violation.count, found.violation.total) == (2, 0, 0)
 
@@ -147,7 +147,7 @@ def test_the_worst_rows_of_the_four_worst_parts_are_kept(demand: Value, scale: f
 
 
 def test_a_moment_is_a_row_in_full() -> None:
-    """Value, joint, posture, attitude, and the payload when the joints were heard."""
+    """A moment keeps value, joint, posture, attitude and the payload of when the joints came."""
     demand = Value('torque', ANY, below=True, limit=5.0)
     criterion = Criterion('c', demand)
     found = CriteriaMeasurement(CriteriaSet('', 1, (criterion,), ''), TOLD, 0, 9 * S)
@@ -169,7 +169,7 @@ def test_a_moment_is_a_row_in_full() -> None:
 
 
 def test_dwell_is_looked_for_only_where_it_is_asked() -> None:
-    """Two seconds above the limit, one at it, one above."""
+    """The longest dwell beyond a limit is measured only for criteria that ask for it."""
     told = rows((0, 1, 2, 3), q=[(0.6, 0.0), (0.7, 0.0), (0.5, 0.0), (0.6, 0.0)])
     found = value(Value('position', 'lift', below=False, limit=0.5, dwell=0.0), [told])
     assert (found.kept.total, found.kept.longest) == (3 * S, (0, 2 * S))
@@ -203,7 +203,7 @@ def visited(
 def test_a_position_is_in_the_cell_it_falls_into(
     lift: float, slide: float, cells: list[tuple[int, int]]
 ) -> None:
-    """Cells of 0.1 m and 0.5 rad, the first joint named first."""
+    """A position falls into the cell that holds it: cells of 0.1 m and 0.5 rad here."""
     assert visited([(lift, slide)]) == cells
 
 
@@ -211,13 +211,13 @@ def test_a_position_is_in_the_cell_it_falls_into(
     ('high', 'cell', 'count'), [(0.3, 0.1, 3), (0.31, 0.1, 4), (0.05, 0.1, 1), (0.0, 0.1, 1)]
 )
 def test_a_range_has_as_many_cells_as_it_takes(high: float, cell: float, count: int) -> None:
-    """0.3 is three tenths, rounding or not; a range smaller than a cell has one."""
+    """A range of 0.3 in cells of 0.1 has three, despite rounding; a tiny range has one."""
     demand = MapDemand(('lift', 'slide'), ((0.0, high), (0.2, 0.9)), (cell, 0.2), 0.5)
     assert measured(demand, []).visited.shape == (count, 4)
 
 
 def test_cells_are_visited_within_the_window_where_margins_are_known() -> None:
-    """Rows at its ends count; what is not known does not."""
+    """A cell counts as visited only by rows in the window, ends included, with known margins."""
     path = [(-0.9, 0.05), (-0.4, 0.05), (0.1, 0.05), (0.6, 0.05)]
     assert visited(path, (1.0, 2.0)) == [(0, 1), (0, 2)]
     assert visited(path, (0.5, 2.5)) == [(0, 1), (0, 2)]
@@ -254,7 +254,7 @@ def test_the_known_time_of_a_last_row_ends_with_what_comes_next() -> None:
 
 
 def test_a_window_counts_from_the_start_of_the_recording() -> None:
-    """In seconds; without one it is the whole recording."""
+    """A window is given in seconds from the recording's start; without one all of it counts."""
     found = CriteriaMeasurement(CriteriaSet('', 1, (), ''), TOLD, 7 * S, 20 * S)
     assert found.span_of(None) == (7 * S, 20 * S)
     assert found.span_of((0.5, 2.25)) == (15 * S // 2, 37 * S // 4)
@@ -265,7 +265,7 @@ def test_a_window_counts_from_the_start_of_the_recording() -> None:
     [('torque', False), ('tip_angle', False), ('tip_energy', True), ('zmp', True)],
 )
 def test_energies_and_zmp_need_detail(signal: str, *, detail: bool) -> None:
-    """Only where a criterion asks for them."""
+    """Energies and the ZMP are computed only if a criterion needs them."""
     other = Criterion('b', DataDemand('gaps'))
     demand = Criterion('c', Value(signal, ANY, below=False, limit=1.0))
     found = CriteriaMeasurement(CriteriaSet('', 1, (other, demand), ''), TOLD, 0, S)

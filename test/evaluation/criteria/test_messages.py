@@ -41,7 +41,7 @@ RUN = made(
     ],
 )  # fmt: skip
 def test_a_violation_in_words(demand: Value, said: str) -> None:
-    """In units of what turns or slides; for two and a half seconds here."""
+    """A violation is told with its value, limit, time and duration, in the joint's unit."""
     found = judge_value(*findings(TOLD, demand, [RUN]))
     assert found.reason == f'{said} (2.50 s in violation)'
 
@@ -54,19 +54,19 @@ def test_a_violation_in_words(demand: Value, said: str) -> None:
     ],
 )
 def test_a_bound_that_is_not_given_is_not_told(demand: DataDemand, words: str) -> None:
-    """Neither at least minus infinity nor at most infinity."""
+    """A demand with one bound does not mention the other, infinite one."""
     assert demand_words(Criterion('it', demand), TOLD) == words
 
 
 def test_a_tilt_of_nothing_is_not_past_the_tipping_point() -> None:
-    """That begins below zero."""
+    """A tilt left of 0 is not told as past the tipping point, which begins below 0."""
     level = made(seconds(0), until=seconds(10), angle=[(0.0, 1.0, 1.0, 1.0)])
     found = judge_value(*findings(TOLD, Value('tip_angle', ANY, below=False, limit=0.1), [level]))
     assert found.reason.startswith('0.0 degrees of tilt left before it tips to the front')
 
 
 def test_a_dwell_tells_how_long_it_was_kept() -> None:
-    """7.5 s of the 8 s that were asked for."""
+    """A dwell that was too short tells how long the limit was kept, of how long was demanded."""
     demand = Value('torque', 'lift', below=True, limit=30.0, dwell=8.0)
     found = judge_value(*findings(TOLD, demand, [RUN]))
     assert found.reason == (

@@ -51,7 +51,7 @@ def test_too_little_data_are_told_as_a_share(
 
 
 def test_seconds_count_from_the_start_of_the_recording() -> None:
-    """Not from 1970."""
+    """Times in an outcome are seconds from the recording's start."""
     _, found = findings(TOLD, BELOW)
     assert found.seconds(seconds(2.5)[0]) == 2.5
 
@@ -87,7 +87,7 @@ def test_an_alert_counts_in_its_window(
     ],
 )  # fmt: skip
 def test_a_number_of_the_data_may_be_at_its_bound(least: float, most: float, verdict: str) -> None:
-    """50 Hz are at least and at most 50; what is not met is told with its number."""
+    """A number of the data exactly at its bound meets the demand; a violation names the number."""
     data = {**COVERED, 'inputs': {'imu': {'rate_hz': 50.0}, 'joint_states': {'rate_hz': None}}}
     found = judged(DataDemand('rate', 'imu', least, most), data=data)['criteria']['results'][0]
     assert found['verdict'] == verdict
@@ -108,7 +108,7 @@ def test_a_number_of_the_data_may_be_at_its_bound(least: float, most: float, ver
 
 @pytest.mark.parametrize(('least', 'verdict'), [(0.5, 'PASS'), (0.51, 'INCONCLUSIVE')])
 def test_the_share_of_a_map_is_of_its_cells(least: float, verdict: str) -> None:
-    """Two of four visited are half of it."""
+    """The visited share of a map is the number of cells visited over all of its cells."""
     demand = MapDemand(('lift', 'slide'), ((0.0, 1.0), (0.0, 0.2)), (0.5, 0.1), least)
     rows = made(seconds(0, 1), until=seconds(1, 10), q=[(0.1, 0.05), (0.7, 0.15)])
     found = judged(demand, rows)['criteria']['results'][0]
@@ -119,7 +119,7 @@ def test_the_share_of_a_map_is_of_its_cells(least: float, verdict: str) -> None:
 
 
 def test_faults_of_the_input_explain_what_is_inconclusive_and_nothing_else() -> None:
-    """Neither warnings nor failures of the robot; a run that passes or fails has other reasons."""
+    """Input faults are the reasons of an INCONCLUSIVE run only, not of a pass or a failure."""
     alerts = [
         alert('INPUT_STALE', 'imu', 1.0, 2.0, STALE),
         alert('INPUT_STALE', 'imu', 3.0, 4.0, STALE),

@@ -54,7 +54,7 @@ def proposed(
 def test_what_must_stay_below_gets_room_above(
     worst: float, limit: float, bound: float | None, expected: float
 ) -> None:
-    """The worst value, its uncertainty and a tenth, rounded up, at most the limit."""
+    """A proposed upper bound is the worst value plus uncertainty and a tenth, up to the limit."""
     found = proposed(value('below', worst, limit, bound))['criteria']['the "value"']
     assert found['below_nm'] == pytest.approx(expected)
     assert (found['value'], found['of']) == ('torque', 'lift')
@@ -73,7 +73,7 @@ def test_what_must_stay_below_gets_room_above(
 def test_what_must_stay_above_gets_room_below(
     worst: float, limit: float, bound: float | None, expected: float
 ) -> None:
-    """The same, rounded down, at least the limit."""
+    """A proposed lower bound is the worst value less uncertainty and a tenth, down to the limit."""
     found = proposed(value('above', worst, limit, bound, 'deg'))['criteria']['the "value"']
     assert found['above_deg'] == pytest.approx(expected)
 
@@ -82,12 +82,12 @@ def test_what_must_stay_above_gets_room_below(
     ('unit', 'key'), [('m', 'below_m'), ('N', 'below_n'), ('deg/s', 'below_degps'), ('', 'below')]
 )
 def test_the_key_names_the_unit(unit: str, key: str) -> None:
-    """As docs/criteria.md spells them; a share has none."""
+    """The keys of proposed criteria end in the unit, as docs/criteria.md spells them."""
     assert key in proposed(value('below', 1.0, 9.0, None, unit))['criteria']['the "value"']
 
 
 def test_what_was_not_seen_is_not_demanded() -> None:
-    """Neither a value without a worst, nor an outcome that is no value, nor a rate of nothing."""
+    """No criterion is proposed from a value that was never known, nor from a rate of 0."""
     alert = {'name': 'no alert', 'requirement': '', 'measured': {'alerts': []}}
     found = proposed(value('below', None, 9.0, None), alert, rate=None)['criteria']
     assert set(found) == {

@@ -58,7 +58,7 @@ def test_every_signal_is_tried_and_three_need_what_is_computed_on_demand() -> No
 
 
 def test_a_value_is_unknown_where_the_row_is() -> None:
-    """And of any joint, one that is not known does not count."""
+    """A value is NaN in a row without margins; of several joints unknown ones are left out."""
     torque = [(1.0, 2.0), (3.0, np.nan), (np.nan, np.nan)]
     rows = made([0, 1, 2], torque=torque)
     found = columns_of('torque', ANY, rows, TOLD, largest=True)

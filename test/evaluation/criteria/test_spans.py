@@ -60,14 +60,14 @@ def given(*parts: list[tuple[int, int]]) -> Spans:
 
 
 def test_spans_that_touch_are_one_within_a_part_and_across_parts() -> None:
-    """One that begins where the last one ended goes on with it; a unit later it is another."""
+    """Spans of time that touch count as one, within a part and across parts."""
     found = given([(0, 1), (2, 5), (5, 6)], [(6, 7), (9, 10)], [], [(11, 13)])
     assert found.first == [(0, 1), (2, 7), (9, 10), (11, 13)]
     assert (found.total, found.count, found.longest) == (9, 4, (2, 7))
 
 
 def test_the_longest_is_the_first_of_equals() -> None:
-    """As evidence the earlier one is shown."""
+    """Of equally long spans the first is kept as the longest."""
     assert given([(0, 2), (3, 5)], [(7, 9)]).longest == (0, 2)
 
 

@@ -85,7 +85,7 @@ def test_a_window_takes_its_share_of_what_holds() -> None:
     ids=str,
 )  # fmt: skip
 def test_an_allowance_may_be_used_up(allowed: dict[str, Any], verdict: str) -> None:
-    """All of it, and no more; a dwell is met by the longest stretch that keeps to the limit."""
+    """A violation may use up its whole allowance, and no more."""
     found = judged(replace(BELOW, **allowed))
     assert found.verdict == verdict
     assert found.measured['longest_kept_s'] == (3.0 if 'dwell' in allowed else None)
@@ -102,12 +102,12 @@ def test_an_allowance_may_be_used_up(allowed: dict[str, Any], verdict: str) -> N
     ids=str,
 )
 def test_the_limit_itself_is_not_kept(demand: Value, verdict: str) -> None:
-    """Below and above mean it."""
+    """A value equal to its limit does not keep it: below and above are strict."""
     assert judged(demand).verdict == verdict
 
 
 def test_a_dwell_that_was_not_seen_may_have_been_where_data_are_missing() -> None:
-    """Inconclusive; a limit that was broken stays broken."""
+    """A dwell not seen is INCONCLUSIVE where data are missing; a broken limit still fails."""
     assert judged(replace(BELOW, dwell=5.0), end=40.0).verdict == 'INCONCLUSIVE'
     assert judged(replace(BELOW, dwell=3.0), end=40.0).verdict == 'INCONCLUSIVE'
     assert judged(BELOW, end=40.0).verdict == 'FAIL'
@@ -115,7 +115,7 @@ def test_a_dwell_that_was_not_seen_may_have_been_where_data_are_missing() -> Non
 
 
 def test_what_is_never_known_or_never_holds_decides_nothing() -> None:
-    """No value, an infinite margin, a value at the very end, and a recording without length."""
+    """A value that is never known, is infinite, or holds for no time is INCONCLUSIVE."""
     unknown = made(seconds(0, 1), known=[False, False])
     found = judged(BELOW, unknown)
     assert (found.verdict, found.reason) == ('INCONCLUSIVE', 'it: no value was known')
@@ -144,7 +144,7 @@ LEVER = 0.5 * 9.81 * 0.5  # what 0.5 kg at half a metre are to the level lift, N
 def test_a_limit_met_by_less_than_the_bound_is_not_met_for_sure(
     room: float, method: str, verdict: str
 ) -> None:
-    """The bound is told whatever it decides."""
+    """A limit met by less than the uncertainty bound is INCONCLUSIVE, and the bound is told."""
     level = made(seconds(0), until=seconds(10), torque=[(20.0, 0.0)])
     demand = replace(BELOW, limit=20.0 + room)
     found = judged(demand, level, sources=[HEAVY], method=method)
@@ -156,7 +156,7 @@ def test_a_limit_met_by_less_than_the_bound_is_not_met_for_sure(
 
 
 def test_how_little_was_left_is_told_beside_the_bound() -> None:
-    """With the unit, where there is one."""
+    """A pass within its uncertainty tells what was left and the bound, with their unit."""
     level = made(seconds(0), until=seconds(10), torque=[(20.0, 0.0)])
     found = judged(replace(BELOW, limit=21.0), level, sources=[HEAVY])
     assert found.reason == 'it: met by 1 N m, within the uncertainty of 2.45 N m'
@@ -181,7 +181,7 @@ def test_alerts_of_the_same_margin_in_the_window_are_evidence(
     end: float | None,
     related: bool,  # noqa: FBT001
 ) -> None:
-    """From 2 s to 8 s, the ends included; of any joint where any is meant."""
+    """The evidence of a violation lists alerts about the same margin within the window."""
     one = alert(code, subject, start, end)
     found = judged(BELOW, window=(2.0, 8.0), alerts=[one])
     assert len(found.evidence) == related

@@ -143,12 +143,12 @@ def test_missing_data_never_pass() -> None:
 
 
 def test_a_violation_fails_also_where_data_are_missing() -> None:
-    """What was seen is enough."""
+    """A violation that was seen fails a criterion even if data are missing elsewhere."""
     assert outcome(TORQUE, moving(), window=(1.0, 4.0))['verdict'] == 'FAIL'
 
 
 def test_how_much_has_to_be_evaluated_is_for_the_criteria_to_say() -> None:
-    """A third of the window is enough for who asks for no more."""
+    """A criterion sets the share of its window that must be evaluated: a third is enough here."""
     criterion = Criterion('it', replace(TORQUE, limit=44.0), window=(1.0, 4.0))
     criteria = CriteriaSet('set', 1, (criterion,), '', 'a.yaml', coverage=0.3)
     assert judged(criteria, moving(), T0 + 2 * S)['verdict'] == 'PASS'
@@ -211,7 +211,7 @@ def test_a_pass_within_its_uncertainty_is_inconclusive(
 
 
 def test_a_criterion_may_ignore_the_uncertainty_for_itself() -> None:
-    """Its own word comes before the file's."""
+    """A criterion's own method for uncertainty overrides the file's."""
     found = outcome(replace(TORQUE, limit=42.0), moving(), [MASS], own='ignored')
     assert found['verdict'] == 'PASS'
 
@@ -302,7 +302,7 @@ def _tighter(criterion: Criterion) -> Criterion:
 
 
 def test_a_robot_on_its_side_fails() -> None:
-    """Tilted by 70 degrees nothing is left to tip."""
+    """A robot tilted by 70 degrees fails the tip-over criterion."""
     tilt = tilted(math.radians(70.0))
     run = [
         replace(m, orientation=tilt, acceleration=upright(tilt)) if isinstance(m, Imu) else m
