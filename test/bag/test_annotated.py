@@ -27,14 +27,14 @@ def copied(path: Path) -> list[tuple[str, str, int, bytes]]:
 
 @pytest.mark.parametrize('shape', SHAPES)
 def test_every_shape_of_mcap_is_copied_whole(tmp_path: Path, shape: str) -> None:
-    """Where the summary does not say what the channels are, the file does."""
+    """An annotated copy has every message of the MCAP, also if its summary lists no channels."""
     path = write_mcap(tmp_path / 'in.mcap', WRITTEN, **SHAPES[shape])
     assert write_annotated(tmp_path / 'out.mcap', open_bag(path), {}, []) == len(WRITTEN)
     assert copied(tmp_path / 'out.mcap') == list(WRITTEN)
 
 
 def test_a_file_cut_off_is_copied_up_to_there(tmp_path: Path) -> None:
-    """What the reader salvages is in the copy, which is whole."""
+    """Of a truncated MCAP the copy holds all that the reader salvages, and is complete itself."""
     path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
     data = path.read_bytes()
     path.write_bytes(data[: chunk_starts(data)[2] + 100])
@@ -44,7 +44,7 @@ def test_a_file_cut_off_is_copied_up_to_there(tmp_path: Path) -> None:
 
 
 def test_no_half_file_is_left(tmp_path: Path) -> None:
-    """Where what is said cannot be made, neither the copy nor a part of it is there."""
+    """If the annotation fails, neither the copy nor a part of it remains."""
     path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
 
     def fault() -> Any:
@@ -59,7 +59,7 @@ def test_no_half_file_is_left(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written_is_one_error(tmp_path: Path) -> None:
-    """A folder where the file should be is named; nothing is left beside it."""
+    """A copy that cannot be written gives one error that names the place, and leaves nothing."""
     path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
     (tmp_path / 'out.mcap' / 'full').mkdir(parents=True)
     with pytest.raises(AcceptanceError, match=r'out\.mcap: cannot be written'):

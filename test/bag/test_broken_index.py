@@ -81,7 +81,7 @@ WRONG: dict[str, tuple[Callable[[Summary], object], str]] = {
 
 @pytest.mark.parametrize('name', WRONG)
 def test_a_wrong_summary_is_found_out(tmp_path: Path, name: str) -> None:
-    """The file is scanned; where the summary contradicts the file, a finding says how."""
+    """A summary that contradicts the file is a finding, and the file is scanned instead."""
     edit, finding = WRONG[name]
     bag, batches, _ = read(with_summary(write_mcap(tmp_path / 'run.mcap', WRITTEN), edit))
     assert rows(batches) == expected(WRITTEN)
@@ -163,7 +163,7 @@ def test_a_message_index_of_another_channel_is_not_believed(tmp_path: Path) -> N
     ],
 )
 def test_a_chunk_of_another_size_than_it_says(tmp_path: Path, shape: str, finding: str) -> None:
-    """It is left out, with what it should have been; the other chunks are read, live and raw."""
+    """A chunk of another size than it states is left out with a finding; the others are read."""
     path = write_mcap(tmp_path / 'run.mcap', WRITTEN, **SHAPES[shape])
     start = chunk_starts(path.read_bytes())[1]
     size = struct.unpack_from('<Q', path.read_bytes(), start + 25)[0]
@@ -191,7 +191,7 @@ def test_a_scan_leaves_out_what_it_cannot_unpack(tmp_path: Path) -> None:
 
 
 def test_a_scan_says_where_the_records_of_a_chunk_break(tmp_path: Path) -> None:
-    """What lies before the break is kept."""
+    """A scan keeps the messages before a break in a chunk, and tells where it is."""
     options = {**SHAPES['no chunk indexes'], 'compression': CompressionType.NONE}
     path = write_mcap(tmp_path / 'run.mcap', WRITTEN, enable_crcs=False, **options)
     start = chunk_starts(path.read_bytes())[1]
@@ -213,7 +213,7 @@ def test_a_scan_passes_a_record_that_is_too_big(tmp_path: Path) -> None:
 
 
 def test_a_file_cut_off_while_it_is_read(tmp_path: Path) -> None:
-    """What is gone since the recording was opened is told chunk by chunk."""
+    """A file truncated while it is read gives a finding for every chunk that is gone."""
     path = write_mcap(tmp_path / 'run.mcap', WRITTEN)
     bag = open_bag(path)
     os.truncate(path, chunk_starts(path.read_bytes())[1] + 50)
@@ -224,7 +224,7 @@ def test_a_file_cut_off_while_it_is_read(tmp_path: Path) -> None:
 
 
 def test_findings_are_not_without_end(tmp_path: Path) -> None:
-    """A recording broken in many places tells of the first, and how many more there are."""
+    """Of very many findings the first are listed, with the number of the others."""
     path = write_mcap(tmp_path / 'run.mcap', run(150), chunk_size=1)
     data = bytearray(path.read_bytes())
     for start in chunk_starts(data):
@@ -263,17 +263,17 @@ def index_of(channel: int, offsets: list[int], size: int | None = None) -> bytes
     [b'\x07', index_of(4, [1, 2]), index_of(3, [1], 15), b'\x08' + index_of(3, [1])[1:]],
 )
 def test_what_is_no_message_index(data: bytes) -> None:
-    """One that is cut off, of another channel or kind, or of a broken size is none."""
+    """A message index that is truncated, of another channel or kind, or misfit is not used."""
     assert indexed(data, 3) is None
 
 
 def test_a_message_index_that_says_more_than_there_is() -> None:
-    """Entries beyond the bytes at hand are not made up."""
+    """A message index longer than its record gives no entries beyond it."""
     assert indexed(index_of(3, [1], 32), 3) is None
 
 
 def test_entries_of_a_message_index_come_in_order() -> None:
-    """Entries out of order, twice or negative are put right."""
+    """Entries of a message index that are unsorted, repeated or negative are corrected."""
     found = indexed(index_of(3, [70, 8, 8, (1 << 64) - 1]), 3)
     assert found is not None
     assert np.array_equal(found, [8, 70])

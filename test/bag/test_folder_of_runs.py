@@ -29,7 +29,7 @@ def told(folder: Path) -> str:
 
 
 def test_a_folder_of_runs_names_them_and_what_judges_them(tmp_path: Path) -> None:
-    """The first few, how many, and both ways on; words of a shell where a name has blanks."""
+    """A folder of several recordings is refused with their names and the commands to use."""
     folder = write_runs(tmp_path / 'all runs', 'a', 'b', 'c', 'd', 'e')
     text = told(folder)
     assert text.startswith(f'{folder}: expected one recording, found 5 in it (a, b, c and 2 more)')
@@ -39,7 +39,7 @@ def test_a_folder_of_runs_names_them_and_what_judges_them(tmp_path: Path) -> Non
 
 
 def test_files_of_two_runs_are_not_one(tmp_path: Path) -> None:
-    """Without metadata.yaml only files that differ in their number alone belong together."""
+    """Without metadata.yaml only files that differ in their number alone are one recording."""
     for name in ('one.mcap', 'two.mcap'):
         write_mcap(tmp_path / name, run(20))
     assert 'found 2 in it (one.mcap, two.mcap)' in told(tmp_path)
@@ -53,20 +53,20 @@ def test_parts_without_metadata_are_one_recording(tmp_path: Path) -> None:
 
 
 def test_a_run_one_folder_further_down_is_named(tmp_path: Path) -> None:
-    """Where there is one run only, that is what was meant."""
+    """A folder whose only recording is in a subfolder is refused with its name."""
     folder = write_runs(tmp_path / 'day', 'run')
     assert told(folder).endswith(f'found one below it: `ugv-acceptance evaluate {folder}/run`')
 
 
 def test_a_folder_without_recordings_says_what_one_is(tmp_path: Path) -> None:
-    """Nothing found: the endings that were looked for."""
+    """A folder without recordings is refused with the endings that were looked for."""
     (tmp_path / 'notes.txt').write_text('no bag')
     assert 'expected a rosbag2 folder, found no .mcap' in told(tmp_path)
 
 
 @pytest.mark.parametrize('verb', [('evaluate',), ('watch',), ('map', 'torque', '--from-bag')])
 def test_every_verb_says_so_in_one_line(verb: tuple[str, ...], tmp_path: Path) -> None:
-    """Exit code 2."""
+    """Every verb refuses a folder of several recordings with one line and exit code 2."""
     folder = write_runs(tmp_path / 'day', 'a', 'b')
     env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
     code = 'from ugv_acceptance.cli import main; main()'

@@ -238,7 +238,7 @@ def test_the_total_of_metadata_is_compared(tmp_path: Path) -> None:
 
 
 def test_files_of_several_formats_are_no_recording(tmp_path: Path) -> None:
-    """The parts of a recording are of one format."""
+    """Files of different formats are refused as parts of one recording."""
     write_other(tmp_path / 'a.db3', run(2))
     parts = [tmp_path / 'a.db3', write_mcap(tmp_path / 'b.mcap', run(2))]
     with pytest.raises(BadBag, match='expected files of one format, got mcap and sqlite3'):
@@ -246,7 +246,7 @@ def test_files_of_several_formats_are_no_recording(tmp_path: Path) -> None:
 
 
 def test_no_file_at_all_is_no_recording() -> None:
-    """An empty list of parts says so."""
+    """An empty list of files is refused as a recording."""
     with pytest.raises(BadBag, match='expected at least one bag, got none'):
         open_bag([])
 

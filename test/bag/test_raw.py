@@ -75,7 +75,7 @@ def test_a_recording_comes_back_in_order(tmp_path: Path) -> None:
 
 
 def test_only_the_topics_asked_for_are_read(tmp_path: Path) -> None:
-    """Other topics are left out."""
+    """Raw reading leaves out topics that were not asked for."""
     written = run(50)
     path = write_mcap(tmp_path / 'run.mcap', written)
     one = written[0][0]
@@ -104,7 +104,7 @@ def test_a_broken_compressed_message_is_left_out(tmp_path: Path) -> None:
 
 
 def test_what_only_looks_compressed_is_left_alone(tmp_path: Path) -> None:
-    """Content that is no CDR is nobody's to unpack, whatever it begins with."""
+    """Content that is no CDR is passed on unchanged, even if it begins as compressed data."""
     path, content = tmp_path / 'run.mcap', zstandard.FRAME_HEADER + b'x'
     with path.open('wb') as file:
         writer = Writer(file)

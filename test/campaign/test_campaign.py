@@ -42,14 +42,14 @@ def test_every_run_is_counted_once(single: Path) -> None:
 
 
 def test_what_is_unclear_is_no_success(single: Path) -> None:
-    """Two of five runs passed, although two of the others did not fail."""
+    """INCONCLUSIVE and BROKEN runs do not count as passed: two of five runs did."""
     success = said(single)['success']
     assert (success['passed'], success['runs']) == (2, 5)
     assert success['if_unclear_had_passed']['value'] == pytest.approx(0.8)
 
 
 def test_hours_are_those_that_could_be_judged(single: Path) -> None:
-    """The silent half of a run is recorded time, but shows no failure-free operation."""
+    """Only the time with known margins counts as operated, not the silent half of a run."""
     hours = said(single)['hours']
     assert hours['recorded'] * 3600 == pytest.approx(4 * 3.98, abs=0.01)
     assert hours['judged'] * 3600 == pytest.approx(3 * 3.98 + 2.08, abs=0.05)
@@ -78,7 +78,7 @@ def test_a_resumed_campaign_computes_nothing_again(fleet: Path, single: Path) ->
 
 
 def test_another_bag_or_criteria_is_computed(fleet: Path, tmp_path: Path) -> None:
-    """Only what changed is judged: a new run, then all of them under new criteria."""
+    """A resumed campaign judges only new runs; under new criteria it judges all again."""
     sources = find_sources([str(fleet / 'good_a')])
     write_run(tmp_path / 'new', 5)
     out = Place(tmp_path / 'out', 1)
@@ -100,7 +100,7 @@ def written(path: Path) -> Path:
 
 
 def test_a_spoilt_result_is_computed_again(fleet: Path, tmp_path: Path) -> None:
-    """A kept result that cannot be read, or says something else, is as if it were not there."""
+    """A stored result that is damaged is computed again."""
     sources, place = find_sources([str(fleet / 'good_a')]), Place(tmp_path, 1)
     rows, _ = carry_out(sources, brief(), place)
     fields = '"verdict": 1, "coverage": [], "start_ns": null, "alerts"'
@@ -120,14 +120,14 @@ def test_no_room_for_a_copy_breaks_no_run(fleet: Path, monkeypatch: pytest.Monke
 
 
 def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    """A file where the campaign's folder should be, before anything is judged."""
+    """A campaign's folder that cannot be made is an error before any run is judged."""
     (tmp_path / 'file').write_text('')
     with pytest.raises(AcceptanceError, match='file: '):
         carry_out([], brief(), Place(tmp_path / 'file', 1))
 
 
 def test_groups_that_cannot_be_compared_are_refused(fleet: Path, tmp_path: Path) -> None:
-    """What is wrong with the groups is said."""
+    """--compare is refused, with the reason, if a group is empty or both share a run."""
     sources = find_sources([str(fleet / 'good_a'), str(fleet / 'tips')])
     rows, _ = carry_out(sources, brief(), Place(tmp_path, 1))
     wrong = {
@@ -162,7 +162,7 @@ def test_a_dask_cluster_gives_the_same(fleet: Path, tmp_path: Path, single: Path
 
 
 def test_no_scheduler_is_said() -> None:
-    """An address nobody listens at is one line."""
+    """An address where no scheduler listens is an error of one line."""
     pytest.importorskip('distributed', reason='extra cluster is not installed')
     with pytest.raises(AcceptanceError, match='expected a dask scheduler'):
         list(judge_all([], brief(), 1, 'tcp://127.0.0.1:1'))
@@ -217,14 +217,14 @@ def test_parts_of_a_split_bag_are_one_run() -> None:
     ('place', 'text'), [('nowhere', 'found nothing'), ('nope://x/y', 'that fsspec knows')]
 )
 def test_a_place_without_runs_is_one_line(place: str, text: str, tmp_path: Path) -> None:
-    """A wrong folder or URL ends with exit code 2 and says what was expected."""
+    """A folder or URL without recordings ends with code 2 and what was expected."""
     code, printed = campaign(tmp_path, place)
     assert (code, printed.count('\n')) == (2, 1)
     assert text in printed
 
 
 def test_groups_are_compared(fleet: Path, tmp_path: Path) -> None:
-    """Two groups stand beside each other with p and power."""
+    """Two groups are compared side by side, with p-value and power."""
     _, text = campaign(tmp_path, fleet, '--compare', 'good=*/good_*', '--compare', 'other=*/tips')
     assert 'other over good 0: no difference shown at 80%' in ' '.join(text.split())
     assert 'MTBF of other over that of good: 0.00' in (tmp_path / 'campaign.html').read_text()

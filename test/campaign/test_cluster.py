@@ -116,7 +116,7 @@ def test_what_a_dead_cluster_leaves_is_judged_by_the_next_call(
 def test_no_statement_is_made_of_runs_that_were_not_judged(
     runs: Path, tmp_path: Path, cluster: Cluster, repository: Path
 ) -> None:
-    """Exit code 3; text, page and JSON say so, and no number is claimed, whatever was asked."""
+    """While a run is not judged the exit code is 3, and text, page and JSON claim no number."""
     cluster.kill_workers()
     cluster.start(0)
     options = ('--scheduler', cluster.address, '--cluster-wait', '0', '--require-mtbf', '0.0001')
@@ -143,7 +143,7 @@ def test_no_statement_is_made_of_runs_that_were_not_judged(
 
 
 def test_a_run_that_kills_its_workers_takes_no_other_with_it(cluster: Cluster) -> None:
-    """It is given up after a few workers, as not judged; all others are done."""
+    """A run that kills its workers is given up after a few, as not judged; all others are done."""
     cluster.start(3)
     sources = [Source(name, (name,)) for name in 'abcdefgh']
     done = {d.source.name: d for d in on_cluster(exit_at_b, sources, cluster.address, 1.0)}
@@ -170,7 +170,7 @@ def test_a_worker_that_does_not_see_a_path_breaks_no_run(
 
 
 def test_a_log_may_tell_of_an_alert_of_a_run_not_judged() -> None:
-    """Nobody knows that alert yet: the entry waits, it is not refused."""
+    """A log entry about an alert of a run not judged yet is kept for later, not refused."""
     row = Row('run', 'NOT_JUDGED', ('gone',))
     assert all_failures([row], [Entry('log:1', 'run', alert='TIP_OVER')]) == []
     assert len(all_failures([row], [Entry('log:1', 'run', what='wheel off')])) == 1

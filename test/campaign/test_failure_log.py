@@ -130,7 +130,7 @@ def test_a_trend_is_drawn_as_its_power_law(rows: list[Row], tmp_path: Path) -> N
     ],
 )
 def test_a_wrong_entry_is_refused(entry: str, text: str, rows: list[Row], tmp_path: Path) -> None:
-    """File, line, field, what was expected and what came."""
+    """A wrong entry is refused with file, line, field, what was expected and what came."""
     path = written(tmp_path, f'\n- {entry}\n')
     with pytest.raises(BadConfig, match=text) as caught:
         failures(rows, path)
@@ -151,7 +151,7 @@ def test_a_wrong_entry_is_refused(entry: str, text: str, rows: list[Row], tmp_pa
 def test_a_file_that_is_no_log_is_refused(
     name: str, content: bytes | None, text: str, tmp_path: Path
 ) -> None:
-    """The file, the line where there is one, and what was expected."""
+    """A file that is no failure log is refused with file, line and what was expected."""
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -162,11 +162,11 @@ def test_a_file_that_is_no_log_is_refused(
 
 @pytest.mark.parametrize('text', ['', 'failures:\n'])
 def test_a_log_without_an_entry_is_one(text: str, tmp_path: Path) -> None:
-    """Nothing failed, or nothing was written down."""
+    """An empty failure log is valid."""
     assert read_log(written(tmp_path, text)) == []
 
 
 def test_an_entry_may_name_a_copy(rows: list[Row], tmp_path: Path) -> None:
-    """A failure of a copy is one of the recording it copies."""
+    """An entry about a copy counts for the recording that it copies."""
     found = failures(rows, written(tmp_path, '- {run: good_copy, class: sensor}'))
     assert [f.run.rpartition('/')[2] for f in found if f.origin == 'log'] == ['good_b']

@@ -33,7 +33,7 @@ def caused(error: Exception) -> BadBag:
 def test_an_error_is_of_the_machine_or_of_the_recording(
     error: Exception, *, machine: bool, tmp_path: Path
 ) -> None:
-    """No memory, room, network or right is the machine's; so it is as the cause of another."""
+    """No memory, disk space, network or permission is the machine's fault, also as a cause."""
     assert is_of_the_machine(error, [tmp_path]) is machine
     assert is_of_the_machine(caused(error), [tmp_path]) is machine
 

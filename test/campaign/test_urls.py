@@ -69,7 +69,7 @@ def test_nothing_of_a_fetched_copy_is_named(s3: str, tmp_path: Path) -> None:
 
 
 def test_a_bucket_that_is_not_there_is_one_line(s3: str, tmp_path: Path) -> None:
-    """Exit code 2 and one line."""
+    """A bucket that does not exist ends with code 2 and one line."""
     code, text = campaign(tmp_path, s3.replace(BUCKET, 'nobody'))
     assert (code, text.count('\n')) == (2, 1)
 

@@ -108,7 +108,7 @@ def test_degrees_and_radians_of_one_angle_give_the_same(
 
 
 def test_a_fault_of_a_run_is_read_as_one_of_simulate() -> None:
-    """A second is no degree: the amounts of other faults stay bare."""
+    """`run --fault` needs units as `simulate --fault` does: for angles, not for other amounts."""
     robot = load().settings.robot
     first = fault_from('wrong-mounting=17deg', robot)
     assert first == fault_from(f'wrong-mounting={math.radians(17)!r}rad', robot)

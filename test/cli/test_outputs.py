@@ -198,7 +198,7 @@ def _long(option: str) -> str:
 def test_nothing_is_written_into_the_folder_of_a_recording(
     place: Path, name: str, option: str, bag: str
 ) -> None:
-    """Whether the folder was named or a file in it; nor into a folder below it."""
+    """No output is written into a recording's folder or below it, however it was named."""
     (place / 'run' / 'below').mkdir()
     arguments = [bag] if name == 'evaluate' else ['torque', '--from-bag', bag]
     for folder in ('run', 'run/below'):
@@ -572,7 +572,7 @@ def test_a_table_and_a_recording_go_through_a_pipe(place: Path) -> None:
 
 
 def test_standard_output_that_is_a_file_is_one_output_like_others(place: Path) -> None:
-    """Standard output led to a file is refused as the place of another output."""
+    """Two outputs that lead to one file through standard output are refused."""
     with (place / 'all.txt').open('wb') as file:
         done = process('plan', '--short', '-o', '/dev/stdout', '--card', '/dev/stdout', stdout=file)
     assert done.returncode == 2

@@ -79,7 +79,7 @@ def one(folder: Path, body: str) -> Criterion:
     ids=str,
 )
 def test_a_criterion_is_read(tmp_path: Path, body: str, demand: Demand) -> None:
-    """Units end keys or stand in texts; degrees become radians."""
+    """Criteria take units from keys or texts; degrees become radians."""
     found = one(tmp_path, body).demand
     if isinstance(found, Value) and isinstance(demand, Value):
         assert found.limit == pytest.approx(demand.limit, rel=1e-15)
@@ -88,7 +88,7 @@ def test_a_criterion_is_read(tmp_path: Path, body: str, demand: Demand) -> None:
 
 
 def test_a_map_takes_its_ranges_from_the_urdf(tmp_path: Path) -> None:
-    """One turn where a joint has no limits."""
+    """A map criterion's ranges are the joints' limits, or a full turn without any."""
     body = 'map: [shoulder_joint, elbow_joint], cell_deg: 30, at_least: 0.1'
     demand = one(tmp_path, body).demand
     assert isinstance(demand, MapDemand)
@@ -159,7 +159,7 @@ REFUSED = [
 
 @pytest.mark.parametrize(('body', 'words'), REFUSED, ids=[body for body, _ in REFUSED])
 def test_a_wrong_criterion_is_refused_with_its_place(tmp_path: Path, body: str, words: str) -> None:
-    """One line: file, line, field, what was expected and what came."""
+    """A wrong criterion is refused with file, line, field, what was expected and what came."""
     with pytest.raises(BadConfig) as caught:
         one(tmp_path, body)
     text = str(caught.value)
@@ -180,7 +180,7 @@ def test_a_wrong_criterion_is_refused_with_its_place(tmp_path: Path, body: str, 
     ],
 )
 def test_a_file_that_is_no_criteria_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    """The version is 1, there is at least one criterion, and no name comes twice."""
+    """A file of criteria has version 1, at least one criterion, and no name twice."""
     with pytest.raises(BadConfig, match=words):
         read(tmp_path, text)
 

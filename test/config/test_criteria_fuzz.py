@@ -41,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @hypothesis.settings(max_examples=300)
 @given(files)
 def test_any_structure_is_read_or_refused_in_one_line(folder: Path, data: Any) -> None:
-    """No other exception, and the file is named."""
+    """Any YAML structure gives criteria or one BadConfig line that names the file."""
     path = folder / 'c.yaml'
     path.write_text(yaml.safe_dump(data, allow_unicode=True), 'utf-8')
     refused = ''
@@ -56,7 +56,7 @@ def test_any_structure_is_read_or_refused_in_one_line(folder: Path, data: Any) -
 @hypothesis.settings(max_examples=200)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_or_refused(folder: Path, content: bytes) -> None:
-    """Also what is no YAML and no text."""
+    """Any bytes give criteria or BadConfig, also if they are no YAML or no text."""
     path = folder / 'b.yaml'
     path.write_bytes(content)
     with suppress(BadConfig):

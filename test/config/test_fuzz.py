@@ -49,14 +49,14 @@ printable = st.text(st.characters(exclude_categories=['Cs']), max_size=6)
 @settings(max_examples=150)
 @given(st.integers(0), st.integers(0, 30), printable)
 def test_a_damaged_yaml_is_a_configuration_or_bad(at: int, length: int, new: str) -> None:
-    """Whatever stands in place of a piece of a sound file."""
+    """A YAML file with any piece replaced gives a configuration or BadConfig."""
     assert isinstance(load_texts(write_over(YAML, at, length, new), URDF), Config | None)
 
 
 @settings(max_examples=150)
 @given(st.integers(0), st.integers(0, 30), printable)
 def test_a_damaged_urdf_is_a_configuration_or_bad(at: int, length: int, new: str) -> None:
-    """Whatever stands in place of a piece of a sound file."""
+    """A URDF with any piece replaced gives a configuration or BadConfig."""
     assert isinstance(load_texts(YAML, write_over(URDF, at, length, new)), Config | None)
 
 
@@ -71,7 +71,7 @@ def test_any_value_of_a_section_is_a_configuration_or_bad(section: str, value: o
 @settings(max_examples=100)
 @given(st.text(st.characters(exclude_categories=['Cs'])))
 def test_any_text_is_a_configuration_or_bad(text: str) -> None:
-    """As a YAML file and as a URDF."""
+    """Any text, as YAML file or as URDF, gives a configuration or BadConfig."""
     assert load_texts(text, URDF) is None
     assert load_texts(YAML, text) is None
 

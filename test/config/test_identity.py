@@ -26,7 +26,7 @@ def test_a_file_holds_the_same(tmp_path: Path) -> None:
 
 
 def test_nothing_entered_is_nothing() -> None:
-    """Every part is then marked as missing."""
+    """Without an identity every part of it is marked as missing."""
     assert identity_from(None) == {}
 
 
@@ -41,13 +41,13 @@ def test_nothing_entered_is_nothing() -> None:
     ],
 )
 def test_a_wrong_identity_is_refused(text: str, words: str) -> None:
-    """One line says what was expected."""
+    """A wrong identity is refused with one line of what was expected."""
     with pytest.raises(BadConfig, match=words):
         identity_from(text)
 
 
 def test_a_file_of_lists_is_refused(tmp_path: Path) -> None:
-    """A part is a text."""
+    """An identity file whose values are lists is refused."""
     path = tmp_path / 'identity.yaml'
     path.write_text('operator: [a, b]\n', 'utf-8')
     with pytest.raises(BadConfig, match='operator: expected a text'):

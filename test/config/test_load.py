@@ -100,7 +100,7 @@ def test_a_urdf_can_stand_in_a_ros_package(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_ros_package_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    """With and without ROS."""
+    """package://NAME of an unknown package is refused, with and without ROS."""
     path = write_robot(tmp_path, swap('two.urdf', 'package://no_such_package/two.urdf'))
     with pytest.raises(BadConfig, match='expected a ROS package of this set-up'):
         load(path)
@@ -146,7 +146,7 @@ REFUSED = [
 def test_a_wrong_field_is_refused_by_name(
     tmp_path: Path, old: str, new: str, sentence: str
 ) -> None:
-    """The error names the file, the line, the field, what was expected and what came."""
+    """A wrong field is refused with file, line, field, what was expected and what came."""
     path = write_robot(tmp_path, swap(old, new))
     with pytest.raises(BadConfig) as caught:
         load(path)
@@ -177,7 +177,7 @@ def test_a_wrong_field_is_refused_by_name(
     ],
 )
 def test_a_section_that_makes_no_sense_is_refused(tmp_path: Path, more: str, sentence: str) -> None:
-    """Values are compared with each other too."""
+    """Values that contradict each other are refused."""
     with pytest.raises(BadConfig) as caught:
         config_of(tmp_path, f'{YAML}{more}\n')
     assert sentence in str(caught.value)
@@ -192,12 +192,12 @@ def test_a_section_that_makes_no_sense_is_refused(tmp_path: Path, more: str, sen
     ],
 )
 def test_a_doubtful_field_is_warned_of(tmp_path: Path, old: str, new: str, sentence: str) -> None:
-    """An evaluation can go on; the warning names the field."""
+    """A doubtful field gives a warning that names it, and the configuration is loaded."""
     assert sentence in '\n'.join(config_of(tmp_path, swap(old, new)).warnings)
 
 
 def test_a_sound_file_has_no_warning(tmp_path: Path) -> None:
-    """Warnings that are always there would not be read."""
+    """A correct file loads without any warning."""
     assert config_of(tmp_path).warnings == ()
 
 
@@ -236,7 +236,7 @@ def test_what_is_no_configuration_is_refused(tmp_path: Path, content: bytes) -> 
 
 
 def test_aliases_of_aliases_are_refused(tmp_path: Path) -> None:
-    """A few lines that stand for a billion values do not hang."""
+    """Nested YAML aliases that expand to a billion values are refused at once."""
     lines = ['l0: &l0 [1, 1]']
     lines += [f'l{k}: &l{k} [{", ".join([f"*l{k - 1}"] * 9)}]' for k in range(1, 12)]
     with pytest.raises(BadConfig, match='expected at most'):

@@ -68,7 +68,7 @@ def test_roll_pitch_yaw_turn_about_fixed_axes() -> None:
 
 
 def test_an_effort_of_zero_or_none_is_no_limit() -> None:
-    """Exporters write 0 where nothing is known."""
+    """An effort of 0 in a URDF means no known limit, as exporters write it."""
     limits = [
         read(robot(joint(inside=inside))).joints[0].effort
         for inside in ('', '<limit effort="0" velocity="0" lower="-1" upper="1"/>')
@@ -143,7 +143,7 @@ def test_what_is_no_usable_tree_is_refused(text: str, sentence: str) -> None:
 
 
 def test_entities_are_refused() -> None:
-    """A billion laughs and files of the machine never get in."""
+    """XML entities in a URDF are refused: neither bombs nor local files are expanded."""
     bomb = '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>'
     with pytest.raises(BadConfig, match='DTD or entities'):
         read(bomb)
@@ -160,12 +160,12 @@ def test_entities_are_refused() -> None:
     ],
 )
 def test_what_is_doubtful_is_warned_of(text: str, sentence: str) -> None:
-    """The robot is read all the same."""
+    """A doubtful element of a URDF gives a warning, and the robot is loaded."""
     assert sentence in '\n'.join(read(text).warnings)
 
 
 def test_five_hundred_links_are_read() -> None:
-    """A long chain is no deeper recursion."""
+    """A chain of 500 links is read without deep recursion."""
     names = [f'l{k}' for k in range(500)]
     chain = ''.join(joint('continuous', ends=f'{a} {b}', name=b) for a, b in pairwise(names))
     assert len(read(robot(chain, ' '.join(names))).joints) == 499

@@ -27,5 +27,5 @@ def test_lengths_and_offsets_of_an_attacker_end_the_reading(tmp_path: Path) -> N
 
 
 def test_bombs_are_refused_before_they_unpack(tmp_path: Path) -> None:
-    """A chunk or a whole file of a few kB that unpacks to more than is allowed."""
+    """A few kB that unpack to more than is allowed are refused before they are unpacked."""
     hold(damage.bombs(tmp_path, 100 << 20))

@@ -7,7 +7,7 @@ from hardening import robots_fuzzed
 
 
 def test_fuzzed_robots_are_taken_or_refused_in_one_line(tmp_path: Path) -> None:
-    """Pieces inserted and cut in YAML and URDF."""
+    """Robot files with pieces inserted or cut are loaded or refused in one line."""
     outcome = robots_fuzzed.fuzz(tmp_path, 200, seed=2)
     assert outcome.held, outcome.measured
 

@@ -10,6 +10,6 @@ from hardening.sameness import trial
 def test_the_way_of_reading_changes_no_byte_of_the_result(
     repository: Path, tmp_path: Path, name: str
 ) -> None:
-    """Threads, parts, the order of files, and message by message as the live monitor decodes."""
+    """Threads, parts, file order and single messages give the same result, byte for byte."""
     outcome = trial(repository / 'bags' / name, tmp_path)
     assert outcome.held, outcome.measured

@@ -57,7 +57,7 @@ def test_an_accelerometer_at_rest_shows_the_same_up(
 
 
 def test_arrays_give_what_their_samples_give() -> None:
-    """One column a component."""
+    """Functions of arrays give the same values as for each sample alone."""
     rng = np.random.default_rng(0)
     q, mounting = rng.normal(size=(4, 50)), as_matrix(MOUNTING)
     a, b, c, d = q
@@ -73,7 +73,7 @@ def test_arrays_give_what_their_samples_give() -> None:
 def test_an_orientation_that_says_nothing_gives_nan(
     bad: tuple[float, float, float, float],
 ) -> None:
-    """Zero, NaN and infinity, without exception or warning."""
+    """A quaternion of zeros, NaN or infinity gives NaN, without exception or warning."""
     one = up_from_orientation(*bad, IDENTITY)
     x, y, z, w = (np.array([x]) for x in bad)
     many = up_from_orientation(x, y, z, w, IDENTITY)
@@ -89,20 +89,20 @@ def test_free_fall_shows_no_up() -> None:
 
 @pytest.mark.parametrize('norm', [0.991, 1.0, 1.009])
 def test_a_norm_near_1_is_a_rotation(norm: float) -> None:
-    """Within a hundredth."""
+    """A quaternion whose norm is within 1 % of 1 counts as a rotation."""
     assert is_rotation(0.6 * norm, 0.0, 0.8 * norm, 0.0) is True
 
 
 @pytest.mark.parametrize('norm', [0.0, 0.5, 0.989, 1.011, 2.0])
 def test_another_norm_is_none(norm: float) -> None:
-    """Drivers that send zeros or degrees are found out; arrays give a mask."""
+    """A quaternion of any other norm, such as zeros or degrees, is refused; arrays give a mask."""
     assert is_rotation(0.6 * norm, 0.0, 0.8 * norm, 0.0) is False
     assert not is_rotation(*np.array([[0.6], [0.0], [0.8], [0.0]]) * norm).any()
 
 
 @pytest.mark.parametrize('norm', [1.0 - NORM_SLACK, 1.0 + NORM_SLACK])
 def test_the_limit_of_the_norm_is_a_rotation_still(norm: float) -> None:
-    """A hundredth off, no further."""
+    """A quaternion's norm may be exactly 1 % off, and no more."""
     assert is_rotation(norm, 0.0, 0.0, 0.0) is True
     further = norm + math.copysign(1e-12, norm - 1.0)
     assert is_rotation(further, 0.0, 0.0, 0.0) is False
@@ -127,7 +127,7 @@ def test_the_angle_between_vectors(axis: tuple[float, float, float], turn: float
 
 
 def test_a_tiny_angle_is_not_lost() -> None:
-    """The arc cosine would give 0 here."""
+    """A tiny angle between vectors is kept, for which the arc cosine would give 0."""
     assert angle_between((1.0, 0.0, 0.0), (1.0, 1e-12, 0.0)) == pytest.approx(1e-12, rel=1e-9)
 
 

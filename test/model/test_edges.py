@@ -22,7 +22,7 @@ NORMALS = [
 
 
 def test_the_sides_go_round_from_the_front() -> None:
-    """Counter-clockwise from above."""
+    """The sides go front, left, rear, right: counter-clockwise seen from above."""
     assert SIDES == ('front', 'left', 'rear', 'right')
 
 
@@ -58,7 +58,7 @@ def test_corners_of_the_base_are_constants() -> None:
 
 @pytest.mark.parametrize('sides', [(0, 1, 2), (0, 1, 2, 3, 0)])
 def test_every_edge_has_one_side(sides: tuple[int, ...]) -> None:
-    """Neither fewer nor more."""
+    """Every edge of a support polygon belongs to exactly one side."""
     mechanics = mechanics_of(tracked())
     with pytest.raises(ValueError, match='zip'):
         edges_of(mechanics, corners_of(mechanics, (3, 1, 0, 2)), sides)

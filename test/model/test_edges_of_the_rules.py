@@ -1,4 +1,4 @@
-"""Where rules of the model begin and end, to the last digit, and parts that are rigidly joined."""
+"""Where the model's rules begin and end, to the last digit, and links that are rigidly joined."""
 
 import math
 import threading
@@ -180,7 +180,7 @@ def test_other_threads_work_where_asked_for_and_worth_it(
     workers: int,
     others: bool,  # noqa: FBT001
 ) -> None:
-    """A single block is no work for two."""
+    """Several threads work only on more than one block of samples."""
     seen = set[int]()
 
     def same(x: Floats) -> list[Floats]:
@@ -193,13 +193,13 @@ def test_other_threads_work_where_asked_for_and_worth_it(
 
 @pytest.mark.parametrize('width', [1, 3])
 def test_a_function_gives_as_many_values_as_are_asked_for(width: int) -> None:
-    """Neither fewer nor more."""
+    """A function of blocks that returns another number of values than stated is an error."""
     with pytest.raises(ValueError, match='zip'):
         in_blocks(lambda x: [x, x], width, np.zeros((4, 1)))
 
 
 def test_one_thread_works_unless_more_are_asked_for() -> None:
-    """On torques, motions, payloads and margins of more than one block."""
+    """One thread works unless more are requested: torques, motions, payloads and margins."""
     started, arm, limit = list[str](), tracked(), [9.0] * 4
     q, still = np.zeros((BLOCK + 1, 4)), np.zeros(4)
     asks = (
@@ -224,7 +224,7 @@ def test_one_thread_works_unless_more_are_asked_for() -> None:
 
 @given(st.lists(st.integers(-3, 9000), min_size=1, max_size=30))
 def test_groups_are_the_rows_of_each_value(codes: list[int]) -> None:
-    """In order of the values, near together or far apart; each row once."""
+    """Rows are grouped by equal values, in order of the values, each row once."""
     found = [
         (code, np.arange(len(codes))[rows].tolist(), size)
         for code, rows, size in groups(np.array(codes))
@@ -251,7 +251,7 @@ def test_rows_of_rows_are_rows() -> None:
 
 
 def test_utilisation_is_a_share_of_the_limit() -> None:
-    """Without sign; nothing of a limit that is infinite."""
+    """Utilisation is |torque| / limit, and 0 for an infinite limit."""
     assert utilisation((-20.0, 30.0), (40.0, 20.0)).tolist() == [0.5, 1.5]
     assert utilisation((20.0,), (math.inf,)).tolist() == [0.0]
 

@@ -1,4 +1,4 @@
-"""Hulls of a few points, to the last digit: one sample against many, and both against geometry."""
+"""Convex hulls of a few points: one sample against many, and against geometry, to the digit."""
 
 from itertools import combinations, permutations
 
@@ -56,7 +56,7 @@ def alone(points: list[Point]) -> Cycle:
 def test_a_polygon_has_an_edge_from_each_corner_to_the_next(
     cycle: Cycle, edges: list[tuple[int, int]]
 ) -> None:
-    """And from the last to the first."""
+    """A polygon's edges join each corner to the next, and the last to the first."""
     assert list(pairs(cycle)) == edges
 
 
@@ -70,7 +70,7 @@ def test_a_hull_goes_counter_clockwise_from_its_least_number(order: tuple[int, .
 
 
 def test_heights_do_not_count_from_above() -> None:
-    """Of points that stand twice in one place the same are taken, however high each is."""
+    """The hull is that of the points seen from above: their heights do not matter."""
     rng = np.random.default_rng(0)
     for _ in range(50):
         flat = rng.integers(0, 3, (7, 2)).astype(float)
@@ -86,7 +86,7 @@ def test_a_point_that_hardly_stands_out_is_no_corner(
     corner: bool,  # noqa: FBT001
     before: float,
 ) -> None:
-    """Not by the slack itself, alone or after a sample where it does or does not stand out."""
+    """A point that stands out by no more than the tolerance is no corner."""
     points: list[Point] = [*SQUARE, (0.5, -out, 0.0)]
     cycle = (0, 4, 1, 2, 3) if corner else (0, 1, 2, 3)
     assert alone(points) == cycle
@@ -116,7 +116,7 @@ def test_what_is_thin_is_thin_wherever_it_lies(
     'points', [[(1.0, 2.0, 0.0)] * 4, [(0.1 * k, 0.2 * k, 0.0) for k in range(4)], SQUARE[:2]]
 )
 def test_points_without_a_hull_are_told_at_once(points: list[Point]) -> None:
-    """All in one place, in one line, or too few: one answer for all samples."""
+    """Points all in one place, in one line or too few have no hull, one answer for all samples."""
     assert of_many([points] * 3) == [((), [0, 1, 2])]
 
 
@@ -127,7 +127,7 @@ def test_samples_that_share_a_hull_share_an_answer() -> None:
 
 
 def test_what_no_sample_moves_has_one_hull() -> None:
-    """Points of floats belong to all samples."""
+    """Points that no sample moves have one hull for all samples."""
     assert [cycle for cycle, _ in hulls(SQUARE, (0, 1, 2, 3), 5)] == [(0, 1, 2, 3)]
 
 
@@ -170,7 +170,7 @@ OUTSIDE = [(-0.25, 0.5, 0.75), (0.5, -0.25, 0.75), (0.5, 0.75, -0.25), (2.0, -0.
 def test_a_triple_carries_what_lies_above_it(
     order: tuple[int, ...], weights: tuple[float, ...], size: float
 ) -> None:
-    """Its edges and corners too, whichever way round it is counted."""
+    """A triple of points carries a load above its inside, its edges and its corners."""
     corners = size * np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
     x, y = np.array(weights) @ corners
     points: list[Point] = [(*corners[k].tolist(), 0.1 * k) for k in order]
@@ -182,7 +182,7 @@ def test_a_triple_carries_what_lies_above_it(
 def test_a_triple_tried_on_many_carries_the_same(
     order: tuple[int, ...], weights: tuple[float, ...]
 ) -> None:
-    """Its edges and corners too, for one sample as for many."""
+    """For many samples a triple carries the same loads as for one, edges and corners included."""
     corners = np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
     x, y = (float(value) for value in np.array(weights) @ corners)
     points: list[Point] = [(9.0, 9.0, 9.0), *((*corners[k].tolist(), 0.1) for k in order)]
@@ -196,14 +196,14 @@ def test_a_narrow_triple_is_not_tried_on_many(
     area: float,
     found: bool,  # noqa: FBT001
 ) -> None:
-    """Of no more than a square centimetre; whichever way round."""
+    """A triple of at most 1 cm2 is not tried on many samples at once."""
     points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, area * WIDE**2, 0.0)]
     for triple in ((0, 1, 2), (0, 2, 1)):
         assert bool(carries(points, (0.0, 0.0), triple)) == found
 
 
 def test_a_sample_of_arrays_is_its_floats() -> None:
-    """Nested as they are; floats are every sample's."""
+    """One sample taken from arrays is the same nested floats; a float belongs to every sample."""
     found = sample(((np.array((1.0, 2.0)), 3.0), (np.array((4.0, 5.0)),)), 1)
     assert found == ((2.0, 3.0), (5.0,))
     assert all(type(x) is float for part in found for x in part)
@@ -213,7 +213,7 @@ def test_a_sample_of_arrays_is_its_floats() -> None:
     ('area', 'found'), [(THIN**2, None), (2.0 * THIN**2, (0, 1, 2)), (0.5 * THIN**2, None)]
 )
 def test_a_triple_in_one_line_carries_nothing(area: float, found: Cycle | None) -> None:
-    """Neither one of no more than a square micrometre."""
+    """A triple of at most a square micrometre carries nothing."""
     points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.5, area, 0.0)]
     assert under(points, (0.0, 0.0, 1.0)) == found
 
@@ -306,6 +306,6 @@ def test_heights_are_above_the_plane_of_the_three(order: tuple[int, int, int]) -
 
 
 def test_triples_are_all_and_each_once() -> None:
-    """In order of their numbers."""
+    """All triples of points are listed once, in order of their numbers."""
     assert triples(4) == ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
     assert len(set(triples(7))) == len(list(combinations(range(7), 3)))

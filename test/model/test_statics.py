@@ -76,7 +76,7 @@ def test_table_1(theta1: float, theta2: list[float]) -> None:
 
 @given(loads)
 def test_an_arm_that_hangs_straight_down_needs_no_torque(load: float) -> None:
-    """Nothing has a lever arm then."""
+    """An arm that hangs straight down needs no torque."""
     found = static_torque(paper_arm(), [-np.pi / 2, 0.0], DOWN, Payload(load))
     np.testing.assert_allclose(found, 0.0, atol=1e-13)
 
@@ -198,7 +198,7 @@ def test_no_payload_is_allowed_where_a_joint_saturates_without_any() -> None:
 
 
 def test_a_payload_that_loads_no_joint_has_no_limit() -> None:
-    """The arm that hangs straight down, and limits that are infinite."""
+    """A payload that loads no joint, or limits that are infinite, have no largest payload."""
     arm = paper_arm()
     assert payload_capacity(arm, [0.0, 0.0], DOWN, [np.inf, np.inf]) == np.inf
     free = payload_capacity(arm, [0.0, 0.0], (0.0, -9.81, 0.0), [30.0, 30.0])
@@ -220,7 +220,7 @@ def test_an_unknown_joint_makes_its_torques_unknown(bad: float) -> None:
 
 
 def test_a_robot_without_mass_is_refused() -> None:
-    """Its centre of gravity is nowhere."""
+    """A robot without mass is refused, because it has no centre of gravity."""
     joint = Joint('j', 'revolute', 'a', 'b')
     robot = Robot('ghost', (Link('a'), Link('b')), (joint,), ('j',))
     with pytest.raises(BadConfig, match='robot ghost: expected a link with a mass'):

@@ -44,7 +44,7 @@ def test_a_robot_that_says_no_more_is_at_rest_on_the_ground_of_the_earth() -> No
 
 
 def test_links_and_joints_are_found_by_name() -> None:
-    """Whatever their order."""
+    """Links and joints are found by name, whatever their order."""
     robot = tracked()
     for link in robot.links:
         assert robot.link(link.name) is link
@@ -78,7 +78,7 @@ def test_a_joint_nobody_speaks_of_is_at_zero() -> None:
 
 @pytest.mark.parametrize('count', [1, 3])
 def test_there_is_one_position_for_each_joint(count: int) -> None:
-    """Neither fewer nor more."""
+    """A posture has exactly one position for each joint; any other number is refused."""
     tree, q = tree_of(paper_arm()), [0.1] * count
     for ask in (pose_of, steps_of):
         with pytest.raises(ValueError, match='zip'):

@@ -131,7 +131,7 @@ def test_the_criteria_without_a_file_are_of_the_first_version() -> None:
 
 
 def test_independent_samples_are_counted_from_neighbours() -> None:
-    """n samples with neighbour correlation r are worth n (1 - r) / (1 + r) independent ones."""
+    """Samples whose neighbours correlate by r count as n (1 - r) / (1 + r) independent ones."""
     assert independent_samples(np.array((1.0, 2.0, 3.0, 4.0))) == pytest.approx(4.0 * 0.75 / 1.25)
     assert independent_samples(np.array((1.0, -1.0, 1.0, -1.0))) == 4.0
     assert independent_samples(np.ones(7)) == 7.0

@@ -39,7 +39,7 @@ def test_what_is_left_to_a_limit_is_negative_in_violation(
     'allowance', ['time_in_violation', 'longest_violation', 'share_in_violation', 'dwell']
 )
 def test_any_allowance_lets_a_sample_be_in_violation(allowance: str) -> None:
-    """Even one of nothing: it is judged by time, not by samples."""
+    """With an allowance, even of 0 s, a criterion is judged by time in violation."""
     plain = Value('torque', 'lift', below=True, limit=5.0)
     assert plain.always
     told: dict[str, Any] = {allowance: 0.0}

@@ -53,7 +53,7 @@ def test_friction_is_told_apart_by_speed() -> None:
 
 @pytest.mark.parametrize(('moving', 'told'), [(LEAST, True), (LEAST - 1, False)])
 def test_friction_needs_thirty_samples_both_ways(moving: int, told: bool) -> None:  # noqa: FBT001
-    """Of one sign alone it is a bias."""
+    """Friction is estimated only from thirty samples in either direction."""
     both = samples(80, lambda t, r: t + np.sign(r), moving=moving)
     found = comparison._friction(both)
     assert (found['friction'] is not None) == told
@@ -138,7 +138,7 @@ def test_f_is_that_of_the_mean_squares() -> None:
 
 @pytest.mark.parametrize(('moving', 'rest', 'told'), [(30, 30, True), (29, 30, False), (30, 29, False)])  # fmt: skip # noqa: E501
 def test_f_needs_thirty_samples_of_each(moving: int, rest: int, told: bool) -> None:  # noqa: FBT001
-    """And a rest that is not without any error."""
+    """F needs thirty samples in motion and at rest, and some error at rest."""
     s = samples(moving + rest, lambda t, _: t + 0.1 * np.sin(t), moving=moving)
     assert (comparison._f_test(s) is not None) == told
     perfect = samples(moving + rest, lambda t, _: t, moving=moving)
@@ -160,7 +160,7 @@ def test_what_an_effort_says_of_itself() -> None:
 
 @pytest.mark.parametrize(('rate', 'motion'), [(0.05, 0), (0.051, 50), (-0.051, 50), (math.nan, 0)])
 def test_motion_is_faster_than_a_twentieth(rate: float, motion: int) -> None:
-    """rad/s or m/s; an unknown rate is none."""
+    """A joint moves above 0.05 rad/s or m/s; with an unknown rate it does not."""
     s = replace(samples(50, lambda t, _: t), rate=np.full(50, rate))
     assert s.motion().sum() == motion
 
@@ -190,14 +190,14 @@ def test_a_scale_needs_torques_that_differ_by_half_a_newton_metre(half: float, t
 def test_a_sign_is_told_where_zero_is_outside_the_interval(
     value: float, half: float, sign: str
 ) -> None:
-    """Of the scale; that of the bias does not matter."""
+    """A wrong sign is told only if the scale's whole interval is below zero."""
     assert comparison._sign(Fit(np.array((value, 0.0)), np.array((half, 9.0)), 9.0)) == sign
     assert comparison._sign(Fit(np.array((value, 0.0)), np.array((half, 0.0)), 9.0)) == sign
     assert comparison._sign(None) == 'unknown'
 
 
 def test_an_interval_is_of_one_coefficient() -> None:
-    """None where it is not a number."""
+    """An interval is that of one coefficient; without a finite one it is None."""
     fit = Fit(np.array((2.0, 5.0, math.nan)), np.array((0.5, 1.0, 1.0)), 9.0)
     assert comparison._interval(fit) == {'value': 2.0, 'low': 1.5, 'high': 2.5}
     assert comparison._interval(fit, 1) == {'value': 5.0, 'low': 4.0, 'high': 6.0}
@@ -218,7 +218,7 @@ def test_a_joint_without_any_scatter_decides_about_the_payload() -> None:
 
 
 def test_joints_that_do_not_weigh_do_not_count() -> None:
-    """Too few samples, or too little leverage."""
+    """Joints with too few samples or too little leverage do not enter the payload's estimate."""
     good, few, light = (
         still(np.full(n, 4.0), np.zeros(n), torque_gradient)
         for n, torque_gradient in ((40, 2.0), (29, 1.0), (40, 0.1))
@@ -229,7 +229,7 @@ def test_joints_that_do_not_weigh_do_not_count() -> None:
 
 
 def test_f_has_one_degree_of_freedom_at_least() -> None:
-    """A difference that only grows is worth less than two samples."""
+    """F uses at least one degree of freedom, also for samples that all resemble each other."""
     s = samples(60, lambda t, _: t + np.linspace(1.0, 2.0, 60), moving=30)
     found = comparison._f_test(s)
     assert found is not None
@@ -295,12 +295,12 @@ def test_an_effort_of_ninety_nine_hundredths_of_its_limit_is_clipped(
 def test_a_sample_is_slow_where_every_joint_keeps_to_its_bound(
     rates: tuple[float, float], share: float
 ) -> None:
-    """0.6 rad/s of the lift and 0.2 m/s of the slide; the bound itself is slow."""
+    """A sample is slow if no joint is faster than its static-speed limit."""
     assert checked(run(rate=rates))['speed_validity']['share'] == share
 
 
 def test_only_joints_with_a_bound_and_a_rate_are_judged_by_speed() -> None:
-    """None of them: no share."""
+    """Without a joint that has a speed limit and a rate, the share of slow samples is unknown."""
     half = run(rate=(0.7, 0.1))
     judged = checked(half, replace(TOLD.limits, speed=(math.inf, 0.2)))['speed_validity']
     assert judged == {'share': 1.0, 'joints': ['slide']}

@@ -75,19 +75,19 @@ def test_a_step_of_more_than_a_twentieth_ends_a_plateau(other: float, count: int
 
 @pytest.mark.parametrize(('other', 'count'), [(34.4, 1), (34.9, 1), (36.7, 1), (36.8, 2)])
 def test_a_large_effort_may_waver_by_its_twentieth(other: float, count: int) -> None:
-    """35 N m allow 1.75 either way."""
+    """A plateau of 35 N m may vary by 5 %, which is 1.75 N m, in either direction."""
     assert len(plateaus([(5.0, 0.0, 35.0), (10.0, 0.0, other)])) == count
 
 
 def test_a_plateau_lasts_three_seconds() -> None:
-    """Two seconds at a level between others are none."""
+    """A plateau lasts at least 3 s; 2 s at one level are none."""
     found = plateaus([(4.0, 0.0, 10.0), (6.0, 0.0, 20.0), (9.0, 0.0, 30.0)])
     assert [p.measured for p in found] == [10.0, 30.0]
 
 
 @pytest.mark.parametrize(('rate', 'count'), [(0.02, 1), (-0.02, 1), (0.021, 0), (-0.021, 0)])
 def test_a_joint_in_motion_is_not_compared(rate: float, count: int) -> None:
-    """0.02 rad/s either way is rest, more is not."""
+    """A joint faster than 0.02 rad/s has no plateau of effort."""
     assert len(plateaus([(5.0, rate, 20.0)])) == count
 
 
@@ -100,7 +100,7 @@ def test_an_effort_at_the_joints_limit_does_not_weigh(effort: float, saturated: 
 
 
 def test_an_upright_arm_does_not_weigh() -> None:
-    """Straight up a kg is felt by nothing."""
+    """A plateau of an upright arm, which feels no load, gives no payload."""
     (found,) = plateaus([(5.0, 0.0, 5.0)], q=math.pi / 2)
     assert found.slope == pytest.approx(0.0, abs=1e-9)
     assert found.payload is None
@@ -118,7 +118,7 @@ def test_an_effort_far_from_the_model_that_stands_at_the_runs_largest_is_clipped
 
 
 def test_without_efforts_there_is_nothing() -> None:
-    """No effort, no plateau; no message, no plateau."""
+    """Without efforts or messages there are no plateaus."""
     assert plateaus([(5.0, 0.0, math.nan)]) == []
     assert EffortComparison(TOLD).plateaus(0) == []
 
@@ -131,7 +131,7 @@ def test_at_most_twenty_samples_a_second_are_kept() -> None:
 
 
 def test_the_result_names_each_joint_its_unit_and_difference() -> None:
-    """Times count from the recording's start."""
+    """A plateau in the result has joint, unit, difference, and times from the start."""
     found = compared([(5.0, 0.0, 20.0)], slide=2.0).result(T0)
     (lift,), (slide,) = found['lift'], found['slide']
     assert (lift['unit'], slide['unit']) == ('N m', 'N')
@@ -247,7 +247,7 @@ def test_a_quarter_of_the_samples_at_the_largest_effort_is_a_limit(
 
 @pytest.mark.parametrize(('slope', 'weighs'), [(1.01, True), (0.99, False)])
 def test_a_joint_that_feels_a_newton_metre_a_kg_weighs(slope: float, weighs: bool) -> None:  # noqa: FBT001
-    """The arm is nearly upright, from either side."""
+    """A plateau gives a payload only if a kg changes the joint's torque by 1 N m."""
     for sign in (1.0, -1.0):
         (found,) = plateaus([(5.0, 0.0, 5.0)], q=math.acos(sign * slope / LEVEL_SLOPE))
         assert found.slope == pytest.approx(sign * slope)

@@ -52,7 +52,7 @@ def test_a_fit_and_its_intervals_are_the_textbooks(columns: Floats, y: Floats) -
 
 @pytest.mark.parametrize(('apart', 'told'), [(1e-7, False), (1e-4, True)])
 def test_columns_that_are_all_but_one_have_no_answer(apart: float, told: bool) -> None:  # noqa: FBT001
-    """Nobody can tell which of the two it was; also where they are the same, or zero."""
+    """A fit of columns that are nearly equal, the same or zero has no result."""
     second = T + apart * 60.0 * np.sin(T)
     assert (least_squares(np.column_stack((T, second)), T) is not None) == told
     assert least_squares(np.column_stack((T, T)), T) is None
@@ -70,5 +70,5 @@ def test_columns_that_are_all_but_one_have_no_answer(apart: float, told: bool) -
 def test_samples_that_resemble_their_neighbours_count_for_fewer(
     residual: tuple[float, ...], worth: float
 ) -> None:
-    """About their mean; three or less tell nothing of that, nor do such that alternate."""
+    """Correlated samples count for fewer; three or less, or alternating ones, are not reduced."""
     assert independent_samples(np.array(residual)) == pytest.approx(worth)

@@ -150,7 +150,7 @@ def test_an_identity_that_the_accelerometer_confirms_is_no_fault() -> None:
 
 
 def test_only_one_bad_orientation_is_no_alert() -> None:
-    """A glitch leaves one message to the accelerometer; the fault has to last."""
+    """A single bad orientation raises no alert, and the accelerometer replaces it."""
     told = settings()
     watch = RuleSet(told)
     of = ImuTracker(told, watch.attitude)
@@ -166,7 +166,7 @@ def test_only_one_bad_orientation_is_no_alert() -> None:
 
 @pytest.mark.parametrize('frame', ['imu_link', '/imu_link', 'robot_1/imu_link', ''])
 def test_a_frame_that_is_the_configured_one_is_no_fault(frame: str) -> None:
-    """Also with a slash before it, in a robot's namespace, or not named at all."""
+    """A frame matches the configured one with a leading slash, a namespace, or no name."""
     margins, codes = framed(frame)
     assert margins is not None
     assert not codes - {'TORQUE_LIMIT'}
@@ -174,7 +174,7 @@ def test_a_frame_that_is_the_configured_one_is_no_fault(frame: str) -> None:
 
 @pytest.mark.parametrize('frame', ['imu', 'other_imu_link', 'imu_link/x'])
 def test_another_frame_is_a_fault_without_margins(frame: str) -> None:
-    """Its mounting is not the one that is given."""
+    """An IMU frame other than the configured one is a fault, and gives no margins."""
     margins, codes = framed(frame)
     assert margins is None
     assert 'IMU_FRAME' in codes
@@ -190,7 +190,7 @@ def framed(frame: str) -> tuple[Margins | None, set[str]]:
 
 
 def test_an_orientation_that_disagrees_at_rest_is_a_fault_without_margins() -> None:
-    """The accelerometer says level, the orientation half a radian: nobody knows."""
+    """Orientation and accelerometer that disagree at rest are a fault, and give no margins."""
     margins, codes = outcome(ImuInput(), tilted(0.5), REST)
     assert margins is None
     assert {'IMU_INCONSISTENT', 'INPUT_INVALID'} <= codes
@@ -204,7 +204,7 @@ def test_an_orientation_that_disagrees_at_rest_is_a_fault_without_margins() -> N
 def test_an_acceleration_that_is_not_gravity_gives_no_margins(
     acceleration: Sequence[float],
 ) -> None:
-    """Where it alone would have to tell where up is; the fault has a name."""
+    """Without orientation an acceleration that is not g is a fault, and gives no margins."""
     margins, codes = outcome(ImuInput(), LEVEL, acceleration)
     assert margins is None
     assert 'INPUT_INVALID' in codes
@@ -212,7 +212,7 @@ def test_an_acceleration_that_is_not_gravity_gives_no_margins(
 
 @pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1e308])
 def test_a_number_beyond_belief_is_a_fault_and_soon_forgotten(bad: float) -> None:
-    """It does not stay in the low-pass."""
+    """An impossible acceleration is a fault, and does not stay in the low-pass."""
     of = tracker(ImuInput(attitude='accelerometer'))
     step(of, Imu(T0))
     gravity, unusable = step(of, Imu(T0 + 10 * MS, acceleration=(bad, 0.0, 9.81)))
@@ -224,7 +224,7 @@ def test_a_number_beyond_belief_is_a_fault_and_soon_forgotten(bad: float) -> Non
 
 
 def test_a_good_orientation_beside_a_broken_accelerometer_is_named() -> None:
-    """Nothing checks the orientation then: no margins, unless it alone was asked for."""
+    """With a broken accelerometer margins are known only if attitude is `orientation`."""
     for attitude in ('auto', 'orientation'):
         told = ImuInput(attitude=attitude)
         margins, codes = outcome(told, tilted(0.1), (math.nan,) * 3)
@@ -238,7 +238,7 @@ def test_a_good_orientation_beside_a_broken_accelerometer_is_named() -> None:
 
 @pytest.mark.parametrize('force', [(0.0, 0.0, 1.0), (0.01, 0.0, 0.02), (0.0, 0.0, 0.0)])
 def test_specific_force_that_is_none_gives_no_margins_at_all(force: Sequence[float]) -> None:
-    """In g or without gravity it would make every margin look large: not one is computed."""
+    """A specific force in g, or without gravity, gives no margins: they would look too large."""
     evaluator = LiveEvaluator(settings(ImuInput(specific_force=True)))
     evaluator.start(T0)
     for k in range(300):
@@ -250,7 +250,7 @@ def test_specific_force_that_is_none_gives_no_margins_at_all(force: Sequence[flo
 
 @pytest.mark.parametrize('orientation', [ON_ITS_BACK, tilted(math.pi / 2)])
 def test_an_imu_mounted_otherwise_than_told_is_never_ok(orientation: tuple[float, ...]) -> None:
-    """Upside down or at 90 degrees: the robot seems past its tipping point, which is an alert."""
+    """An IMU mounted upside down or at 90 degrees against its configuration raises TIP_OVER."""
     margins, codes = outcome(ImuInput(), orientation, upright(orientation))
     assert margins is not None
     assert min(map(float, margins.stability.angle)) < 0.0
@@ -258,7 +258,7 @@ def test_an_imu_mounted_otherwise_than_told_is_never_ok(orientation: tuple[float
 
 
 def test_a_mounting_that_is_told_is_undone() -> None:
-    """Sensor axes are turned into base_link for orientation and acceleration alike."""
+    """The configured mounting turns sensor axes into `base_link`, orientation and acceleration."""
     sensor = tilted(math.pi / 2)
     margins, codes = outcome(ImuInput(mounting=QUARTER_ROLL), sensor, upright(sensor))
     assert margins is not None

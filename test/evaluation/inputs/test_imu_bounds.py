@@ -71,7 +71,7 @@ def test_orientation_and_acceleration_are_compared_at_rest(
 def test_an_acceleration_that_is_not_g_at_rest_is_strange(
     up: float, omega: tuple[float, ...], found: set[str]
 ) -> None:
-    """From 15 % of g on; in motion nobody expects g."""
+    """At rest an acceleration 15 % off g is a fault; in motion it is not judged."""
     *_, codes = tracked(Imu(T0, tilted(0.1), omega, (0.0, 0.0, up)), 100, rest_rate=0.125)
     assert codes == found
 
@@ -80,7 +80,7 @@ def test_an_acceleration_that_is_not_g_at_rest_is_strange(
     ('up', 'known'), [(11.5, True), (11.5001, False), (8.5, True), (8.4999, False)]
 )
 def test_an_acceleration_tells_up_within_fifteen_hundredths(up: float, known: bool) -> None:  # noqa: FBT001
-    """The bounds included."""
+    """An acceleration gives the attitude within 15 % of g, the bounds included."""
     gravity, unusable, *_ = tracked(Imu(T0, LEVEL, STILL, (0.0, 0.0, up), -1.0))
     assert unusable != known
     assert math.isnan(gravity[2]) != known
@@ -88,7 +88,7 @@ def test_an_acceleration_tells_up_within_fifteen_hundredths(up: float, known: bo
 
 @pytest.mark.parametrize(('up', 'known'), [(5.0, True), (4.9999, False)])
 def test_half_of_g_is_no_fall(up: float, known: bool) -> None:  # noqa: FBT001
-    """Less is one: no margin is computed from such a specific force."""
+    """A specific force of exactly half of g is no free fall; less is, and gives no margins."""
     gravity, unusable, *_ = tracked(Imu(T0, LEVEL, STILL, (0.0, 0.0, up)), specific_force=True)
     assert unusable != known
     assert gravity == (
@@ -103,7 +103,7 @@ def test_a_rate_beyond_belief_makes_a_message_unusable(
     spin: float,
     usable: bool,  # noqa: FBT001
 ) -> None:
-    """Who asks for the orientation alone is told, and still gets its gravity."""
+    """An impossible angular rate makes an IMU message unusable, except for `orientation`."""
     message = Imu(T0, tilted(0.1), (0.0, spin, 0.0), TEN)
     gravity, unusable, *_ = tracked(message, attitude=attitude)
     assert unusable != usable
@@ -133,7 +133,7 @@ def test_a_unit_quaternion_is_a_rotation_about_any_axis(
 def test_who_asks_for_the_accelerometer_hears_nothing_of_orientations_that_say_nothing(
     orientation: tuple[float, ...],
 ) -> None:
-    """Only of one that contradicts it."""
+    """With attitude `accelerometer` only an orientation that contradicts it is a fault."""
     message = Imu(T0, orientation, STILL, TEN)
     gravity, unusable, _, codes = tracked(message, 100, attitude='accelerometer')
     contradicts = orientation == tilted(0.5)
@@ -168,7 +168,7 @@ def test_a_warning_of_the_orientation_leaves_gravity_to_the_accelerometer(
 
 @pytest.mark.parametrize(('frame', 'found'), [('imu_link', set()), ('arm', {'IMU_FRAME'})])
 def test_a_foreign_frame_takes_gravity_away_at_once(frame: str, found: set[str]) -> None:
-    """With its first message."""
+    """A foreign frame makes gravity unknown from its first message on."""
     gravity, unusable, _, codes = tracked(
         Imu(T0, LEAN, STILL, LEANING, frame=frame), frame='imu_link'
     )

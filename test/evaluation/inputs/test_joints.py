@@ -60,7 +60,7 @@ def test_sign_offset_and_effort_scale_are_undone() -> None:
 
 
 def test_names_may_come_in_any_order_among_others() -> None:
-    """Joints are found by name."""
+    """Joints are found by name, in any order and among other joints."""
     merger = merged(Joints(T0, ('wheel', 'hand_slide', 'lift'), (9.0, 0.2, 0.3)))
     assert merger.q == [pytest.approx(-0.2), 0.2]
 
@@ -89,7 +89,7 @@ def test_a_position_may_be_a_tenth_beyond_its_limits(slide: float, known: bool) 
     ('number', 'known'), [(1e5, True), (-1e5, True), (1.0001e5, False), (-1.0001e5, False)]
 )
 def test_no_angle_and_no_rate_is_beyond_a_hundred_thousand(number: float, known: bool) -> None:  # noqa: FBT001
-    """However far an endless joint has turned; alone and in columns."""
+    """An angle or rate beyond 1e5 is unknown, also of a continuous joint."""
     told = settings()
     lift = replace(told.robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf)
     endless = replace(told.robot, joints=(lift, told.robot.joints[1]))
@@ -103,7 +103,7 @@ def test_no_angle_and_no_rate_is_beyond_a_hundred_thousand(number: float, known:
 
 
 def test_a_name_that_stands_twice_is_left_out() -> None:
-    """Nobody can tell which of the two it is."""
+    """A joint named twice in one message is left out."""
     merger = merged(Joints(T0, ('lift', 'lift', 'hand_slide'), (0.1, 0.2, 0.3)))
     assert math.isnan(merger.q[0])
     assert merger.q[1] == 0.3
@@ -126,7 +126,7 @@ def test_a_message_without_a_position_of_ours_is_no_event(message: Joints) -> No
 
 
 def test_empty_velocity_and_effort_are_unknown_not_zero() -> None:
-    """As many drivers leave them empty."""
+    """Empty velocities and efforts are unknown (NaN), not 0."""
     merger = merged(Joints(T0))
     assert all(map(math.isnan, [*merger.qd, *merger.effort]))
 
@@ -151,7 +151,7 @@ def turning(unit: float, wrapped: float = 0.0) -> tuple[list[float], list[str]]:
 
 @pytest.mark.parametrize('wrapped', [0.0, math.tau])
 def test_an_endless_joint_may_turn(wrapped: float) -> None:
-    """Wrapped at a turn or not, its position stays known."""
+    """A continuous joint's position stays known as it turns, wrapped at a turn or not."""
     known, alerts = turning(1.0, wrapped)
     assert not alerts
     assert not any(map(math.isnan, known))
@@ -159,14 +159,14 @@ def test_an_endless_joint_may_turn(wrapped: float) -> None:
 
 @pytest.mark.parametrize('wrapped', [0.0, math.tau])
 def test_degrees_of_an_endless_joint_are_found_by_its_motion(wrapped: float) -> None:
-    """It moves 57 times faster than it seems to the driver: from the second second on, a fault."""
+    """Degrees given for radians are found by a continuous joint's motion: 57 times too fast."""
     known, alerts = turning(180.0 / math.pi, wrapped)
     assert set(alerts) == {'POSITION_LEAP lift'}
     assert all(map(math.isnan, known[101:]))
 
 
 def test_a_leap_is_forgotten_when_the_joint_is_slow_again() -> None:
-    """A joint that was homed leaps once: unknown for a while, then known where it is now."""
+    """A joint that jumps once, as by homing, is unknown for a while and then known again."""
     slide = [0.0] * 150 + [0.3] * 450
     told = [replace(j, velocity=0.01) for j in settings().robot.joints]
     slow = replace(settings(), robot=replace(settings().robot, joints=tuple(told)))
@@ -208,32 +208,32 @@ def heard(
 
 @pytest.mark.parametrize('every', [10, 100, 300])
 def test_two_robots_that_tell_of_one_joint_are_not_believed(every: int) -> None:
-    """The slide makes 1 m/s; another robot's stands 0.2 m off. Each second begins with ours."""
+    """Two robots' positions of one joint, in turn, make it unknown."""
     ours = [(at, 0.0) for at in range(0, 3000, 10)]
     theirs = [(at + 3, 0.2) for at in range(20, 3000, every)]
     assert heard(sorted(ours + theirs)) == [('slide', 1)]
 
 
 def test_robots_that_agree_are_believed() -> None:
-    """Two drivers of one robot, one a little behind: 0.05 m between them at 1 m/s."""
+    """Two drivers of one joint whose positions agree cause no fault."""
     told = [(at + late, (at - 10 * late) / 1e3) for at in range(0, 3000, 10) for late in (0, 5)]
     assert not heard(told, velocity=1.0)
 
 
 def test_a_wrong_reading_a_second_is_no_contradiction() -> None:
-    """There and back are two jumps; three in a second are one too many."""
+    """One wrong reading a second (two jumps) is no fault; three jumps in a second are."""
     told = [(at, 0.2 if at % 1000 == 500 else 0.0) for at in range(0, 4000, 10)]
     assert not heard(told)
     assert heard([*told[:160], (1601, 0.2), *told[160:]]) == [('slide', 2)]
 
 
 def test_messages_that_come_late_and_all_at_once_do_not_leap() -> None:
-    """Five of a moving slide within a millisecond of each other, again and again."""
+    """Messages of a moving joint that arrive in a burst are no jump."""
     assert not heard([(at - at % 50 + at % 50 // 10, at / 1e3) for at in range(0, 3000, 10)])
 
 
 @pytest.mark.parametrize(('kind', 'jump_signals'), [('continuous', 0), ('revolute', 1)])
 def test_a_turn_to_and_fro_is_no_leap_of_an_endless_joint(kind: str, jump_signals: int) -> None:
-    """It rests where its driver wraps: told as half a turn, and minus half a turn."""
+    """A continuous joint reported at +half a turn and -half a turn in turn has not jumped."""
     told = [(at, math.pi * (-1) ** (at // 10)) for at in range(5, 3000, 10)]
     assert len(heard(told, 'lift', kind=kind)) == jump_signals

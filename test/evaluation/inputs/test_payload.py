@@ -62,7 +62,7 @@ BELOW = 'static torque (magnitude) of lift below 30 N m'
     ],
 )  # fmt: skip
 def test_a_demand_in_words(demand: Demand, words: str) -> None:
-    """As a person would say it, with its unit; a window is told too."""
+    """A demand is told in words with its unit and its window."""
     assert demand_words(Criterion('c', demand), TOLD).endswith(words)
     windowed = demand_words(Criterion('c', demand, window=(1.5, 4.0)), TOLD)
     assert windowed.endswith(f'{words}, from 1.5 to 4 s')
@@ -86,20 +86,20 @@ def test_only_a_load_that_can_be_is_taken(
     frame: str,
     known: bool,  # noqa: FBT001
 ) -> None:
-    """In the hand's axes, not below zero, below a hundred tons and a kilometre."""
+    """A payload is taken only in the gripper's frame, from 0 to 100 t, within a kilometre."""
     found = payload_from(TOLD.robot, mass, com, frame)
     assert found == (Payload(mass, com) if known else None)
 
 
 def test_a_robot_without_a_hand_carries_nothing() -> None:
-    """Whatever frame is named."""
+    """A robot without a payload link takes no payload, whatever the frame."""
     robot = Robot('r', TOLD.robot.links[:1], (), ())
     assert payload_from(robot, 1.0, (0.0, 0.0, 0.0), '') is None
 
 
 @given(st.lists(st.integers(0, 50), max_size=6), st.lists(st.integers(0, 50), min_size=1))
 def test_a_load_is_in_force_from_its_moment_on(declared: list[int], asked: list[int]) -> None:
-    """Of those declared at one time the last counts; asked in order, in any pieces."""
+    """A payload is in force from its declaration on; of several at one time the last counts."""
     history, times = PayloadHistory(Payload(0.5)), sorted(asked)
     for k, when in enumerate(sorted(declared)):
         history.declare(when, Payload(float(k + 1), (0.1 * k, 0.0, 0.0)))
@@ -130,7 +130,7 @@ def need(mass: float, q: float = 0.0) -> float:
     ('mass', 'differs'), [(1.0, False), (1.49, False), (1.51, True), (3.0, True), (0.4, True)]
 )
 def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa: FBT001
-    """By the leverage of a kg; half a kg from what was declared is told."""
+    """The efforts estimate the payload by leverage; half a kg off the declared one is told."""
     found = weighed(need(mass))
     assert found.mass == pytest.approx(mass)
     assert found.declared == 1.0
@@ -139,13 +139,13 @@ def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa:
 
 
 def test_less_than_nothing_is_told_as_nothing() -> None:
-    """A motor that is helped a little carries no negative load; helped much, the arm leans."""
+    """A slightly negative estimate is a payload of 0; a large one means that the arm leans."""
     assert 'as if 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
     assert weighed(need(0.0) - 0.6 * LIFT) is None
 
 
 def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
-    """Motion, no effort, or an arm that stands up: a kg there is felt by less than a N m."""
+    """No payload is estimated in motion, without effort, or with an upright arm."""
     assert weighed(need(2.0), rate=0.02) is not None
     assert weighed(need(2.0), rate=0.021) is None
     assert weighed(math.nan) is None
@@ -157,7 +157,7 @@ def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
 
 @pytest.mark.parametrize(('off', 'known'), [(5.0, True), (15.0, False)])
 def test_what_no_load_explains_is_no_load(off: float, known: bool) -> None:  # noqa: FBT001
-    """A level slide feels no load: its force must stay below what half a kg is to the lift."""
+    """No payload is estimated where a prismatic joint's force cannot come from a load."""
     load = Payload(1.0, (0.1, 0.0, 0.0))
     told = payload_estimate(
         TOLD, (0.0, 0.0), (0.0, 0.0), (need(1.0), off), DOWN, load

@@ -58,7 +58,7 @@ def test_the_period_is_the_median_of_the_last_full_window(steps: list[int]) -> N
     st.sampled_from([1, S, 3 * S]),
 )
 def test_clock_of_many_is_clock_of_each(pairs: list[tuple[int, int]], cut: int, grain: int) -> None:
-    """Also where the messages come in two parts, or a clock is so coarse that it stands."""
+    """Clock faults of columns equal those of single messages, in parts and with coarse clocks."""
     times = T0 + np.cumsum([step for step, _ in pairs])
     stamps = (times + [shift for _, shift in pairs]) // grain * grain
     one, many = InputTimeout(Delays()), InputTimeout(Delays())
@@ -95,7 +95,7 @@ def test_stamps_that_jump_or_are_days_off_are_a_clock_fault(
 
 
 def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
-    """Stamps that stand still while messages are received."""
+    """Stamps that stand still while messages come are a CLOCK fault within a second."""
     fresh = InputTimeout(Delays())
     wrong = []
     for k in range(40):
@@ -105,7 +105,7 @@ def test_a_frozen_clock_is_a_fault_within_a_second() -> None:
 
 
 def test_columns_learn_the_period_of_a_slow_input() -> None:
-    """A hundred messages at 60 ms: stale after three periods."""
+    """Columns learn the period of a slow input: stale after three periods of 60 ms."""
     fresh = InputTimeout(Delays())
     _, limits = fresh.messages(T0 + np.arange(100) * 60 * MS)
     assert fresh.period == 60 * MS
@@ -120,7 +120,7 @@ def test_columns_of_a_frozen_clock_are_wrong_after_half_a_second() -> None:
 
 
 def test_no_message_has_no_clock() -> None:
-    """A batch without one changes nothing."""
+    """An empty batch of messages does not change the state of the clock."""
     fresh = InputTimeout(Delays())
     assert fresh.clocks(np.empty(0, np.int64), np.empty(0, np.int64)).tolist() == []
     assert fresh.deadline is None
