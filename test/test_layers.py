@@ -1,4 +1,4 @@
-"""The walls of the house, executed: who imports whom, what the pure part does without, how long.
+"""The rules of the code's layers, executed: imports, purity, lengths, docstrings, types.
 
 The table is that of docs/architecture.md. Imports inside functions count too.
 """

@@ -224,7 +224,7 @@ with ended_by_signals() as told:
 
 
 def test_a_signal_is_not_lost() -> None:
-    """Where its exception is swallowed it is raised again, but not into what is being closed."""
+    """A signal whose exception is swallowed raises again, but not while files are being closed."""
     done = subprocess.run(
         [sys.executable, '-c', LOSES], capture_output=True, text=True, check=False, timeout=PATIENCE
     )
@@ -288,7 +288,7 @@ LEAVE: dict[str, Callable[[Screen], object]] = {
 
 @pytest.mark.parametrize('words', [('watch',), ('watch', BAG)], ids=['live', 'bag'])
 def test_watch_gives_the_terminal_back(words: tuple[str, ...]) -> None:
-    """Key or signal: it ends with 0, and the terminal's modes and screen are those of before."""
+    """Ended by key or signal, `watch` returns 0 and restores the terminal's modes and screen."""
     with ExitStack() as stack:
         screens = {how: stack.enter_context(on_a_screen(*words)) for how in LEAVE}
         for how, screen in screens.items():

@@ -59,7 +59,7 @@ def test_a_shelved_alert_is_silent() -> None:
 
 
 def test_who_joins_late_sees_what_is_active() -> None:
-    """What a console itself sees is added, but not twice."""
+    """A console that starts late adds the active alerts it finds itself, none twice."""
     book, own = (
         AlertBook(),
         AlertRow('TIP_OVER-left-ERROR', 'TIP_OVER', 'left', ERROR, '', '', '', 0),

@@ -1,4 +1,4 @@
-"""What a console keeps of what it hears: enough for a picture, and nothing twice."""
+"""Which messages a console evaluates for a picture: the newest ones, each once."""
 
 import pytest
 from hypothesis import given
@@ -75,7 +75,7 @@ def test_an_orientation_replaces_an_older_one() -> None:
 def test_what_is_smoothed_is_taken_whole(
     settings: ImuInput, orientation: tuple[float, ...], covariance: tuple[float, ...]
 ) -> None:
-    """Where the attitude is the smoothed acceleration's, each message goes on."""
+    """If attitude comes from smoothed acceleration, every IMU message is passed on."""
     taken: list[bytes] = []
     messages = [imu(k, orientation, covariance) for k in range(5)]
     newest = Newest(taken.append, newest_attitude(settings))

@@ -62,6 +62,6 @@ def test_a_recording_is_told_to_its_end(clock: Clock) -> None:
 
 
 def test_nothing_new_is_no_line(clock: Clock) -> None:
-    """A robot that stands still for an hour is one line."""
+    """A robot that does not change for an hour prints one line."""
     feed = replace(recording_feed(BAG, load()), now=lambda: 0.0)
     assert len(told(clock, feed, 600.0)) == 1

@@ -1,4 +1,4 @@
-"""Who may talk to the console: the rules, and a real server that keeps them."""
+"""The console's access rules, and a real server that applies them."""
 
 import http.client
 import json
@@ -85,7 +85,7 @@ def test_this_machine_needs_no_token() -> None:
     ],
 )
 def test_host_must_be_ours(host: str, bound: str, status: int | None) -> None:
-    """A name that was rebound to this machine is refused: 400."""
+    """A request whose Host is another name, as by DNS rebinding, is refused with 400."""
     assert Guard(bound, None).refusal('GET', {b'host': host.encode()}, b'') == status
 
 

@@ -1,4 +1,4 @@
-"""The server among clients: every question is answered, and who is slow harms nobody."""
+"""The server with many clients: every command is answered, and slow clients harm no other."""
 
 import json
 import os

@@ -98,7 +98,10 @@ def test_a_message_on_its_deadline_is_not_late(
     late: int,
     stale: bool,  # noqa: FBT001
 ) -> None:
-    """A message exactly at its deadline is in time; one nanosecond later its input was stale."""
+    """A message exactly at its deadline is in time; one nanosecond later its input was stale.
+
+    Margins are known up to the deadline, itself included, whichever input asks.
+    """
     run = run_of(2.0, imu_hz=50.0)
     start = T0 + (MS if silent is Imu else 0)
     last = start + 1480 * MS

@@ -180,7 +180,10 @@ FINE = (1.0, 1.0, 1.0, 1.0)
 
 
 def test_time_in_violation_counts_from_the_limit_on() -> None:
-    """Each known row counts until the next, the last until its deadline or the end."""
+    """Each known row counts until the next, the last until its deadline or the end.
+
+    Half of 40 N m and 30 N are allowed; 0.1 rad are left to any side.
+    """
     rows = made(
         [0, 1, 3, 7, 15],
         until=[1, 3, 7, 15, 31],

@@ -1,4 +1,4 @@
-"""What the verdict says beside the alerts, and what a person may do about them."""
+"""The verdict's advice and hints beside the alerts, and the operator's commands."""
 
 import math
 import time
@@ -145,7 +145,7 @@ def test_a_load_that_the_motors_feel_is_offered() -> None:
 
 
 def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared() -> None:
-    """A moving arm tells nothing: the alert stays; efforts that agree end it."""
+    """An undeclared payload stays an alert in motion, until efforts agree with the declared one."""
     session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
     effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
     wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
@@ -230,13 +230,13 @@ def test_whatever_an_operator_sends_is_done_or_refused_in_one_line(
     ],
 )
 def test_what_is_wrong_with_an_operation_is_said(sent: DiagnosticStatus, said: str) -> None:
-    """Which field, what was expected, what came."""
+    """A wrong operator command is refused with field, what was expected and what came."""
     with pytest.raises(BadSample, match=said):
         operation_from(sent)
 
 
 def test_one_alarm_can_be_acknowledged_by_its_code() -> None:
-    """The others stay as they are."""
+    """One alarm can be acknowledged by its code; the others stay as they are."""
     session = session_with()
     wait_until(
         lambda: raised(session, 'TIP_OVER', 'front', ERROR) and len(session.active) > 3,

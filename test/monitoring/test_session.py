@@ -1,4 +1,4 @@
-"""What the live node is made of, without ROS around it: bytes in, margins and alerts out."""
+"""The monitor's session without ROS: message bytes in, margins and alerts out."""
 
 import struct
 import time
@@ -170,7 +170,7 @@ def test_the_follower_tells_each_change_once() -> None:
 
 
 def test_an_alert_shorter_than_a_look_is_told() -> None:
-    """What was raised and cleared between two looks is both, in that order."""
+    """An alert raised and cleared between two looks is told as both, in that order."""
     short = alert(1)
     short.end = 2
     alarm_tracker = AlarmTracker([short])
@@ -235,7 +235,7 @@ def test_a_parameter_reads_what_was_put(tunable: Any) -> None:
 
 
 def test_a_misspelt_parameter_is_said() -> None:
-    """A parameter that does not exist is a warning that names the nearest one."""
+    """A parameter that does not exist gives a warning with the nearest name."""
     (text,) = unknown(['limits.tip_wran_deg'], knobs_of(CONFIG.settings))
     assert 'limits.tip_wran_deg' in text
     assert 'limits.tip_warn_deg' in text

@@ -1,4 +1,4 @@
-"""What is left, what was least, how soon it is gone, and what the motors say of the load."""
+"""Trends of live margins: the least seen, the time until one is gone, and the payload estimate."""
 
 import math
 from collections.abc import Sequence
@@ -68,7 +68,7 @@ def test_a_load_that_grows_is_told_with_its_time() -> None:
 
 @pytest.mark.parametrize('later', [0, 3 * SECOND])
 def test_a_robot_that_rests_or_is_not_heard_has_nothing_ahead(later: int) -> None:
-    """No rate, or no sample of the last second: nothing is said."""
+    """A robot at rest, or without samples in the last second, has no predicted end."""
     trends = Trends(PACKBOT)
     for k in range(100):
         left = 0.1 - 0.05 * k / 100 if later else 0.1
@@ -105,7 +105,7 @@ def test_a_near_miss_is_dated_to_the_first_of_equals() -> None:
 
 
 def test_what_has_no_limit_or_was_never_seen_is_no_near_miss() -> None:
-    """A joint without a limit, a tilt that is not known, and no sample at all."""
+    """A joint without a limit, or a tilt that is unknown, gives no near miss."""
     free = settings(limits=Limits((math.inf, 10.0)))
     nowhere = (math.nan,) * 4
     (torque,) = seen([(nowhere, (50.0, 3.0))], told=free).near_misses()
@@ -121,7 +121,7 @@ def falling(count: int, spacing: int = 50 * MS, tilt: float = 0.2, load: float =
 
 
 def test_eight_samples_of_the_last_second_tell_a_rate() -> None:
-    """One every 50 ms is kept; a second old is too old."""
+    """A rate needs eight samples, one every 50 ms, from the last second."""
     assert len(falling(8).ahead(350 * MS)) == 1
     assert falling(7).ahead(300 * MS) == ()
     assert len(falling(8).ahead(SECOND - 1)) == 1
@@ -131,7 +131,7 @@ def test_eight_samples_of_the_last_second_tell_a_rate() -> None:
 
 
 def test_a_second_of_samples_is_all_that_is_kept() -> None:
-    """However long the robot runs."""
+    """Only the samples of the last second are kept, however long the robot runs."""
     assert len(falling(500)._recent) == 21
 
 
@@ -159,20 +159,20 @@ def test_a_rate_is_that_of_a_line_through_the_last_second() -> None:
 def test_what_is_used_up_within_five_seconds_is_told_soonest_first(
     tilt: float, load: float, names: list[str]
 ) -> None:
-    """Loads that grow by 3 % of their limit a second or more; what recovers is not told."""
+    """Margins gone within 5 s are listed, soonest first; recovering ones are not."""
     assert [a.subject for a in falling(10, tilt=tilt, load=load).ahead(450 * MS)] == names
 
 
 @pytest.mark.parametrize(('degrees', 'told'), [(1.1, True), (0.9, False)])
 def test_a_tilt_that_shrinks_by_a_degree_a_second_is_told(degrees: float, told: bool) -> None:  # noqa: FBT001
-    """Slower it is not, however little is left."""
+    """A tilt is listed only if it shrinks by at least 1 deg/s, however little is left."""
     at = [k * 0.05 for k in range(10)]
     low = [((0.03 - math.radians(degrees) * t, 1.0, 1.0, 1.0), (0.0, 0.0)) for t in at]
     assert bool(seen(low).ahead(450 * MS)) == told
 
 
 def test_a_margin_that_was_unknown_tells_nothing_and_one_that_is_gone_tells_now() -> None:
-    """The other margins go on; a limit that is infinite is none."""
+    """A margin with an unknown sample is not listed; one already gone is listed with 0 s."""
     at = [k * 0.05 for k in range(10)]
     rows = [((0.5 - 0.2 * t, -0.1 - 0.2 * t, 1.0, 1.0), (85.0 + 9.0 * t, 9.0 + t)) for t in at]
     rows[4] = ((math.nan, *rows[4][0][1:]), rows[4][1])
@@ -187,19 +187,19 @@ def test_a_margin_that_was_unknown_tells_nothing_and_one_that_is_gone_tells_now(
 def test_the_robot_slides_where_the_slope_is_the_angle_of_friction(
     tilt: float, heading: float, friction: float
 ) -> None:
-    """What is left is the friction angle less the slope, whatever way it faces."""
+    """The margin to sliding is the friction angle less the slope, at any heading."""
     x, y, z = gravity_on_slope(9.81, tilt, heading).tolist()
     assert slide_left((x, y, z), friction) == pytest.approx(math.atan(friction) - tilt, abs=1e-9)
 
 
 def test_without_a_friction_nothing_slides() -> None:
-    """Friction that is not known is not judged."""
+    """Without a known friction, sliding is not judged."""
     assert slide_left(LEVEL, math.inf) == math.inf
 
 
 @given(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-0.8, 0.8))
 def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) -> None:
-    """Efforts of a load at rest give its mass, and whether it is another than the declared one."""
+    """Efforts at rest give the payload's mass, and whether it differs from the declared one."""
     q, down = (0.3, 0.4, -0.2, 0.0), gravity_on_slope(9.81, tilt, 1.0)
     effort = static_torque(PACKBOT.robot, q, down, Payload(carried))
     found = payload_estimate(PACKBOT, q, STILL, effort.tolist(), down.tolist(), Payload(declared))
@@ -210,7 +210,7 @@ def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) 
 
 
 def test_the_motors_tell_nothing_of_a_load_while_they_move() -> None:
-    """In motion, unknown, zero or turned round they say nothing; friction is no load."""
+    """No payload is estimated from efforts in motion, unknown, zero or of the wrong sign."""
     q, ten, nan = (0.0, 0.4, -0.2, 0.0), (0.0, 90.0, 40.0, 0.0), (math.nan,) * 4
     moving = (0.0, 0.2, 0.0, 0.0)
     assert payload_estimate(PACKBOT, q, moving, ten, LEVEL, Payload(4.0)) is None

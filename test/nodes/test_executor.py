@@ -51,7 +51,7 @@ def test_no_node_of_ours_shares_memory_with_others(discovery: str) -> None:
 
 @pytest.mark.parametrize('discovery', ['LOCALHOST', 'SUBNET'])
 def test_shared_memory_is_there_for_who_asks(discovery: str) -> None:
-    """The choice of transports is the user's; this also shows that the look finds what is open."""
+    """A user who chooses shared memory gets it; this also shows that the check finds it."""
     assert opened(**{TRANSPORT: 'DEFAULT', RANGE: discovery})['shared']
 
 
@@ -65,7 +65,7 @@ def test_a_choice_that_was_made_is_kept(name: str) -> None:
 
 
 def test_who_names_peers_on_other_machines_reaches_them() -> None:
-    """The range is not narrowed to this machine's own addresses where others are named."""
+    """If peers on other machines are named, the range is not limited to this machine."""
     given = {RANGE: 'LOCALHOST', 'ROS_STATIC_PEERS': '192.0.2.7'}
     environment = dict(given)
     choose_transport(environment)
@@ -82,10 +82,10 @@ def test_the_range_asked_for_later_is_taken() -> None:
 
 
 def test_only_the_addresses_of_this_machine_are_heard() -> None:
-    """What stands for the discovery range LOCALHOST binds no address that others can reach."""
+    """With discovery range LOCALHOST a node binds no address that other machines can reach."""
     assert set(opened(**{RANGE: 'LOCALHOST'})['bound']) == {LOOPBACK_ADDRESS}
 
 
 def test_other_machines_are_heard_by_default() -> None:
-    """Without that range a node's sockets are bound to every address: the look before tells."""
+    """Without a discovery range a node binds every address, as the same check shows."""
     assert '00000000' in opened()['bound']

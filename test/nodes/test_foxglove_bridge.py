@@ -124,7 +124,7 @@ def test_the_monitor_can_be_watched(live: Live, bridge: Bridge) -> None:
 
 
 def test_a_topic_is_subscribed_only_while_it_is_watched(live: Live, bridge: Bridge) -> None:
-    """Nobody watches: nothing is taken from the network."""
+    """A topic that nobody watches is not subscribed."""
     driver = live.driver()
     with connected(live, bridge) as client:
         client.subscribe('/joint_states')
@@ -137,7 +137,7 @@ def test_a_topic_is_subscribed_only_while_it_is_watched(live: Live, bridge: Brid
 
 
 def test_a_topic_that_is_gone_is_not_offered(live: Live, bridge: Bridge) -> None:
-    """And comes back when it is published again."""
+    """A topic no longer published is not offered, until it is published again."""
     talker: Node = live.add(Node('talker'))
     first = talker.create_publisher(String, 'words', 1)
     with connected(live, bridge) as client:
@@ -150,7 +150,7 @@ def test_a_topic_that_is_gone_is_not_offered(live: Live, bridge: Bridge) -> None
 
 
 def test_a_client_cannot_publish(live: Live, bridge: Bridge) -> None:
-    """Not what it advertises, not without; the robot hears nothing."""
+    """A client cannot publish, with or without advertising; the robot receives nothing."""
     live.alone()
     heard: list[JointState] = []
     robot: Node = live.add(Node('robot'))
@@ -172,7 +172,7 @@ def _closed(client: Client) -> bool:
 
 
 def test_a_client_cannot_set_parameters_or_call_services(live: Live, bridge: Bridge) -> None:
-    """What is asked is refused, and the monitor is as it was."""
+    """A client's parameters and service calls are refused, and the monitor is unchanged."""
     monitor, driver = live.running(limits__tip_warn_deg=11.0)
     assert isinstance(driver, Driver)
     with connected(live, bridge) as client:
@@ -204,6 +204,6 @@ def test_only_this_machine_is_heard(bridge: Bridge) -> None:
 
 
 def test_a_port_that_is_taken_is_one_line(bridge: Bridge) -> None:
-    """It says which."""
+    """A port in use is refused with one line that names it."""
     with pytest.raises(AcceptanceError, match=str(bridge.port)):
         Bridge(bridge.port)

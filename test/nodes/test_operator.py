@@ -173,7 +173,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
 
 
 def test_a_person_is_asked_for_everything(played: Played) -> None:
-    """To stand the robot up, to set it up, and for each posture."""
+    """The operator is asked to set up, to stand the robot up, and for each posture."""
     assert 'stand the robot on its tracks' in played.asked[0]
     for name in ('one', 'two'):
         assert any(f'{name}: set up' in text for text in played.asked), played.text

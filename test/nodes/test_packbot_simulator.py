@@ -93,7 +93,7 @@ def test_it_follows_a_trajectory_and_holds(live: Live) -> None:
 
 
 def test_a_command_that_makes_no_sense_is_refused(live: Live) -> None:
-    """The node lives on, the robot stays."""
+    """A wrong command is refused; the node goes on and the robot does not move."""
     robot = Controller(live)
     robot.move(1, wing_joint=1.0)
     robot.velocity.publish(Twist(linear=Vector3(x=math.nan)))

@@ -108,7 +108,7 @@ def test_a_joints_limit_cannot_be_raised_above_the_configured_one(
 
 @pytest.mark.parametrize('reason', ['  ', 'a\nb', 'x' * 201])
 def test_a_reason_that_says_nothing_is_refused(one: tuple[Live, Any], reason: str) -> None:
-    """Alone, and together with what it should permit."""
+    """An empty reason for relaxed limits is refused, alone or with the values."""
     live, monitor = one
     before = session_of(monitor).settings
     for values in ({'unsafe_limits': reason}, {'unsafe_limits': reason, **WIDE}):
@@ -250,7 +250,7 @@ LOCKED: list[dict[str, Any]] = [
 
 
 def test_locked_parameters_cannot_be_set_while_active(live: Live) -> None:
-    """Whatever decides what is told; the load stays the operator's to declare."""
+    """Locked parameters cannot be set while active, except the load's."""
     monitor = live.monitor(lock_parameters=True)
     before = session_of(monitor).settings
     for values in LOCKED:

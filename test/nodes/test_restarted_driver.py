@@ -1,4 +1,4 @@
-"""A driver that was killed and came back is one source; two at once are two, whatever they say."""
+"""A restarted driver counts as one source; two live publishers are two, whatever their names."""
 
 import os
 import random
@@ -167,7 +167,7 @@ def test_lost_messages_make_no_second_voice(before: int, seed: int) -> None:
 @pytest.mark.parametrize('ahead', [0, 1, 2, 50, 100000])
 @pytest.mark.parametrize('turns', ['in turn', 'at random'])
 def test_voices_that_alternate_are_two(ahead: int, turns: str) -> None:
-    """However far apart their numbers are, two that speak by turns are heard to be two."""
+    """Publishers whose messages alternate are two, however far apart their numbers are."""
     lossy, heard = random.Random(ahead), list[int]()
     sources = count(ahead + 1), count(1)
     for k in range(20):
@@ -218,7 +218,7 @@ def test_a_name_that_comes_and_is_another_is_a_second_source_at_once() -> None:
 
 
 def test_without_numbers_two_of_one_name_are_two() -> None:
-    """Where the middleware numbers nothing, nobody is taken for dead."""
+    """If the middleware gives no message numbers, two publishers of one name are two."""
     voices = Voices()
     voices.hear(None)
     assert voices.present(0, [OLD, NEW]) == ['/driver', '/driver']

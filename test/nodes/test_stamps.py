@@ -178,7 +178,7 @@ def test_the_header_of_a_whole_and_of_its_parts_move_alike() -> None:
     ],
 )
 def test_where_headers_are_is_known_of_a_type(kind: Any, *, first: bool, inside: bool) -> None:
-    """At the begin, in its parts, in both, or nowhere."""
+    """The headers of a message type are found at its start, in its parts, in both, or nowhere."""
     found = stamped(kind)
     assert (found.first, found.inside) == (first, inside)
 

@@ -73,7 +73,7 @@ def test_the_first_acknowledgement_counts(tmp_path: Path) -> None:
 
 
 def test_without_the_topic_nothing_is_said(tmp_path: Path) -> None:
-    """Not recorded is not the same as never."""
+    """Without the alerts topic, acknowledgements are unknown, not absent."""
     result = {'alerts': [alert(2.0)]}
     add_acknowledgements(result, open_bag(recorded(tmp_path / 'bag', SEEN, topic='/diagnostics')))
     assert result == {'alerts': [alert(2.0)]}
@@ -81,7 +81,7 @@ def test_without_the_topic_nothing_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize('wrong', ['', 'soon', '-5', '1e9'])
 def test_an_acknowledgement_without_a_time_is_left_out(tmp_path: Path, wrong: str) -> None:
-    """Its numbers are texts of somebody else."""
+    """An acknowledgement whose times are no numbers is left out."""
     odd = status(state='acknowledged', start_ns=START + 2 * S, time_ns=wrong)
     result = {'alerts': [alert(2.0)]}
     add_acknowledgements(result, open_bag(recorded(tmp_path / 'bag', odd)))

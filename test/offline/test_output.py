@@ -70,7 +70,7 @@ def test_a_table_that_is_not_whole_has_no_name(
 def test_a_table_that_cannot_be_written_is_one_error(
     tmp_path: Path, kind: type[CsvSink | ParquetSink]
 ) -> None:
-    """The place is named."""
+    """A table that cannot be written is one error that names its path."""
     path = tmp_path / 'gone' / 'out'
     with pytest.raises(AcceptanceError, match=r'out: cannot be written: .*No such file'):
         judged(REPOSITORY / 'bags' / 'packbot_pass', kind(path, SETTINGS, 0))

@@ -1,4 +1,4 @@
-"""A derived plan against the model, posture by posture and way by way."""
+"""A derived plan checked against the model, posture by posture and motion by motion."""
 
 import math
 import re
@@ -91,7 +91,7 @@ def shares(where: str) -> list[float]:
 
 @pytest.mark.parametrize('sign', [1.0, -1.0])
 def test_both_sides_of_the_torque_boundary_are_there(sign: float) -> None:
-    """In either direction: below the warning and inside on the robot, outside in simulation."""
+    """Each torque limit is tested below its warning and inside on the robot, outside simulated."""
     on_robot = [sign * s for s in shares(ROBOT)]
     simulated = [sign * s for s in shares(SIMULATION)]
     assert any(0.7 < s < 0.77 for s in on_robot)
@@ -104,14 +104,14 @@ def test_both_sides_of_the_torque_boundary_are_there(sign: float) -> None:
 def test_both_sides_of_the_rollover_boundary_are_there(
     side: str, band: tuple[float, float]
 ) -> None:
-    """Towards each side: before the warning, inside the limit, and beyond it."""
+    """Each side's tilt limit is tested before the warning, inside the limit, and beyond it."""
     steps = [s for s in PLAN.steps if s.group == 'rollover boundary']
     left = [s.expected['tilt_left_deg'] for s in steps if s.ground.orientation == side]
     assert any(band[0] < x < band[1] for x in left)
 
 
 def test_the_robot_tips_over_in_simulation() -> None:
-    """Beyond the tip-over itself, to more than one side."""
+    """The plan has simulated steps that tip the robot over, to more than one side."""
     tips = [s for s in PLAN.steps if s.action == 'tip']
     assert all(s.where == SIMULATION and s.expected['tilt_left_deg'] < 0.0 for s in tips)
     assert len({s.ground.orientation for s in tips}) >= 2
@@ -131,13 +131,13 @@ def test_a_posture_behind_a_limit_is_reached_around_it() -> None:
 
 
 def test_nothing_that_fails_is_run_on_the_robot() -> None:
-    """Only the simulation may be asked for a critical alert."""
+    """No step on the robot expects a critical alert; only simulated steps do."""
     asked = [p for s in PLAN.steps if s.where == ROBOT for p in s.alerts.must]
     assert not [p for p in asked if p.startswith(('ERROR', 'STALE'))]
 
 
 def test_every_orientation_is_there() -> None:
-    """All of Figure 6 but level ground, which most steps have."""
+    """The plan has every orientation of Figure 6 besides level ground."""
     found = {s.ground.orientation for s in PLAN.steps if s.group == 'orientations'}
     assert found == set(ORIENTATIONS) - {'level'}
 
@@ -171,7 +171,7 @@ def test_the_greedy_order_is_shorter_than_by_title() -> None:
 
 
 def test_the_same_robot_gives_the_same_plan() -> None:
-    """Nothing is left to chance."""
+    """Deriving a plan twice for one robot gives the same plan."""
     assert derive(CONFIG).sha256 == PLAN.sha256
 
 
@@ -196,7 +196,7 @@ def test_the_card_shows_every_step_and_loads_nothing() -> None:
 
 
 def test_the_card_says_what_every_alert_means() -> None:
-    """Any can come while somebody works with the card."""
+    """The card explains every alert code, because any can come during a test."""
     assert set(MEANINGS) == set(WORDS)
 
 
@@ -204,7 +204,7 @@ def test_the_card_says_what_every_alert_means() -> None:
     ('seconds', 'text'), [(16.2, '16 s'), (119.0, '119 s'), (1500.0, '25 min'), (22000.0, '6.1 h')]
 )
 def test_a_length_is_told_in_the_unit_that_fits(seconds: float, text: str) -> None:
-    """A short plan is not one of 0 min."""
+    """The length of a plan is told in a suitable unit, a short one not as 0 min."""
     assert time_text(seconds, digits=2) == text
 
 

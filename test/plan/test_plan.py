@@ -81,7 +81,7 @@ def test_text_that_is_no_plan_is_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_two_steps_of_one_id_are_refused(tmp_path: Path) -> None:
-    """Recordings and results are filed by id."""
+    """A plan with two steps of one id is refused: results are filed by id."""
     text = yaml.safe_dump({**PLAN, 'steps': [STEP, STEP]})
     with pytest.raises(BadConfig, match='expected a different id for every step, got one twice'):
         read_plan(written(tmp_path, text))
@@ -95,5 +95,5 @@ def test_two_steps_of_one_id_are_refused(tmp_path: Path) -> None:
 def test_a_pattern_names_level_code_and_subject_as_far_as_it_goes(
     pattern: str, *, found: bool
 ) -> None:
-    """What a pattern leaves out may be anything."""
+    """An alert pattern matches any value of the parts that it leaves out."""
     assert matches(pattern, 'ERROR', 'TIP_OVER', 'left') is found

@@ -57,14 +57,14 @@ def test_messages_that_are_missing_by_their_rate_are_told(
 
 @pytest.mark.parametrize(('low', 'doubted'), [(0.99, True), (0.2, True), (0.1, False)])
 def test_a_load_that_nobody_declared_is_a_doubt(low: float, doubted: bool) -> None:  # noqa: FBT001
-    """Only where all of its interval is beyond noise."""
+    """An estimated payload is a doubt only if its whole interval is beyond noise."""
     load = {'value': 1.0, 'low': low, 'high': 2.0 - low}
     found = doubts_of({'model_check': {'payload': load}})
     assert [text[:36] for text in found] == ['efforts at rest tell of 1.00 kg more'] * doubted
 
 
 def test_where_no_load_could_be_told_nothing_is_doubted() -> None:
-    """As without efforts."""
+    """Without a payload estimate, as without efforts, the payload is not doubted."""
     assert doubts_of({'model_check': {'payload': None}}) == []
 
 
@@ -91,7 +91,7 @@ def test_hours_are_told_in_the_unit_that_fits(hours: float | None, text: str) ->
 
 
 def test_a_time_that_is_none_ends_no_report() -> None:
-    """Not a number stays one."""
+    """A time of NaN is shown as such and does not end a report."""
     assert time_text(float('nan')) == 'nan s'
 
 
@@ -100,5 +100,5 @@ def test_a_time_that_is_none_ends_no_report() -> None:
     [(19289181967339508.0, '1.93e+16 kg'), (-2e6, '-2e+06 kg'), (999999.0, '999999.0 kg')],
 )
 def test_a_long_number_is_shortened(value: float, text: str) -> None:
-    """Sixteen digits overflow every column and tell nothing."""
+    """A number of sixteen digits is shortened to fit a column."""
     assert number_text(value, 1, 'kg') == text

@@ -155,13 +155,13 @@ def test_an_unknown_scenario_is_refused() -> None:
 
 @pytest.mark.parametrize('seconds', [0.0, -1.0, 1e6, math.nan])
 def test_a_run_of_no_length_is_refused(seconds: float) -> None:
-    """A run lasts longer than nothing and less than a million seconds."""
+    """A run must be longer than 0 s and shorter than a million seconds."""
     with pytest.raises(BadConfig, match='seconds: expected a number above 0'):
         case_of('gentle', ROBOT, 1, seconds)
 
 
 def test_a_jolt_is_no_saturation() -> None:
-    """Only what lasts counts, from its first moment."""
+    """A motor at its limit for a moment is no saturation; a lasting one counts from its start."""
     stamp = np.arange(0.0, 2.0, 0.1)
     held = (stamp > 0.45) & (stamp < 0.55) | (stamp > 0.95) & (stamp < 1.35)
     assert lasting(held, stamp, 0.2) == pytest.approx(1.0)

@@ -96,7 +96,7 @@ def test_a_monitor_that_is_silent_for_a_moment_makes_no_step_fail(tmp_path: Path
 
 
 def test_messages_that_never_come_back_show_nothing(tmp_path: Path) -> None:
-    """After the last attempt the step is inconclusive, and says why."""
+    """After the last attempt without messages a step is INCONCLUSIVE, with the reason."""
     (result,) = results(runner_of(tmp_path / 'out', plan_of({}), 'dead:imu@1.5'))
     assert result['verdict'] == 'INCONCLUSIVE'
     assert 'STALE INPUT_STALE imu' in result['reasons'][0]
@@ -110,7 +110,7 @@ def test_a_posture_that_is_not_reached_fails(tmp_path: Path) -> None:
 
 
 def test_a_posture_that_is_left_during_the_hold_fails(tmp_path: Path) -> None:
-    """Reached is not enough: somebody who moves the arm away is seen."""
+    """A step fails if the arm leaves its posture during the hold."""
     runner = runner_of(tmp_path / 'out', plan_of({'hold_s': 4.0}))
     world = runner.world
 
@@ -140,7 +140,7 @@ def test_a_pull_is_felt(tmp_path: Path) -> None:
 
 
 def test_an_operator_who_refuses_leaves_the_step_open(tmp_path: Path) -> None:
-    """Neither passed nor failed, not tried again, and the reason is there."""
+    """A step that the operator refuses neither passes nor fails, and is not tried again."""
     runner = runner_of(tmp_path / 'out', plan_of({}), mode=OPERATOR)
     (result,) = results(runner)
     assert result['verdict'] == 'INCONCLUSIVE'

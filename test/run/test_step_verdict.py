@@ -75,7 +75,7 @@ def test_a_step_passes_if_its_alerts_are_those_it_expects(
     ],
 )
 def test_what_was_stopped_or_not_seen_never_passes(done: Done, share: float, expected: str) -> None:
-    """A frozen motion fails; missing data is inconclusive."""
+    """A step whose motion was frozen fails; one with missing data is INCONCLUSIVE."""
     assert decide(step(), [], WINDOW, done, share)[0] == expected
 
 
@@ -97,7 +97,7 @@ def test_an_alert_that_does_not_come_while_data_are_missing_shows_nothing(
 
 
 def test_a_run_is_as_good_as_its_worst_step() -> None:
-    """A step left out leaves the whole inconclusive."""
+    """A run's verdict is that of its worst step; a skipped step makes it INCONCLUSIVE."""
     passed, failed, skipped = ({'verdict': v} for v in ('PASS', 'FAIL', 'SKIPPED'))
     assert whole([passed, passed]) == 'PASS'
     assert whole([passed, skipped]) == 'INCONCLUSIVE'
@@ -184,14 +184,14 @@ def test_a_run_whose_head_is_broken_is_not_continued(tmp_path: Path, text: str) 
 
 
 def test_a_run_needs_a_place(tmp_path: Path) -> None:
-    """Where no folder can be made, the error says where."""
+    """A run's folder that cannot be made is an error that names it."""
     (tmp_path / 'file').write_text('')
     with pytest.raises(BadConfig, match='file/out: expected a folder to record into'):
         opened(tmp_path / 'file' / 'out', tmp_path / 'plan.yaml')
 
 
 def test_what_an_interruption_left_is_kept(tmp_path: Path) -> None:
-    """The recording of a step that was not finished moves aside; nothing recorded is lost."""
+    """The recording of an unfinished step is moved aside, so that nothing recorded is lost."""
     folder = opened(tmp_path / 'out', tmp_path / 'plan.yaml')
     first = PLAN.steps[0]
     for number in (1, 2):

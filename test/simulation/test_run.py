@@ -1,4 +1,4 @@
-"""Simulated runs: what their topics say is what the robot does, and a seed gives the same bits."""
+"""Simulated runs: messages agree with the robot's motion, and a seed gives the same bits."""
 
 from dataclasses import fields, replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Runs in stretches, faults of sensors, and a robot under live commands."""
+"""Runs simulated in parts, faults of sensors, and a robot under live commands."""
 
 import math
 
@@ -23,14 +23,14 @@ SHORT = Scenario('short', 2.0, start=STOWED, commands=gentle().commands[:1])
 
 
 def test_one_stretch_is_the_whole_run() -> None:
-    """A run taken whole is the same, bit for bit, as `run` gives."""
+    """A run simulated as one part is that of `run`, bit for bit."""
     whole, (stretch,) = run(ROBOT, SHORT, 3), stretches(ROBOT, SHORT, 3, math.inf)
     assert np.array_equal(whole.joints.position, stretch.joints.position)
     assert np.array_equal(whole.imu.linear_acceleration, stretch.imu.linear_acceleration)
 
 
 def test_stretches_only_cut_the_run() -> None:
-    """The truth does not depend on how a run is cut, and no sample is lost or doubled."""
+    """The truth does not depend on how a run is cut into parts; no sample is lost or doubled."""
     (whole,) = stretches(ROBOT, SHORT, 3, math.inf)
     parts = list(stretches(ROBOT, SHORT, 3, 0.5))
     assert len(parts) > 2
@@ -150,7 +150,7 @@ def test_an_empty_trajectory_stops_the_arm_where_it_is() -> None:
 
 
 def test_the_tracks_stop_without_new_commands() -> None:
-    """A lost link does not drive on."""
+    """The tracks stop when drive commands stop coming, as after a lost link."""
     robot = remote()
     robot.drive(0.3, 0.0)
     passed(robot, 1.0)

@@ -52,18 +52,18 @@ def test_a_cosine_lies_between_its_bounds_where_it_is_said_to(
 def test_an_interval_is_cut_at_the_full_turn(
     start: float, end: float, parts: list[tuple[float, float]]
 ) -> None:
-    """Whatever turn it is given in."""
+    """An interval of an angle is split at the full turn, whichever turn it is given in."""
     np.testing.assert_allclose(wrap(start, end), parts)
 
 
 def test_intervals_that_touch_become_one() -> None:
-    """Also where one lies in another; a gap is kept."""
+    """Intervals that touch or contain each other are merged; a gap is kept."""
     assert merge([(2.0, 3.0), (0.0, 1.0), (1.0, 1.5), (0.2, 0.4)]) == ((0.0, 1.5), (2.0, 3.0))
     assert merge([]) == ()
 
 
 def test_both_hold_where_intervals_overlap() -> None:
-    """A touch is a point; the length is the sum."""
+    """The intersection of intervals may be a point; its length is the sum of the parts."""
     a, b = ((0.0, 2.0), (3.0, 4.0)), ((1.0, 3.5), (5.0, 6.0))
     assert intersect(a, b) == ((1.0, 2.0), (3.0, 3.5))
     assert length(intersect(a, b)) == 1.5

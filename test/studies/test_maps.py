@@ -185,7 +185,7 @@ def test_level_curves_lie_on_the_level() -> None:
 
 
 def test_no_margin_is_a_failure() -> None:
-    """Unknown is never safe."""
+    """A cell without a known margin counts as a failure, never as safe."""
     found = classes(np.array([20.0, 7.0, 5.0, -1.0, np.nan]), 10.0, 5.0)
     assert found.tolist() == [SAFE, CAUTION, FAILURE, FAILURE, FAILURE]
 

@@ -39,7 +39,7 @@ def test_flippers_reach_the_ground() -> None:
 
 
 def test_a_joint_without_contacts_reaches_nothing() -> None:
-    """The error names the joint."""
+    """A joint that moves no contact point is refused by name as a flipper."""
     with pytest.raises(BadConfig, match='joint elbow: expected it to bring a contact'):
         grounding_angle(tracked(), 'elbow')
     with pytest.raises(BadConfig, match='joint elbow'):

@@ -184,7 +184,7 @@ def test_availability_without_repairs_is_unbounded(
 
 
 def test_no_trial_says_nothing_of_success() -> None:
-    """Any share from 0 to 1."""
+    """Without a trial the share of success is anything from 0 to 1."""
     found = proportion(0, 0, 0.9)
     assert (found.value, found.low, found.high, found.demonstrated) == (None, 0.0, 1.0, 0.0)
 

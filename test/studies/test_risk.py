@@ -117,7 +117,7 @@ def test_a_robot_without_fixed_edges_is_judged_by_its_stance(contacts: str) -> N
 
 
 def test_a_robot_that_carries_nothing_is_judged_too() -> None:
-    """Its torque is that of its links alone."""
+    """A robot without a payload is judged by the torque of its links alone."""
     robot = replace(arm_robot(PAPER), payload_link=None)
     study = Study(robot, {'theta1.position': uniform(0.0, math.pi)}, (0.0, 0.0), (20.0, math.inf))
     at = np.linspace(0.1, 3.0, 20)

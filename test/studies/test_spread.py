@@ -29,14 +29,14 @@ def test_draws_are_spread_as_said(spread: Spread, truth: 'stats.rv_continuous') 
 
 @pytest.mark.parametrize('spread', [uniform(3.0, 3.0), normal(3.0, 0.0)])
 def test_a_number_without_spread_is_always_the_same(spread: Spread) -> None:
-    """It has no rank but 0."""
+    """A number without spread is constant, and its rank is 0."""
     values = spread.draw(generators(7, 1)[0], 5)
     assert values.tolist() == [3.0] * 5
     assert spread.rank(values).tolist() == [0.0] * 5
 
 
 def test_generators_are_independent_and_repeat() -> None:
-    """One a chunk, the same whoever asks."""
+    """Each chunk has its own random generator, the same for every worker."""
     one, two = (rng.random(100) for rng in generators(3, 2))
     assert not np.array_equal(one, two)
     np.testing.assert_array_equal(generators(3, 5)[1].random(100), two)
@@ -44,7 +44,7 @@ def test_generators_are_independent_and_repeat() -> None:
 
 @pytest.mark.parametrize(('failures', 'trials'), [(0, 7), (7, 7), (3, 7), (1, 1000)])
 def test_intervals_are_scipy_s(failures: int, trials: int) -> None:
-    """Of none and of all too."""
+    """Exact intervals of a proportion equal scipy's, also for none and all."""
     expected = stats.binomtest(failures, trials).proportion_ci(0.9)
     assert clopper_pearson(failures, trials, 0.9) == pytest.approx((expected.low, expected.high))
 

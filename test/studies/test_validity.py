@@ -63,7 +63,7 @@ def test_just_outside_the_family_a_cell_differs() -> None:
 
 
 def test_a_heavy_second_link_has_no_family() -> None:
-    """Its own error at rest is too large for any offset of the first to give the cells."""
+    """With too heavy a second link, no offset of the first link gives Table 2."""
     arm = PlanarArm(0.23, 0.32, 13.6, 13.1, 6.2)
     found = offset_family(np.array([-0.1, 0.0]), arm)
     assert (found.offset2.shape, found.positive.shape, found.negative.shape) == (

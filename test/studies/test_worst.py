@@ -96,7 +96,7 @@ def test_a_joint_that_loads_nothing_has_no_worst_position() -> None:
 
 
 def test_a_sliding_joint_is_refused() -> None:
-    """Its torques are straight lines."""
+    """A prismatic joint is refused, because its torques are straight lines."""
     rng = np.random.default_rng(0)
     robot = random_robot(rng, 3)
     while all(joint.kind != 'prismatic' for joint in robot.joints):

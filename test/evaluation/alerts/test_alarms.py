@@ -1,4 +1,4 @@
-"""What a person has seen of an alert, held to a model of plain flags.
+"""Alarm states after operator actions, compared with a simple model of boolean flags.
 
 UGV_ACCEPTANCE_ALARM_STEPS makes the run of random events longer.
 """
@@ -221,7 +221,7 @@ def test_a_tip_over_stays_until_it_is_reset() -> None:
 
 
 def test_a_newer_alert_is_not_cleared_by_the_end_of_an_older() -> None:
-    """The end of an alert that a newer one replaced is no event."""
+    """The end of an alert does not clear the alarm of a newer one that replaced it."""
     alarms = Alarms()
     first = raised(alarms, 2)
     raised(alarms, 2)
@@ -230,7 +230,7 @@ def test_a_newer_alert_is_not_cleared_by_the_end_of_an_older() -> None:
 
 
 def test_critical_alarms_and_lost_data_cannot_be_shelved() -> None:
-    """Shelving is for warnings, and it is refused by one line that says why."""
+    """Only warnings can be shelved; any other alarm is refused with the reason."""
     alarms = Alarms()
     for k, key in ((0, TIP), (2, ELBOW), (3, STALE_IMU)):
         raised(alarms, k)
@@ -239,7 +239,7 @@ def test_critical_alarms_and_lost_data_cannot_be_shelved() -> None:
 
 
 def test_the_shelf_ends_by_itself_at_its_time() -> None:
-    """The end of shelving is told, dated to when it was due."""
+    """Shelving ends by itself, and the change is dated to when it was due."""
     alarms = Alarms()
     raised(alarms, 4)
     alarms.shelve(0, CLOCK, 60 * SECOND, 'Ada')
@@ -250,7 +250,7 @@ def test_the_shelf_ends_by_itself_at_its_time() -> None:
 
 @pytest.mark.parametrize('length', [1, 600 * SECOND])
 def test_a_warning_is_shelved_for_at_most_ten_minutes(length: int) -> None:
-    """The longest time itself is allowed, and it ends just then."""
+    """A warning can be shelved for exactly ten minutes, and no longer."""
     alarms = Alarms()
     raised(alarms, 4)
     (change,) = alarms.shelve(7, CLOCK, length, 'Ada', 'known')
@@ -266,7 +266,7 @@ def test_a_warning_is_shelved_for_at_most_ten_minutes(length: int) -> None:
     ('length', 'got'), [(0, '0 s'), (-SECOND, '-1 s'), (601 * SECOND, '601 s')]
 )
 def test_shelving_for_no_time_or_too_long_is_refused(length: int, got: str) -> None:
-    """The message says what is allowed and what came, in seconds."""
+    """Shelving for 0 s or too long is refused with the permitted range in seconds."""
     alarms = Alarms()
     raised(alarms, 4)
     expected = f'^shelve: expected above 0 and at most 600 s, got {got}$'
@@ -276,7 +276,7 @@ def test_shelving_for_no_time_or_too_long_is_refused(length: int, got: str) -> N
 
 
 def test_what_is_not_known_cannot_be_shelved() -> None:
-    """The message names the code and the subject."""
+    """Shelving an alarm that does not exist is refused with its code and subject."""
     with pytest.raises(
         AcceptanceError, match=r"^shelve: expected a known alarm, got 'CLOCK' of 'imu'$"
     ):
@@ -285,7 +285,7 @@ def test_what_is_not_known_cannot_be_shelved() -> None:
 
 
 def test_shelves_end_in_the_order_of_their_times() -> None:
-    """Whatever the order in which they were put there."""
+    """Shelved alarms return in the order of their end times, however they were shelved."""
     alarms = Alarms()
     raised(alarms, 1)
     raised(alarms, 4)
@@ -308,7 +308,7 @@ def test_shelves_end_in_the_order_of_their_times() -> None:
 def test_a_state_says_what_is_active_and_what_was_seen(
     state: State, *, active: bool, unseen: bool
 ) -> None:
-    """The five states of ISA-18.2 that are known here."""
+    """An alarm has one of five states of ISA-18.2, by whether it is active and acknowledged."""
     assert (state.active, state.unseen) == (active, unseen)
 
 
@@ -322,12 +322,12 @@ def test_a_state_says_what_is_active_and_what_was_seen(
 def test_only_a_robot_that_may_lie_on_its_side_latches(
     code: str, level: int, *, latched: bool
 ) -> None:
-    """Tip-over and no support, where they are critical."""
+    """Only critical TIP_OVER and NO_SUPPORT alarms stay until they are reset."""
     assert latches(Rule(code, 'front', level, 1.0, 0.5, 0, 0)) is latched
 
 
 def test_an_alarm_that_is_over_and_seen_is_forgotten_unless_it_is_shelved() -> None:
-    """The table holds no alarm that is normal, except on the shelf."""
+    """An alarm that is over and acknowledged is removed, unless it is shelved."""
     alarms = Alarms()
     alert = raised(alarms, 4)
     alarms.shelve(0, CLOCK, 60 * SECOND, 'Ada')

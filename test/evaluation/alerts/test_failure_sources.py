@@ -11,11 +11,11 @@ def test_the_leaves_are_those_of_the_paper() -> None:
 
 
 def test_a_path_says_the_branch() -> None:
-    """Physical or human, then the category."""
+    """A failure source's path names its branch, physical or human, and its category."""
     assert FailureSource.EFFECTOR.path == 'physical / effector'
     assert FailureSource.DESIGN.path == 'human / design'
 
 
 def test_every_alert_has_a_first_suspect() -> None:
-    """No code without a category, no category for a code that is gone."""
+    """Every alert code has a category of likely cause, and no category names an unknown code."""
     assert FIRST_SUSPECT.keys() == WORDS.keys()

@@ -133,7 +133,10 @@ def test_a_loss_that_comes_for_the_most_part_at_once_is_a_jump(share: float, tol
 def test_a_warning_ahead_ends_where_a_second_and_a_half_are_left(
     left: float, end: float | None, each: int
 ) -> None:
-    """A prediction ends once more than 1.5 s are left at the present rate."""
+    """A prediction ends once more than 1.5 s are left at the present rate.
+
+    The tilt falls ever more slowly, at last by 0.02 rad/s.
+    """
     lost = np.cumsum((0, 5, 5, 5, 5, 4, 3, 2, 2, 1, 1, 1, 1)) * 1e-3
     tilt = 0.02 * left + lost[-1] - lost
     assert Looks(tilt=steps(*tilt.tolist())).told(13, each) == [('TIP_AHEAD', 'front', 4.0, end)]

@@ -30,7 +30,10 @@ def test_sliding_is_watched_where_the_friction_is_known() -> None:
 
 
 def test_the_way_to_gravity_is_watched_with_the_delay_of_the_imu() -> None:
-    """Attitude faults use the IMU's on-delay, a foreign frame the delay of any other fault."""
+    """Attitude faults use the IMU's on-delay, a foreign frame the delay of any other fault.
+
+    Disagreement has half its limit as deadband; the acceleration may be 15 % from g.
+    """
     of = RuleSet(settings(ImuInput(agreement=0.2, agreement_delay=1.5), DELAYS)).attitude
     found = [rule(s) for s in (of.frame, of.orientation, of.strange, of.disagreement)]
     assert found == [

@@ -77,7 +77,7 @@ def test_the_largest_sources_are_named_in_order() -> None:
 
 
 def test_what_has_no_sources_or_is_no_margin_has_no_bound() -> None:
-    """Speeds and efforts are measured, not computed."""
+    """Measured values, such as speeds and efforts, have no uncertainty bound."""
     assert Bounds(TOLD, ()).of('torque', moment(1.0, 'lift')) is None
     assert Bounds(TOLD, SOURCES).of('speed', moment(1.0, 'lift')) is None
     assert Bounds(TOLD, SOURCES).of('torque_margin', moment(1.0, 'lift')) is not None
@@ -148,7 +148,7 @@ def test_a_bound_of_an_angle_is_in_degrees() -> None:
 
 
 def test_the_moment_with_the_least_left_counts() -> None:
-    """Not the one with the largest value: its bound may be smaller."""
+    """The bound is that of the moment with least left, which may not have the largest value."""
     bounds = known()
     other = moment(44.0, 'lift', (0.0, 1.0, -9.0))
     still = Effects(SOURCES, *(np.zeros_like(x) for x in (
@@ -163,7 +163,7 @@ def test_the_moment_with_the_least_left_counts() -> None:
 
 
 def test_no_moment_and_no_number_have_no_bound() -> None:
-    """An effect that is not a number, of one source, makes the bound unknown."""
+    """A bound is unknown without a moment, or if the effect of one source is NaN."""
     assert known().worst(measure(LIFT), RSS) is None
     torque = EFFECTS.torque.copy()
     torque[1, 0] = math.nan
@@ -201,7 +201,7 @@ def test_margins_of_a_result_get_their_bounds() -> None:
 
 
 def test_effects_on_a_moment_are_worked_out_once() -> None:
-    """What is known of it is used; another payload is another moment."""
+    """The effects on a moment are computed once; another payload makes another moment."""
     bounds = known()
     assert bounds.of('torque', moment(1.0, 'slide')) == pytest.approx((2.0, 4.0))
     assert len(bounds._known) == 1

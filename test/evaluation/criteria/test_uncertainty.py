@@ -155,7 +155,7 @@ def test_the_worst_case_is_never_below_the_root_sum_of_squares(effects: list[flo
 
 
 def test_a_limit_is_uncertain_without_any_torque() -> None:
-    """+/- 2 N m of a limit move nothing but the limit."""
+    """An uncertainty of +/- 2 N m of a limit moves the limit and nothing else."""
     source = Source('shoulder.limit_nm', 'shoulder', 'limit', 2.0)
     effects = effects_of(SETTINGS, [source], POSTURES[0], GRAVITY, PAYLOAD)
     assert effects.limit.tolist() == [[0.0, 2.0, 0.0, 0.0]]
@@ -176,7 +176,7 @@ def test_without_a_polygon_torques_still_have_bounds() -> None:
 def test_a_joints_offset_moves_its_own_position_and_nothing_else_does(
     source: Source, q: tuple[float, ...]
 ) -> None:
-    """By as much as the offset, in every posture."""
+    """A joint's offset error moves its own position by that offset, in every posture."""
     expected = [source.value if source.subject == name else 0.0 for name in ROBOT.joint_names]
     if source.what != 'offset':
         expected = [0.0] * len(q)
@@ -189,6 +189,6 @@ def test_a_joints_offset_moves_its_own_position_and_nothing_else_does(
 def test_an_imu_that_is_off_tilts_and_nothing_else_does(
     source: Source, q: tuple[float, ...]
 ) -> None:
-    """By its own angle, in every posture."""
+    """An IMU's angle error moves the tilt by that angle, in every posture."""
     expected = source.value if source.subject == 'imu' else 0.0
     assert effects_of(SETTINGS, [source], q, GRAVITY, PAYLOAD).tilt[0] == expected

@@ -68,7 +68,7 @@ def test_bias_and_scale_are_found_within_their_intervals() -> None:
 
 
 def test_a_wrong_sign_is_told() -> None:
-    """An effort that counts the other way has a scale of -1."""
+    """An effort that counts the other way is found as a scale of -1."""
     found = check(swinging(lambda torque, _, at: -torque + noise(at)))['joints']['lift']
     assert found['sign'] == 'opposite'
     assert found['scale']['value'] == pytest.approx(-1.0, abs=0.05)
@@ -115,7 +115,7 @@ def test_without_friction_motion_differs_no_more_than_rest() -> None:
     [(lambda *_: np.nan, 'not recorded'), (lambda *_: 5.0, 'constant at 5')],
 )
 def test_an_effort_that_says_nothing_is_told_so(effort: Effort, words: str) -> None:
-    """Missing and constant efforts give no number."""
+    """Missing and constant efforts give no number, and the result says so."""
     assert check(swinging(effort))['joints']['lift'] == {'effort': words}
 
 
@@ -190,13 +190,13 @@ def test_an_interval_holds_the_truth_as_often_as_it_says() -> None:
 
 
 def test_equal_columns_have_no_fit() -> None:
-    """What cannot be told apart is not told."""
+    """A fit of equal columns has no result."""
     x = np.linspace(0.0, 1.0, 50)
     assert least_squares(np.column_stack((x, 2.0 * x)), x) is None
 
 
 def test_neighbours_that_are_alike_count_less() -> None:
-    """A correlation of 0.5 leaves a third of the samples."""
+    """Samples whose neighbours correlate by 0.5 count as a third as many."""
     rng = np.random.default_rng(3)
     error = np.zeros(50_000)
     for k, shock in enumerate(rng.normal(size=49_999), start=1):

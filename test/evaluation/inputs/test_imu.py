@@ -134,7 +134,7 @@ def outcome(imu: ImuInput, orientation: Sequence[float], acceleration: Sequence[
 def test_an_orientation_that_tells_nothing_leaves_it_to_the_accelerometer(
     orientation: Sequence[float], covariance_0: float, named: set[str]
 ) -> None:
-    """In five ways, of which only covariance -1 announces itself: the others are a fault."""
+    """An empty orientation is a fault unless announced; the accelerometer replaces it."""
     lean = upright(tilted(0.2, 0.1))
     margins, codes = outcome(ImuInput(), orientation, lean, covariance_0)
     assert margins is not None
