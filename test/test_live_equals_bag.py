@@ -214,7 +214,7 @@ def test_equal_pairs_have_equal_margins(played: Played) -> None:
 
 
 def test_what_was_heard_gives_the_same_margins_from_a_bag(played: Played) -> None:
-    """A recording of what the monitor heard gives all its margins, none more and none fewer."""
+    """A recording of the messages the monitor received gives exactly its margins."""
     bag = recorded(played.heard, played.started, played.ended).margins
     assert bag.keys() == played.live.margins.keys()
     for key, numbers in bag.items():

@@ -1,4 +1,4 @@
-"""A joint moved on a slope: the static margin holds while it is slow, and not when it is fast."""
+"""The static margin of a moving joint on a slope: right for slow motion, not for fast motion."""
 
 import numpy as np
 import pytest

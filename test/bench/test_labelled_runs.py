@@ -1,4 +1,4 @@
-"""Labelled runs: the truth is the simulation's, what was said is the evaluator's."""
+"""Labelled runs: events come from the simulation's truth, alerts from the evaluator."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -26,27 +26,27 @@ def labelled(kind: str, seed: int, seconds: float | None = None, fault: str = ''
 
 
 def test_a_slow_tip_over_is_warned_of_in_time() -> None:
-    """The ground tilts: WARN, then ERROR, then it tips, each at least half a second apart."""
+    """A slow tip-over comes at least 0.5 s after its ERROR, and that 0.5 s after its WARN."""
     (event,) = [e for e in labelled('tilt', 1).events if e.kind == TIP]
     assert event.warned + 0.5 < event.alarmed < event.time - 0.5
 
 
 def test_a_dead_imu_is_alarmed_before_the_robot_tips() -> None:
-    """Margins that are not known are said to be so; nothing is predicted from them."""
+    """A dead IMU raises NO DATA before the robot tips, and gives no predictions."""
     (event,) = [e for e in labelled('tilt', 1, fault='dead').events if e.kind == TIP]
     assert event.alarmed < 3.0
     assert event.predicted == np.inf
 
 
 def test_a_reach_saturates_and_is_warned_of() -> None:
-    """The shoulder gives all it has; that its motor neared its limit was told well before."""
+    """A shoulder that saturates raised the warning of its limit well before."""
     events = [e for e in labelled('reach', 0).events if e.kind == SATURATION]
     assert [e.subject for e in events] == ['shoulder_joint']
     assert events[0].warned < events[0].time - 0.3
 
 
 def test_a_weak_motor_is_told_when_it_gives_no_more() -> None:
-    """No level is near at 30 N m of 50 declared: only that effort no longer follows the need."""
+    """A motor weaker than declared is found when its effort stops following the need."""
     found = [
         label(CONFIG, *case) for case in cases(CONFIG, 200, 0) if case[0] == 'reach+weak-motor'
     ]
@@ -56,7 +56,7 @@ def test_a_weak_motor_is_told_when_it_gives_no_more() -> None:
 
 
 def test_a_second_publisher_is_alarmed_before_the_robot_tips() -> None:
-    """Positions of two robots in turn: no margin is told from either, a second later at most."""
+    """With positions of two robots in turn, margins are unknown within a second."""
     told = [
         event
         for case in cases(CONFIG, 200, 0)
@@ -69,7 +69,7 @@ def test_a_second_publisher_is_alarmed_before_the_robot_tips() -> None:
 
 
 def test_braking_is_an_impact_and_a_swinging_arm_is_none() -> None:
-    """What shoves the base before it tips is an impact; gravity and a moving arm are not."""
+    """A shove to the base before a tip-over is an impact; gravity and a moving arm are not."""
     dashed = [e.impact for s in (0, 1, 4) for e in labelled('dash', s).events if e.kind == TIP]
     swung = [e.impact for s in range(6) for e in labelled('swing', s).events if e.kind == TIP]
     snatched = [e.impact for s in (2,) for e in labelled('snatch', s).events if e.kind == TIP]
@@ -81,7 +81,7 @@ def test_braking_is_an_impact_and_a_swinging_arm_is_none() -> None:
 
 
 def test_quiet_work_is_quiet() -> None:
-    """No event, no alarm, no prediction, obstacles and loads included."""
+    """Quiet work with obstacles and loads has no event, no alarm and no prediction."""
     found = labelled('work', 1, seconds=120.0)
     assert found.events == ()
     assert found.for_nothing == ()
@@ -89,7 +89,7 @@ def test_quiet_work_is_quiet() -> None:
 
 
 def test_there_are_as_many_runs_as_asked() -> None:
-    """All kinds are there, no seed twice."""
+    """As many runs as requested are made, of every kind, no seed twice."""
     found = list(cases(CONFIG, 200, 0))
     assert len(found) >= 200
     assert len({seed for _, seed, _ in found}) == len(found)
@@ -98,7 +98,7 @@ def test_there_are_as_many_runs_as_asked() -> None:
 
 @pytest.mark.parametrize('seed', [1, 2])
 def test_a_label_says_what_the_recording_says(tmp_path: Path, seed: int) -> None:
-    """Columns handed to the evaluator give the alerts of the recorded messages."""
+    """Columns given to the evaluator give the same alerts as the recorded messages."""
     case = case_of('swing', ROBOT, seed, 8.0)
     case = replace(case, scenario=replace(case.scenario, joint_rate=100.0, imu_rate=200.0))
     record(CONFIG, case, seed, tmp_path / 'run')

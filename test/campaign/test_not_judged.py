@@ -1,4 +1,4 @@
-"""What keeps a run from being judged is told apart from a recording that cannot be read."""
+"""A run that could not be judged is told apart from a recording that cannot be read."""
 
 import errno
 from pathlib import Path

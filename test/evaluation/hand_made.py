@@ -64,7 +64,7 @@ def made(
 
 
 S = 1_000_000_000
-# The recordings that `findings` tells of begin so late (ns).
+# Start (ns) of the recordings that `findings` evaluates.
 BEGIN = 100 * S
 
 

@@ -10,7 +10,7 @@ from ugv_acceptance.evaluation.margin_table import MarginRows
 
 
 def times(parts: list[MarginRows], spacing: int = 10, *, standing: bool = False) -> list[int]:
-    """Return the times of the samples of stretches of rows."""
+    """Return the times of the samples kept from rows that come in parts."""
     sampler = Sampler(spacing)
     for part in parts:
         sampler.add(part, standing=standing)

@@ -74,7 +74,7 @@ def test_an_alert_is_told_with_its_times_and_peak() -> None:
 
 
 def test_the_largest_is_the_first_of_equals_and_never_not_a_number() -> None:
-    """Later stretches count only where they are larger."""
+    """Of equal largest values the first is kept, across parts too, and never NaN."""
     found = Extreme()
     found.see(np.array((np.nan, 2.0, 2.0)), np.array((1, 2, 3)))
     found.see(np.array((2.0, np.nan)), np.array((4, 5)))

@@ -75,7 +75,7 @@ def test_a_long_run_has_wider_columns_and_the_same_worst() -> None:
 
 
 def recorded_strips(parts: list[MarginRows], start: int = 0) -> Strips:
-    """Return the strips of stretches of rows."""
+    """Return the strips of rows that come in parts."""
     recorder = StripRecorder(TOLD, start)
     for part in parts:
         recorder.add(part)

@@ -39,7 +39,7 @@ STEP = 0.001
 
 @dataclass
 class Lane:
-    """One way to lose messages; `held` are those that are late: (when due in s, number, send)."""
+    """One way to lose messages; `held` are the delayed ones: (when due in s, number, send)."""
 
     way: tuple[float, float, float, float]
     rng: Random

@@ -6,7 +6,7 @@ from hardening.clocks import CLOCKS, trial
 
 @pytest.mark.parametrize('name', list(CLOCKS))
 def test_a_wrong_clock_is_told_and_disturbs_nothing(name: str) -> None:
-    """Stamps jump, stand still, are zero, days off, or begin again as a looped bag's do."""
+    """Stamps that jump, freeze, are zero, days off or restart raise CLOCK and change no margin."""
     told, silent, known = trial(name)
     assert known
     assert told <= 1.0

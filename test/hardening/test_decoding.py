@@ -1,4 +1,4 @@
-"""No content of a message ends the watch; the short form of a million mutants a type."""
+"""No content of a message ends the monitor: a short form of a million mutants per type."""
 
 from hardening.decoding import SEEDS, trial
 

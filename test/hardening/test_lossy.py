@@ -11,6 +11,6 @@ from hardening.lossy import WAYS, trial
 def test_a_lossy_relay_changes_no_verdict(
     repository: Path, tmp_path: Path, name: str, way: str
 ) -> None:
-    """Messages lost one by one, in bursts, or late: the same verdict or INCONCLUSIVE."""
+    """Messages lost singly, in bursts, or late give the same verdict or INCONCLUSIVE."""
     outcome = trial(repository / 'bags' / name, tmp_path, way, seeds=1)
     assert outcome.held, outcome.measured

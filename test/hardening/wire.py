@@ -46,7 +46,7 @@ class Heard:
 
 
 class Ears(Node):
-    """Hears what the robot sends and what the monitor says. `last` are the newest stamps (ns)."""
+    """A node that records what robot and monitor publish. `last` are the newest stamps (ns)."""
 
     def __init__(self, namespace: str = '', *, inputs: bool = True) -> None:
         super().__init__('ears', namespace=namespace)

@@ -1,4 +1,4 @@
-"""Whether tracks slide before the robot tips, where the slope's angle is known in closed form."""
+"""Whether tracks slide before the robot tips, for slopes whose angle is known."""
 
 import math
 

@@ -32,7 +32,7 @@ NOTHING = bytes([0, 1, 0, 0]) + bytes(8) + (1).to_bytes(4, 'little') + bytes(8)
 
 
 def box_in(folder: Path | None) -> BlackBox:
-    """Return a black box that hears of no problem."""
+    """Return a black box that must not report a problem."""
     problems: list[str] = []
     box = BlackBox(folder, TOPICS, 0, problems.append)
     assert not problems

@@ -61,7 +61,7 @@ def test_a_manager_walks_it_through_its_states(live: Live) -> None:
 
 
 def test_a_deactivated_monitor_is_stale_and_not_silent(live: Live) -> None:
-    """Deactivated it hears nothing, and says STALE every second."""
+    """A deactivated monitor takes no input and publishes STALE every second."""
     monitor, driver = live.running()
     assert change(live, Transition.TRANSITION_DEACTIVATE)
     live.until(lambda: not driver.connected())
@@ -217,7 +217,7 @@ def test_acknowledging_does_not_clear(live: Live) -> None:
 
 
 def test_reset_begins_a_new_evaluation(live: Live) -> None:
-    """After a reset nothing is latched and nothing known until messages come."""
+    """A reset begins a new evaluation: nothing is latched, nothing known before new messages."""
     monitor, driver = overload(live)
     live.until(lambda: driver.verdicts[-1].message.startswith('over now'), driver.send)
     assert live.call(Trigger, '/acceptance_monitor/reset').success

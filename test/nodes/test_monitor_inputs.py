@@ -137,7 +137,7 @@ def test_bytes_that_are_no_message_are_counted_and_survived(live: Live) -> None:
 
 
 def test_nan_is_never_ok(live: Live) -> None:
-    """A joint position that is not a number gives no margins and an ERROR, not an OK."""
+    """A joint position of NaN gives no margins and an ERROR."""
     monitor, driver = live.running()
     bad = (float('nan'), *FOLDED[1:])
     live.until(

@@ -91,7 +91,7 @@ def come_back(live: Live, monitor: Monitor) -> None:
 
 
 def test_a_driver_that_was_killed_and_came_back_is_one_source(live: Live) -> None:
-    """While DDS still knows the dead one, no alert tells of two; the diagnostics name it."""
+    """A restarted driver raises no second-publisher alert while DDS still knows the dead one."""
     monitor, ears = listening(live)
     with started('driver') as process:
         live.until(more(monitor))

@@ -156,7 +156,7 @@ def test_an_alert_that_is_not_expected_freezes_the_robot(tmp_path: Path) -> None
 
 @pytest.mark.skipif(not Path('/proc/self').exists(), reason='reads processes from /proc')
 def test_the_run_stops_when_the_monitor_dies(tmp_path: Path) -> None:
-    """The runner's own watchdog freezes a moving arm; nothing passes that nobody watched."""
+    """A monitor that dies freezes a moving arm, and no step passes without one."""
     far = {**HOME, 'shoulder_joint': 35}
     plan, out = (
         plan_file(tmp_path, step('long', posture_deg=far, speed_degps=2.0)),

@@ -136,7 +136,7 @@ def test_a_library_that_is_not_there_is_named(
 
 
 def test_a_declared_payload_counts_where_no_message_says_otherwise() -> None:
-    """Twice the payload, declared, loads the shoulder more until a message tells of another."""
+    """A payload given to `evaluate` is in force until a message declares another."""
     config = ugv.load_config('packbot')
     light = ugv.LiveEvaluator(config)
     heavy = ugv.LiveEvaluator(config)
@@ -256,7 +256,7 @@ def test_the_import_is_cheap() -> None:
 
 
 def test_every_public_name_is_there() -> None:
-    """All of `__all__` can be had, and `dir` tells of it."""
+    """Every name in `__all__` can be imported and is listed by `dir`."""
     assert all(getattr(ugv, name) is not None for name in ugv.__all__)
     assert set(ugv.__all__) <= set(dir(ugv))
 

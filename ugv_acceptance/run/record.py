@@ -36,7 +36,7 @@ class Outcome:
     """The result of recording a simulated run: its messages, and when it tipped or saturated.
 
     `tipped_at` (s) is when it had leant too far (infinite: never); `saturated_at` (s) is when a
-    joint's motor first gave all it had, for joints where that happened. No sensor measures these.
+    joint's motor was first at its limit, for joints where that happened. No sensor measures these.
     """
 
     messages: int = 0

@@ -107,9 +107,9 @@ class Truth:
     """What really happened to the robot, at the joints' stamps; no sensor measures it.
 
     `lean` (n,) is the angle (rad) between the robot's z axis and the ground's normal at the start,
-    less what its blocks explain; `saturated` (n, j) says which motors gave all they had; `position`
-    (n, 3) is `base_link` in the ground's axes (m); `slope` (n,) the ground's tilt (rad); `load`
-    (n,) the mass (kg) that the gripper bears.
+    less what its blocks explain; `saturated` (n, j) says which motors are at their limit;
+    `position` (n, 3) is `base_link` in the ground's axes (m); `slope` (n,) the ground's tilt (rad);
+    `load` (n,) the mass (kg) that the gripper bears.
     """
 
     stamp: Floats

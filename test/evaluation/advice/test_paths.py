@@ -1,4 +1,4 @@
-"""Paths that an operator could follow: where they lead, how long they take, what they must not."""
+"""Paths that an operator could follow: where they lead, their time, and what they must not do."""
 
 import math
 from dataclasses import replace

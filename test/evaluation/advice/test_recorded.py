@@ -1,4 +1,4 @@
-"""What to do about the alerts of a recording: for the moment each was raised, at a bounded cost."""
+"""Advice on the alerts of a recording: for the moment each was raised, at a bounded cost."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What to do about a margin, held to the model, to plain geometry, and to the simulated robot."""
+"""Advice about a margin, compared with the model, with geometry, and with the simulated robot."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What advice is about and where it ends: scores, the margin spoken of first, the step to stop."""
+"""The choice of advice: scores of margins, which margin comes first, and where a motion ends."""
 
 import math
 from dataclasses import replace

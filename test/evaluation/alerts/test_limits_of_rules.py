@@ -1,4 +1,4 @@
-"""Where each rule of the evaluation begins, to the digit."""
+"""The exact values at which each rule of the evaluation begins."""
 
 import math
 from dataclasses import replace

@@ -348,7 +348,7 @@ def test_the_next_look_is_due_at_a_whole_multiple_of_fifty_milliseconds(now: int
 
 
 def quiet(log: list[Alert]) -> Prediction:
-    """Return the foresight of the small robot, whose alerts go to a log without delay."""
+    """Return the predictions of the small robot, whose alerts go to a log without delay."""
 
     def signal(code: str, subject: str, at: tuple[float, float], _: float) -> Signal:
         return Signal(Rule(code, subject, WARN, *at, 0, 0), log)

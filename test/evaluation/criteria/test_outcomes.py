@@ -1,4 +1,4 @@
-"""How much has to be evaluated, and criteria on alerts, data and maps at their very bounds."""
+"""How much must be evaluated, and criteria on alerts, data and maps exactly at their limits."""
 
 import math
 from dataclasses import replace

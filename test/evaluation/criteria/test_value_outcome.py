@@ -1,4 +1,4 @@
-"""A criterion on a value over rows made by hand: every number told, and allowances at their end."""
+"""A criterion on a value, over hand-made rows: its numbers, and allowances at their end."""
 
 import math
 from dataclasses import replace

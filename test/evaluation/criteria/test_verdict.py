@@ -1,4 +1,4 @@
-"""What becomes of a criterion: PASS, FAIL and INCONCLUSIVE, each for its reason."""
+"""The verdict on a criterion: PASS, FAIL or INCONCLUSIVE, each with its reason."""
 
 import math
 import re
@@ -116,7 +116,7 @@ TORQUE = Value('torque', 'lift', below=True, limit=25.0)
     ids=str,
 )
 def test_a_value_is_judged_by_its_demand(demand: Value, verdict: str) -> None:
-    """Up but for two stretches of 0.3 s with 40.7 N m: worst, sum, longest, share, dwell."""
+    """A value can be judged by its worst, total time, longest time, share or dwell in violation."""
     run = moving((0.0, 0.5, UP), (0.8, 1.2, UP), (1.5, 2.0, UP))
     assert outcome(demand, run)['verdict'] == verdict
 
@@ -129,14 +129,14 @@ def test_the_limit_itself_is_a_violation() -> None:
 
 
 def test_a_criterion_counts_in_its_window_only() -> None:
-    """Level from 0.5 s to 0.8 s fails there and nowhere else."""
+    """A violation from 0.5 s to 0.8 s fails only a criterion whose window holds it."""
     run = moving((0.0, 0.5, UP), (0.8, 2.0, UP))
     assert outcome(TORQUE, run, window=(1.0, 1.9))['verdict'] == 'PASS'
     assert outcome(TORQUE, run, window=(0.0, 0.7))['verdict'] == 'FAIL'
 
 
 def test_missing_data_never_pass() -> None:
-    """A run that ends at 2 s cannot meet a criterion of 1 s to 4 s."""
+    """A run that ends before a criterion's window does cannot pass it."""
     found = outcome(replace(TORQUE, limit=44.0), moving(), window=(1.0, 4.0))
     assert found['verdict'] == 'INCONCLUSIVE'
     assert found['reason'] == 'only 33.3% of 1 to 4 s could be evaluated (95% needed)'
@@ -155,7 +155,7 @@ def test_how_much_has_to_be_evaluated_is_for_the_criteria_to_say() -> None:
 
 
 def test_a_failure_shows_the_worst_moment_the_first_and_the_alerts_about_it() -> None:
-    """Reaching out from 0.5 s is too much from 0.5 s on, and a warning from 0.6 s on."""
+    """A failure names its worst moment, its first violation and the alerts about it."""
     found = outcome(replace(TORQUE, limit=42.0), loaded())
     measured = found['measured']
     assert measured['worst_of'] == 'lift'

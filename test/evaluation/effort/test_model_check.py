@@ -1,4 +1,4 @@
-"""The model held against the run: what was put into synthetic efforts is found again."""
+"""The comparison of model and efforts finds what was put into synthetic efforts."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The comparison of effort and model in closed form, and at each number at which it decides."""
+"""The comparison of model and efforts in closed form, and its exact thresholds."""
 
 import math
 from collections.abc import Callable

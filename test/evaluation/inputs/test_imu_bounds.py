@@ -1,4 +1,4 @@
-"""Where the rules of the IMU begin, to the digit: a message at a time, and the same in columns."""
+"""The exact values at which the IMU's rules begin: in single messages and in columns."""
 
 import math
 from collections.abc import Sequence

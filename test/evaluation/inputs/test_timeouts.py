@@ -1,4 +1,4 @@
-"""Freshness: the period is learnt from receipt times; silence is judged by it, never by stamps."""
+"""Timeouts: an input's period is learnt from receipt times, and silence is judged by it."""
 
 import numpy as np
 import pytest
