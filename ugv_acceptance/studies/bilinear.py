@@ -1,9 +1,9 @@
-"""A quantity over two joints as an exact 3 x 3 form, so that maps are cheap.
+"""A static quantity over two joints as an exact 3 x 3 bilinear form, so that maps are cheap.
 
 Every link's position is linear in (1, cos q, sin q) of each joint angle and in (1, x) of each
 prismatic joint; so are the centre of gravity, the potential energy and, as its derivative, each
-static torque. Over two joints a and b such a quantity is u(a) K v(b), and nine postures tell K.
-Where K depends on a + b alone but for terms in a, cells of equal a + b share their value.
+static torque. Over two joints a and b such a quantity is u(a) K v(b), and nine postures determine
+K. If K is f(a) + g(a + b), cells of equal a + b share their value of g.
 """
 
 import math
@@ -21,9 +21,10 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Two joints' positions `x` (n,), `y` (m,), all others as in `q` (j,); rad, m where prismatic.
+    """A grid over two joints: positions `x` (n,) and `y` (m,), all other joints as in `q` (j,).
 
-    `first` and `second` are numbers in `robot.joint_names`. A field over the grid is (n, m).
+    rad, m if prismatic. `first` and `second` are the two joints' indices in `robot.joint_names`. A
+    field over the grid has shape (n, m).
     """
 
     first: int
@@ -43,7 +44,10 @@ class Grid:
 def grid_of(
     robot: Robot, axes: tuple[str, str], ranges: ArrayLike, counts: tuple[int, int], q: ArrayLike
 ) -> Grid:
-    """Return the grid over the joints named in `axes`; `ranges` (2, 2): from, to, both counted."""
+    """Return the grid over the two joints named in `axes`; `ranges` (2, 2) are from and to, closed.
+
+    `counts` are the numbers of cells; `q` (j,) gives the other joints' positions (rad, m).
+    """
     first, second = (robot.joint_names.index(name) for name in axes)
     (x0, x1), (y0, y1) = np.asarray(ranges, dtype=np.float64)
     return Grid(
@@ -66,19 +70,19 @@ def _prismatic(robot: Robot, joint: int) -> bool:
     return robot.joint(robot.joint_names[joint]).kind == 'prismatic'
 
 
-# Three positions of each joint tell a form; the pseudo-inverse leaves out a prismatic joint's empty
-# third column.
+# Three positions of each joint determine a form; the pseudo-inverse leaves out the third column,
+# which is empty for a prismatic joint.
 _NODES = np.array([0.0, TURN / 3.0, -TURN / 3.0])
 _INVERSE = {kind: np.linalg.pinv(_basis(_NODES, prismatic=kind)) for kind in (False, True)}
 
 
 def basis(robot: Robot, joint: int, values: Floats) -> Floats:
-    """Return (1, cos q, sin q), or (1, x, 0) of a prismatic joint, shape (..., 3)."""
+    """Return (1, cos q, sin q) of positions (...), or (1, x, 0) if prismatic, shape (..., 3)."""
     return _basis(values, prismatic=_prismatic(robot, joint))
 
 
 def form_of(robot: Robot, grid: Grid, function: Callable[[Floats], Floats]) -> Floats:
-    """Return K (k, 3, 3) of the k quantities that `function` gives for postures (..., j)."""
+    """Return the forms K (k, 3, 3) of the k quantities that `function` returns for postures."""
     few = Grid(grid.first, grid.second, _NODES, _NODES, grid.q)
     left, right = (_INVERSE[_prismatic(robot, k)] for k in (grid.first, grid.second))
     values = function(few.postures())
@@ -89,7 +93,7 @@ def form_of(robot: Robot, grid: Grid, function: Callable[[Floats], Floats]) -> F
 
 
 def evaluate(robot: Robot, grid: Grid, form: Floats, rows: slice = slice(None)) -> Floats:
-    """Return the quantities of `form` (..., 3, 3) over rows of the grid, shape (..., n, m)."""
+    """Return the values of `form` (..., 3, 3) over the grid, or rows of it, shape (..., n, m)."""
     left = basis(robot, grid.first, grid.x[rows])
     right = basis(robot, grid.second, grid.y)
     field: Floats = left @ form @ right.T
@@ -103,7 +107,7 @@ def along_rows(robot: Robot, grid: Grid, form: Floats) -> Floats:
 
 
 def is_sum_form(form: Floats, slack: float = 1e-12) -> bool:
-    """Return whether one form (3, 3) is f(a) + g(a + b), as of two parallel joints in series."""
+    """Return whether a form (3, 3) is f(a) + g(a + b), as for two parallel joints in series."""
     off = np.array(
         [form[0, 1], form[0, 2], form[1, 1] + form[2, 2], form[1, 2] - form[2, 1]],
     )
@@ -111,10 +115,10 @@ def is_sum_form(form: Floats, slack: float = 1e-12) -> bool:
 
 
 def level_curves(robot: Robot, grid: Grid, form: Floats, level: float) -> Floats:
-    """Return where one form (3, 3) equals `level`: (2, n) positions of the second joint.
+    """Return the positions (2, n) of the second joint at which a form (3, 3) equals `level`.
 
-    For each position of the first joint the two roots of c0 + R cos(b - phase) = level, moved by
-    whole turns into the grid's range; NaN where there is none. The second joint must turn.
+    For each position of the first joint the two roots (rad) of c0 + R cos(b - phase) = level, moved
+    by whole turns into the grid's range; NaN if there is none. The second joint must be rotary.
     """
     c0, c1, c2 = along_rows(robot, grid, form).T
     phase, radius = np.arctan2(c2, c1), np.hypot(c1, c2)

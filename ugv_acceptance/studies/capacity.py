@@ -1,6 +1,6 @@
 """The largest force a robot can pull or lift with before it tips, slips or saturates a joint.
 
-Torque and tipping moments are linear in the force, friction is a quadratic; so each bound is exact.
+Torque and tipping moments are linear in the force, friction is quadratic, so each bound is exact.
 A lift is a pull along gravity at the gripper.
 """
 
@@ -19,29 +19,29 @@ from ugv_acceptance.model.statics import LEAST_LEVER, gripper_point, static_torq
 from ugv_acceptance.model.support import pairs, supports_of
 from ugv_acceptance.type_aliases import Floats
 
-# What ends a pull first; NOTHING: no finite force does.
+# What limits the force first; NOTHING if no finite force is too large.
 SATURATION, TIP, SLIP, NOTHING = range(4)
 CAUSES = ('saturation', 'tip', 'slip', 'nothing')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Capacity:
-    """`force` (...) in N before each of CAUSES but the last, shape (..., 3), and the first of them.
+    """The largest force before each cause of failure: `bounds` (..., 3) in N, in order of CAUSES.
 
-    Zero where the bound is passed without any force; infinite where no force reaches it.
+    Zero where the limit is passed without any force; infinite where no force reaches it.
     """
 
     bounds: Floats
 
     @property
     def force(self) -> Floats:
-        """Largest force (N), shape (...)."""
+        """Largest force (N) before any of the causes, shape (...)."""
         least: Floats = self.bounds.min(axis=-1)
         return least
 
     @property
     def cause(self) -> NDArray[np.int8]:
-        """Number in CAUSES of what comes first, shape (...)."""
+        """Index in CAUSES of the cause that limits the force, shape (...)."""
         first = self.bounds.argmin(axis=-1)
         return np.where(np.isinf(self.force), NOTHING, first).astype(np.int8)
 
@@ -78,7 +78,7 @@ def pull_capacity(  # noqa: PLR0913, PLR0917 - two optional places of the pull
 def lift_capacity(
     robot: Robot, q: ArrayLike, gravity: ArrayLike, limits: ArrayLike
 ) -> tuple[Floats, NDArray[np.int8]]:
-    """Return the largest payload (kg), shape (...), and what limits it: SATURATION or TIP.
+    """Return the largest payload (kg), shape (...), and its cause: SATURATION, TIP or NOTHING.
 
     The payload's centre of gravity is that of `robot.payload`; zero where even without any payload
     the robot tips or saturates.
@@ -107,7 +107,7 @@ def _rise(start: Floats, slope: Floats, end: Floats) -> Floats:
 def _saturation(
     robot: Robot, q: Floats, g: Floats, d: Floats, limits: Floats, load: Payload
 ) -> Floats:
-    """Return the force at which the first joint saturates (...)."""
+    """Return the force (...) in N at which the first joint saturates."""
     cog = robot.payload.cog
     torque = static_torque(robot, q, g, load)
     # The torque that holds 1 kg against an acceleration d holds 1 N along d.
@@ -119,7 +119,7 @@ def _saturation(
 
 
 def _tip(robot: Robot, q: Floats, g: Floats, d: Floats, point: Floats, load: Payload) -> Floats:
-    """Return the force at which the robot tips about the first edge (...); 0: it tips already."""
+    """Return the force (...) in N at which the robot tips about any edge; 0 if it tips already."""
     mechanics, n = mechanics_of(robot), len(robot.joint_names)
 
     def bound(*columns: Floats) -> tuple[Floats]:
@@ -156,7 +156,10 @@ def _rows(vector: Sequence[Number], rows: Rows) -> Floats:
 def _edge_bound(
     start: Floats, end: Floats, weight: tuple[Floats, Floats], pull: tuple[Floats, Floats]
 ) -> Floats:
-    """Return the pull at which the moment about an edge vanishes; each pair is point and force."""
+    """Return the factor (n,) of the pull at which the moment about an edge vanishes.
+
+    `weight` and `pull` are each a point (n, 3) in m and the force (n, 3) that acts there.
+    """
     along = end - start
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     holds, pulls = (
@@ -169,7 +172,10 @@ def _edge_bound(
 
 
 def _slip(weight: Floats, d: Floats, friction: float) -> Floats:
-    """Return the force at which the friction cone is left: |T + f t|^2 = mu^2 (N + f n)^2."""
+    """Return the force at which the tracks slip: f of |T + f t|^2 = mu^2 (N + f n)^2.
+
+    T and N are the weight along and across the ground, t and n the parts of direction `d`.
+    """
     if np.isinf(friction):
         return np.full(np.broadcast_shapes(weight.shape, d.shape)[:-1], np.inf)
     mu = friction**2

@@ -1,4 +1,4 @@
-"""Intervals of an angle on one turn in which a sinusoidal torque stays in bounds."""
+"""Intervals of an angle within one turn, and where a cosine stays between two bounds."""
 
 import math
 
@@ -26,7 +26,7 @@ def where_cosine_between(lower: float, upper: float, shift: float = 0.0) -> Inte
 
 
 def wrap(start: float, end: float) -> list[tuple[float, float]]:
-    """Return an interval of at most one turn as intervals inside [0, 2 pi]."""
+    """Return an interval (rad) of at most one turn as one or two intervals inside [0, 2 pi]."""
     turns = math.floor(start / TURN)
     start, end = start - turns * TURN, end - turns * TURN
     if end <= TURN:
@@ -46,12 +46,12 @@ def merge(parts: list[tuple[float, float]], slack: float = 1e-12) -> Intervals:
 
 
 def length(intervals: Intervals) -> float:
-    """Return the total length (rad)."""
+    """Return the total length (rad) of disjoint intervals."""
     return math.fsum(end - start for start, end in intervals)
 
 
 def intersect(a: Intervals, b: Intervals) -> Intervals:
-    """Return where both hold."""
+    """Return the intersection of two sets of intervals."""
     both = [
         (max(start, low), min(end, high))
         for start, end in a

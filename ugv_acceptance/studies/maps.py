@@ -1,7 +1,7 @@
 """Maps over two joints: torque utilisation and tip-over margin, and where they fail.
 
-Both come from 3 x 3 forms (bilinear.py) where the support polygon stays the same over the map, and
-from the general functions of arrays where it does not.
+Computed from 3 x 3 forms (bilinear.py), which is fast; the tip-over margin by the general functions
+of room model where the support polygon changes over the map.
 """
 
 from collections.abc import Callable
@@ -25,13 +25,13 @@ from ugv_acceptance.type_aliases import Floats
 
 SAFE, CAUTION, FAILURE = range(3)
 CLASSES = ('safe', 'caution', 'failure')
-# Rows a block: a few rows of 2001 cells and their temporaries stay in the cache.
+# Rows per block: so few rows of 2001 cells and their temporaries stay in the cache.
 _ROWS = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Where a margin turns: from `failure` down it fails, from `caution` down it warns."""
+    """Levels of a margin: at or below `failure` it fails, at or below `caution` it warns."""
 
     caution: float
     failure: float
@@ -39,7 +39,10 @@ class Levels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipMap:
-    """`angle` (n, m): tilt left (rad), NaN where there is no margin; `side`: number in SIDES."""
+    """Tip-over margin over a grid: smallest tilt left and the side to which the robot would tip.
+
+    `angle` (n, m) in rad, NaN where there is no margin; `side` (n, m) is a number in SIDES.
+    """
 
     angle: Floats
     side: NDArray[np.int8]
@@ -47,7 +50,10 @@ class TipMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipForms:
-    """Each tip edge's angle as atan2(sine, cosine), forms (edges, 3, 3), and its side (edges,)."""
+    """Each tip edge's angle as atan2 of two forms: `sine` and `cosine` (edges, 3, 3).
+
+    `side` (edges,) is the number in SIDES of the side each edge lies on.
+    """
 
     sine: Floats
     cosine: Floats
@@ -55,7 +61,7 @@ class TipForms:
 
 
 def classes(margin: Floats, caution: float, failure: float) -> NDArray[np.uint8]:
-    """Return SAFE, CAUTION or FAILURE of margins (larger is better); no margin is a failure."""
+    """Return SAFE, CAUTION or FAILURE of each margin (larger is better); NaN is a FAILURE."""
     found = np.full(margin.shape, FAILURE, dtype=np.uint8)
     found[margin > failure] = CAUTION
     found[margin > caution] = SAFE
@@ -72,7 +78,7 @@ def torque_forms(
 def within_limits(
     robot: Robot, grid: Grid, forms: Floats, limits: ArrayLike, workers: int = 2
 ) -> Mask:
-    """Return where every |torque| is at most its limit (j,), shape (n, m)."""
+    """Return whether every |torque| is at most its limit (j,), shape (n, m)."""
     bounds = np.broadcast_to(np.asarray(limits, dtype=np.float64), len(forms))
     judged = [(form, float(bound)) for form, bound in zip(forms, bounds, strict=True)]
     judged = [(form, bound) for form, bound in judged if np.abs(form).sum() > bound]
@@ -93,7 +99,10 @@ def within_limits(
 
 @dataclass(slots=True, eq=False)
 class _Window:
-    """Bounds on g(a + b) = wave[0] cos + wave[1] sin, one (n,) a position of the first joint."""
+    """Bounds `lower` and `upper` (n,) on g(a + b) = wave[0] cos(a + b) + wave[1] sin(a + b).
+
+    One of each for every position a of the first joint.
+    """
 
     wave: Floats
     lower: Floats
@@ -101,7 +110,10 @@ class _Window:
 
 
 def _add_window(windows: list[_Window], of_row: Floats, wave: Floats, bound: float) -> None:
-    """Add |of_row + g| <= bound; joints that share g (shoulder and elbow) share a window."""
+    """Add the condition |of_row + g| <= bound; joints with the same g share one window.
+
+    Shoulder and elbow do, for example.
+    """
     for known in windows:
         if np.abs(known.wave - wave).max() <= 1e-14 * np.abs(wave).max():
             np.maximum(known.lower, -bound - of_row, out=known.lower)
@@ -155,7 +167,7 @@ def utilisation_map(robot: Robot, grid: Grid, forms: Floats, limits: ArrayLike) 
 def tip_forms(
     robot: Robot, grid: Grid, gravity: ArrayLike, payload: Payload | None = None
 ) -> TipForms | None:
-    """Return the tip edges' forms; None where the support polygon changes over the grid."""
+    """Return the tip edges' forms; None if the support polygon changes over the grid."""
     g = np.asarray(gravity, dtype=np.float64)
     cog = form_of(robot, grid, lambda q: centre_of_gravity(robot, q, payload))
     points = _fixed_contacts(robot, grid)
@@ -177,14 +189,14 @@ def tip_forms(
 
 
 def _affine(cog: Floats, start: Floats, direction: Floats) -> Floats:
-    """Return the form of (start - cog) . direction."""
+    """Return the form (3, 3) of (start - cog) . direction, from the forms `cog` (3, 3, 3)."""
     form: Floats = -np.einsum('kab,k->ab', cog, direction)
     form[0, 0] += start @ direction
     return form
 
 
 def _fixed_contacts(robot: Robot, grid: Grid) -> list[Floats] | None:
-    """Return the contact points (m, `base_link`); None where one moves with a joint of the grid."""
+    """Return the contact points (m, `base_link`); None if one moves with a joint of the grid."""
     mechanics = mechanics_of(robot)
     names = {robot.joint_names[k] for k in (grid.first, grid.second)}
     for contact in robot.contacts:
@@ -235,10 +247,10 @@ def _general(
 
 
 def stands(robot: Robot, grid: Grid, forms: TipForms, angle: float = 0.0) -> Mask:
-    """Return where more than `angle` (rad, at least 0) is left about every edge, shape (n, m).
+    """Return whether the tilt left about every edge is above `angle` (rad, >= 0), shape (n, m).
 
-    sin(force angle - angle) > 0 without an arc tangent; a robot tipped by more than half a turn
-    less `angle` does not occur under a gravity that points below the base.
+    Tests sin(force angle - angle) > 0, which needs no arc tangent. That is the same as long as
+    gravity points below the base, where the force angle stays above `angle` less half a turn.
     """
     turned = forms.sine * np.cos(angle) - forms.cosine * np.sin(angle)
     ok = np.empty((len(grid.x), len(grid.y)), dtype=np.bool_)
@@ -251,7 +263,7 @@ def stands(robot: Robot, grid: Grid, forms: TipForms, angle: float = 0.0) -> Mas
 
 
 def area_fraction(mask: Mask, grid: Grid) -> float:
-    """Return the fraction of the map's area where `mask` (n, m) holds: the trapezoidal rule."""
+    """Return the fraction of the map's area where `mask` (n, m) is True (trapezoidal rule)."""
     rows = trapezoid(mask.astype(np.float64), grid.y, axis=1)
     area = (grid.x[-1] - grid.x[0]) * (grid.y[-1] - grid.y[0])
     return float(trapezoid(rows, grid.x) / area)

@@ -1,9 +1,10 @@
-"""Explains the paper's Table 2: centres of gravity that give all its cells.
+"""Reproduces the paper's Table 2 by link centres of gravity that lie away from mid-link.
 
-With both centres of gravity at mid-link the two models agree at rest, the reference error at
-1 deg/s is nearly zero and F grows as the fourth power of speed. Table 2 needs a reference error of
-1.0 N m, which link centres of gravity away from mid-link give. For each offset of link 2 the
-cells bound the offset of link 1 in closed form: the mean square at rest is a quadratic of it.
+With both centres of gravity at mid-link the static and the dynamic model agree at rest, so that the
+reference error at 1 deg/s is nearly zero and F grows as the fourth power of speed. The printed
+Table 2 implies a reference error of 1.0 N m, which offset centres of gravity explain. For each
+offset of link 2 the cells bound the offset of link 1 in closed form, because the mean square at
+rest is a quadratic of it.
 """
 
 import math
@@ -30,17 +31,17 @@ from ugv_acceptance.type_aliases import Floats
 # Table 2 as printed: F of the first joint; that of the second is 1.0 throughout.
 TABLE_2 = (1.0, 1.0, 1.0, 1.2, 5.1, 22.0, 67.6, 163.9)
 THETA1 = math.pi / 6.0
-# The family's member used on the page (m): near its middle.
+# The offsets (m) that the paper page uses: near the middle of the family.
 OFFSET1, OFFSET2 = 0.04728, -0.00228
-# A printed digit holds everything that rounds to it.
+# Half the last printed digit: a cell agrees if it rounds to what is printed.
 _HALF = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Offsets (m) that give every cell: for each `offset2` the ends of two intervals of offset1.
+    """All offsets (m) that reproduce Table 2: for each `offset2` (n,) two intervals of offset1.
 
-    `positive` and `negative` have shape (n, 2), smaller magnitude first.
+    `positive` and `negative` (n, 2) are the intervals' ends, smaller magnitude first.
     """
 
     offset2: Floats
@@ -67,7 +68,7 @@ def matches(found: Floats) -> Floats:
 
 
 def offset_family(offset2: Floats, arm: PlanarArm = PAPER) -> Family:
-    """Return the offsets of link 1 that give all cells, for each of `offset2` (m) with any."""
+    """Return the offsets of link 1 that reproduce Table 2, for each `offset2` (m) that has any."""
     rows = [(d2, *ends) for d2 in offset2 if (ends := _ends(float(d2), arm)) is not None]
     table = np.array(rows).reshape(-1, 5)
     return Family(table[:, 0], table[:, 1:3], table[:, 3:5])
@@ -82,7 +83,7 @@ def _ends(offset2: float, arm: PlanarArm) -> tuple[float, float, float, float] |
 
 
 def _rest_bounds(offset2: float, arm: PlanarArm) -> tuple[float, float]:
-    """Return between which mean squares at rest (N2 m2) every cell of joint 1 rounds as printed."""
+    """Return the bounds of the mean square at rest (N2 m2) within which joint 1 matches Table 2."""
     moved, q, n = replace(arm, offset2=offset2), paper_sweep(THETA1), PAPER_SAMPLES - 1
     rest = planar_torque(moved, q[:, 0], q[:, 1])[0]
     motion = planar_dynamics(moved, q, (0.0, 1.0), (0.0, 0.0))[0] - rest

@@ -12,7 +12,10 @@ from ugv_acceptance.model.robot import Robot, Vector
 
 @dataclass(frozen=True, slots=True)
 class Orientation:
-    """A tilt: `heading` (rad) is the low side, 0 the front, pi/2 the left; `words` names it."""
+    """A direction of tilt: `heading` (rad) is the low side, 0 the front, pi/2 the left.
+
+    None on level ground; `words` is its name for people.
+    """
 
     words: str
     heading: float | None
@@ -42,9 +45,10 @@ def gravity_of(orientation: str, tilt: float, size: float = 9.81) -> Vector:
 
 
 def grounding_angle(robot: Robot, joint: str) -> float:
-    """Return the angle (rad, nearest 0) at which contacts on `joint` reach the tracks' ground.
+    """Return the position of `joint` (rad, nearest 0) at which its contacts touch the ground.
 
-    This is how flippers are put forward on the ground. Raises BadConfig where none does.
+    The ground is the tracks' plane; this is how flippers are laid forward on it. Raises BadConfig
+    if no contact reaches it.
     """
     mechanics, k = mechanics_of(robot), robot.joint_names.index(joint)
     nodes = np.array([0.0, 1.0, -1.0]) * 2.0 * math.pi / 3.0
@@ -54,7 +58,7 @@ def grounding_angle(robot: Robot, joint: str) -> float:
         q[k] = float(node)
         posture = posture_of(mechanics, q, 0.0, (0.0, 0.0, 0.0))
         heights.append([float(point[2]) for point in posture.contacts])
-    # z = c0 + c1 cos q + c2 sin q, told by three angles.
+    # z = c0 + c1 cos q + c2 sin q, determined by three angles.
     c0, c1, c2 = np.linalg.solve(
         np.stack([np.ones(3), np.cos(nodes), np.sin(nodes)], axis=1), np.array(heights)
     )

@@ -1,7 +1,7 @@
 """The paper's planar two-link arm: equations (1)-(8), Table 1 and the two-link inverse dynamics.
 
-Closed forms, as the check of the code for any tree; `paper_arm` is the same arm as a Robot. Angles
-in rad, theta1 from the horizontal, theta2 from link 1, both positive upwards.
+These closed forms check the general code for any tree; `paper_arm` is the same arm as a Robot.
+Angles in rad, theta1 from the horizontal, theta2 from link 1, both positive upwards.
 """
 
 import math
@@ -15,7 +15,7 @@ from ugv_acceptance.studies.intervals import Intervals, where_cosine_between
 from ugv_acceptance.type_aliases import Floats
 
 TURN = 2.0 * math.pi
-# Below this a cosine is zero: pi/2 as a float has a cosine of 6e-17.
+# A cosine below this counts as zero: that of pi/2 as a float is 6e-17.
 _ZERO = 1e-12
 
 
@@ -81,7 +81,10 @@ def planar_torque(arm: PlanarArm, theta1: ArrayLike, theta2: ArrayLike) -> tuple
 def planar_dynamics(
     arm: PlanarArm, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Return tau_1 and tau_2 (N m) of the moving arm; `q`, `qd`, `qdd` are of shape (..., 2)."""
+    """Return tau_1 and tau_2 (N m) of the moving arm: inverse dynamics of two rods and the load.
+
+    `q` (rad), `qd` (rad/s) and `qdd` (rad/s2) have shape (..., 2).
+    """
     q, qd, qdd = (np.asarray(x, dtype=np.float64) for x in (q, qd, qdd))
     static1, static2 = planar_torque(arm, q[..., 0], q[..., 1])
     l1, c2 = arm.length1, arm.centre2

@@ -10,7 +10,7 @@ from ugv_acceptance.type_aliases import Floats
 
 
 def joint_range(robot: Robot, name: str) -> tuple[float, float]:
-    """Return a joint's range (rad, m): its limits; without any a full turn, 0 where it slides."""
+    """Return a joint's range (rad, m): its limits; -pi to pi without any, or 0 if prismatic."""
     joint = robot.joint(name)
     widest = 0.0 if joint.kind == 'prismatic' else math.pi
     low = joint.lower if math.isfinite(joint.lower) else -widest
@@ -19,7 +19,7 @@ def joint_range(robot: Robot, name: str) -> tuple[float, float]:
 
 
 def random_postures(robot: Robot, count: int, seed: int) -> Floats:
-    """Return `count` postures (count, j), each joint even over its range."""
+    """Return random postures (count, j), each joint uniform over its range (rad, m)."""
     ranges = np.array([joint_range(robot, name) for name in robot.joint_names])
     rng = np.random.default_rng(seed)
     found: Floats = rng.uniform(ranges[:, 0], ranges[:, 1], (count, len(ranges)))
@@ -27,7 +27,7 @@ def random_postures(robot: Robot, count: int, seed: int) -> Floats:
 
 
 def sweeps(robot: Robot, q: Sequence[float], count: int) -> list[Floats]:
-    """Return each joint's sweep over its range from posture `q`, shape (count, j)."""
+    """Return for each joint its sweep over its range, postures (count, j); the others as in `q`."""
     found = []
     for k, name in enumerate(robot.joint_names):
         low, high = joint_range(robot, name)

@@ -1,7 +1,7 @@
 """MTBF, availability, success and trend from hours and failures, with exact bounds.
 
 Exact bounds of an MTBF rest on a constant failure rate (exponential times between failures); the
-trend tests say whether that may be assumed. Times in hours; infinite where nothing bounds.
+trend tests say whether that may be assumed. Times in hours; infinite where there is no bound.
 """
 
 import math
@@ -13,15 +13,16 @@ from scipy.special import chdtr, chdtri, fdtri, ndtr
 
 from ugv_acceptance.studies.spread import clopper_pearson
 
-# A growth slope of a single failure says nothing.
+# Fewer failures do not determine a growth slope.
 LEAST_FAILURES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Bounded:
-    """A number with its two-sided bounds, and the one-sided lower bound of the same confidence.
+    """An estimate with two-sided bounds `low` and `high` at a `confidence` from 0 to 1.
 
-    `value` is None where the data give none.
+    `demonstrated` is the one-sided lower bound at the same confidence. `value` is None if the data
+    give no estimate.
     """
 
     value: float | None
@@ -32,16 +33,17 @@ class Bounded:
 
 
 def chi_square(probability: float, degrees: int) -> float:
-    """Return the quantile of the chi-square distribution; 0 for no degree of freedom."""
+    """Return the chi-square value that `probability` lies below; 0 for zero degrees of freedom."""
     return float(chdtri(degrees, 1.0 - probability)) if degrees else 0.0
 
 
 def demonstrated_mtbf(
     hours: float, failures: int, confidence: float, *, failure_terminated: bool = False
 ) -> float:
-    """Return the MTBF (h) that is exceeded with `confidence`: the one-sided exact lower bound.
+    """Return the MTBF (h) demonstrated with `confidence`: the exact one-sided lower bound.
 
-    A test that ends with its last failure has one failure less to come than one that ends by time.
+    2 T / chi2(confidence, 2 r + 2) for r failures in T hours of a test that ends by time; 2 r
+    degrees of freedom for one that ends with its last failure.
     """
     degrees = 2 * failures if failure_terminated else 2 * failures + 2
     quantile = chi_square(confidence, degrees)
@@ -51,7 +53,7 @@ def demonstrated_mtbf(
 def mtbf(
     hours: float, failures: int, confidence: float, *, failure_terminated: bool = False
 ) -> Bounded:
-    """Return the MTBF (h) with exact chi-square bounds; without a failure only from below."""
+    """Return the MTBF (h) with exact chi-square bounds; without failures only a lower bound."""
     tail = (1.0 - confidence) / 2.0
     quantile = chi_square(tail, 2 * failures)
     ended = failure_terminated
@@ -65,12 +67,12 @@ def mtbf(
 
 
 def hours_to_demonstrate(required: float, failures: int, confidence: float) -> float:
-    """Return the hours in all that demonstrate an MTBF (h), with so many failures in them."""
+    """Return the total hours needed to demonstrate an MTBF (h) with this number of failures."""
     return required * chi_square(confidence, 2 * failures + 2) / 2.0
 
 
 def hours_still_to_run(required: float, hours: float, failures: int, confidence: float) -> float:
-    """Return the hours still to run, without another failure; 0 where it is demonstrated."""
+    """Return the failure-free hours still needed to demonstrate an MTBF (h); 0 if it is."""
     return max(0.0, hours_to_demonstrate(required, failures, confidence) - hours)
 
 
@@ -83,9 +85,9 @@ def proportion(successes: int, trials: int, confidence: float) -> Bounded:
 
 
 def availability(up: float, failures: int, down: float, confidence: float) -> Bounded:
-    """Return up / (up + down) of `failures` repairs that took `down` (h) in all.
+    """Return availability up / (up + down); `down` (h) is the time of all `failures` repairs.
 
-    The bounds are exact where times to failure and to repair are exponential: their ratio is F
+    The bounds are exact if times to failure and to repair are exponential: their ratio is F
     distributed.
     """
     if failures == 0 or down <= 0.0 or up <= 0.0:
@@ -102,11 +104,12 @@ def availability(up: float, failures: int, down: float, confidence: float) -> Bo
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """Whether failures grow rarer: the power law lambda t^beta (Crow-AMSAA) and Laplace's test.
+    """Whether failures become rarer: the power law lambda t^beta (Crow-AMSAA) and Laplace's test.
 
-    `beta` < 1 is improvement; `unbiased` is corrected for few failures, `low` and `high` its exact
-    bounds. `mtbf_now` (h) is the inverse of the fitted rate at the end. `p_growth` and `laplace_p`
-    are two-sided: a constant rate is as far off in this share of campaigns.
+    `beta` < 1 is improvement; `unbiased` is beta corrected for few failures, `low` and `high` its
+    exact bounds, `scale` is lambda. `mtbf_now` (h) is the inverse of the fitted rate at the end.
+    `laplace` is the test's score. `p_growth` and `laplace_p` are two-sided p-values of a constant
+    rate.
     """
 
     failures: int
@@ -126,7 +129,7 @@ def trend(
 ) -> Trend | None:
     """Return the trend of failures at `times` (h, of `hours` run); None for fewer than three.
 
-    A test that ends with its last failure has that failure for its end, so it tells no time.
+    If the test ends with its last failure, the time of that one carries no information.
     """
     at = np.sort(np.asarray(times, dtype=np.float64))
     n, free = at.size, at.size - failure_terminated
@@ -156,6 +159,6 @@ def trend(
 
 
 def _two_sided_chi_square(statistic: float, degrees: int) -> float:
-    """Return how often a chi-square number is as far off on either side: the MIL-HDBK-189 test."""
+    """Return the two-sided p-value of a chi-square statistic, as in MIL-HDBK-189."""
     below = float(chdtr(degrees, statistic))
     return min(1.0, 2.0 * min(below, 1.0 - below))

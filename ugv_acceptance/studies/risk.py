@@ -1,7 +1,7 @@
-"""Probability of saturation and rollover where environment, load and robot are uncertain.
+"""Probability of saturation and rollover if environment, load and robot are uncertain.
 
-Plain Monte Carlo in blocks: exact binomial intervals, memory that does not grow, and the same
-counts for a seed whatever the number of processes.
+Plain Monte Carlo in blocks: exact binomial intervals, constant memory, and the same counts for a
+seed whatever the number of processes.
 """
 
 import math
@@ -25,20 +25,20 @@ Columns = tuple[Floats, Floats, Floats]
 
 EVENTS = ('saturation', 'rollover', 'either')
 BINS = 20
-# Samples a generator makes, and samples whose temporaries stay in the cache.
+# Samples drawn from one random generator; samples per block, so that temporaries fit the cache.
 CHUNK, BLOCK = 2**18, 2**11
-# Samples from which starting processes (half a second each) pays.
+# From this number of samples on, starting processes (half a second each) pays.
 WORTH_A_PROCESS = 2**22
-# Samples of which the failures' inputs are looked at.
+# Number of samples from which the sensitivities are computed.
 LOOKED_AT = 2**20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """What is uncertain: `spreads` by name (see `known_names`); the rest is nominal.
+    """The input of a risk study: distributions `spreads` by name; all other numbers are nominal.
 
-    `q` (j,) is the posture (rad, m) of joints without a spread, `limits` (j,) the torque limits
-    (N m), infinite where not judged.
+    `risk_kernel.known_names` lists the names. `q` (j,) is the posture (rad, m) of joints without a
+    spread, `limits` (j,) the torque limits (N m), infinite where not judged.
     """
 
     robot: Robot
@@ -49,7 +49,10 @@ class Study:
 
 @dataclass(slots=True)
 class Counts:
-    """Failures by event, and for each input how the failures' inputs are spread over its bins."""
+    """Failures by event (3,), and for each input a histogram of its values at the failures.
+
+    `bins` (inputs, 3, BINS) counts the first `looked_at` samples only.
+    """
 
     samples: int = 0
     failures: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, np.int64))
@@ -67,7 +70,7 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A probability with its exact interval, after so many samples."""
+    """A probability with its exact confidence interval, from a number of samples."""
 
     samples: int
     failures: int
@@ -78,10 +81,11 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Risk:
-    """The result: an estimate an event, how it converged, and each input's share of the variance.
+    """The result of a risk study: probability of each event, its convergence, and sensitivities.
 
-    `sensitivity[name][event]` is the first-order share (0 to 1) of the failure indicator's variance
-    that the input explains alone; `history` holds the estimates at growing numbers of samples.
+    `sensitivity[name][event]` is the first-order Sobol index: the share (0 to 1) of the failure
+    indicator's variance that the input explains alone; `history` holds the estimates at growing
+    numbers of samples.
     """
 
     estimates: dict[str, Estimate]
@@ -91,13 +95,16 @@ class Risk:
 
 
 def estimate(failures: int, samples: int, confidence: float = 0.95) -> Estimate:
-    """Return the probability with its Clopper-Pearson interval."""
+    """Return failures / samples with its Clopper-Pearson confidence interval."""
     low, high = clopper_pearson(failures, samples, confidence)
     return Estimate(samples, failures, failures / samples, low, high)
 
 
 def failures_of(study: Study, columns: Mapping[str, Floats], count: int) -> NDArray[np.bool_]:
-    """Return which samples saturate a joint, roll over, do either: shape (3, count)."""
+    """Return which samples fail, shape (3, count): a joint saturates, the robot rolls over, either.
+
+    `columns` holds the drawn values (count,) of each name in SI units.
+    """
     robot = study.robot
     limits = _limits(study, columns)
     n = len(limits)
@@ -119,7 +126,7 @@ def failures_of(study: Study, columns: Mapping[str, Floats], count: int) -> NDAr
 
 
 def _limits(study: Study, columns: Mapping[str, Floats]) -> dict[str, Any]:
-    """Return the torque limit of each joint that has one: a number, or drawn."""
+    """Return the torque limit of each joint that has one: a number, or drawn values (count,)."""
     known = zip(study.robot.joint_names, study.limits, strict=True)
     limits = {name: columns.get(f'{name}.limit', limit) for name, limit in known}
     return {name: limit for name, limit in limits.items() if np.min(limit) < math.inf}
@@ -130,7 +137,7 @@ def _triples(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _tipped(robot: Robot, posture: Posture, gravity: Columns, count: int) -> NDArray[np.bool_]:
-    """Return where no positive moment holds the robot down; no margin at all counts as tipped."""
+    """Return which samples (count,) tip over: no positive moment holds them, or there is none."""
     tipped = np.ones(count, dtype=np.bool_)
     for rows, stance in stances_of(mechanics_of(robot), posture, count):
         gx, gy, gz = (g[rows] for g in gravity)
@@ -149,7 +156,7 @@ def run(
     workers: int = 2,
     progress: Callable[[int], None] | None = None,
 ) -> Risk:
-    """Return the risk from `samples` draws; `progress` is told how many are done."""
+    """Return the risk from `samples` draws; `progress` is called with the number done so far."""
     total, step = Counts(), CHUNK
     history: list[tuple[int, NDArray[np.int64]]] = []
     for counts in _chunks(study, samples, seed, workers):
@@ -171,7 +178,10 @@ def run(
 
 
 def _chunks(study: Study, samples: int, seed: int, workers: int) -> Iterator[Counts]:
-    """Yield the counts of each chunk, in order. Blocks are too small for threads."""
+    """Yield the counts of each chunk in order; many samples are shared out to worker processes.
+
+    Processes and not threads, because the blocks are too small for threads to pay.
+    """
     sizes = [CHUNK] * (samples // CHUNK) + [samples % CHUNK] * (samples % CHUNK > 0)
     looked = range(-(-LOOKED_AT // CHUNK))
     rngs = generators(seed, len(sizes))
@@ -210,9 +220,10 @@ def _bins(
 
 
 def _sensitivity(study: Study, counts: Counts) -> dict[str, dict[str, float]]:
-    """Return the variance of the failure probability over an input's bins, over p (1 - p).
+    """Return each input's first-order Sobol index of each event.
 
-    Its expected value where the input has no influence, (BINS - 1) / samples, is taken off.
+    The variance of the failure probability over the input's bins, divided by p (1 - p), less
+    (BINS - 1) / samples, which is its expected value for an input without influence.
     """
     shares: dict[str, dict[str, float]] = {}
     in_bin = counts.looked_at / BINS

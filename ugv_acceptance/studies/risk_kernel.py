@@ -1,7 +1,7 @@
-"""The compiled formula of a risk study over the numbers that are uncertain.
+"""Compiles torques and tipping moments as a function of the uncertain numbers of a risk study.
 
-The recursion of every other margin, compiled with a symbol for each uncertain number and a constant
-for the rest, so that what does not vary costs nothing.
+The same formulas as for every other margin, compiled with a symbol for each uncertain number and
+constants for the rest, so that what does not vary costs nothing.
 """
 
 from collections.abc import Container, Mapping, Sequence
@@ -37,9 +37,9 @@ AXES = ('x', 'y', 'z')
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RiskKernel:
-    """Compiled for one robot and one set of names, which are the kernel's inputs, in their order.
+    """A compiled formula whose inputs are the uncertain numbers `names`, in their order.
 
-    Outputs: the torque of each joint judged; then, where the support polygon cannot change
+    Outputs: the torque of each joint judged; then, if the support polygon cannot change
     (`edges` > 0), the moment (N m) that holds the robot down about each edge, else the mass, the
     centre of gravity (3), gravity (3) and the contacts (3 each).
     """
@@ -50,7 +50,7 @@ class RiskKernel:
 
 
 def known_names(robot: Robot) -> tuple[str, ...]:
-    """Return the names of all numbers that may vary.
+    """Return the names of all numbers of a robot that may be uncertain.
 
     `slope` (rad) and `heading` (rad, of the uphill direction in `base_link`); JOINT.position,
     .rate, .x, .y, .z (where the joint sits in its parent) and .limit; LINK.mass and its centre of
@@ -67,7 +67,7 @@ def known_names(robot: Robot) -> tuple[str, ...]:
 def risk_kernel(
     robot: Robot, names: tuple[str, ...], fixed: tuple[float, ...], judged: tuple[str, ...]
 ) -> RiskKernel:
-    """Return the kernel in which `names` vary; joints not among them stay at `fixed` (j,).
+    """Return the kernel in which `names` vary; the joints' nominal positions are `fixed` (j,).
 
     Torques are those of the joints `judged`. Raises BadConfig for a name the robot does not have.
     """
@@ -100,7 +100,7 @@ def risk_kernel(
 
 @dataclass(frozen=True, slots=True)
 class _Stand:
-    """What decides whether the robot tips."""
+    """The numbers that decide whether the robot tips: kg, m, m/s2, in `base_link`."""
 
     mass: Scalar
     cog: Vec
@@ -109,7 +109,7 @@ class _Stand:
 
 
 def _fixed_edges(robot: Robot, fixed: Sequence[float], stand: _Stand) -> list[Scalar]:
-    """Return the moment about each tip edge; none where the polygon can change."""
+    """Return the moment (N m) about each tip edge; an empty list if the polygon can change."""
     if not stand.contacts or not all(isinstance(x, float) for p in stand.contacts for x in p):
         return []
     cog = centre_of_gravity(robot, fixed)
@@ -125,7 +125,7 @@ def _fixed_edges(robot: Robot, fixed: Sequence[float], stand: _Stand) -> list[Sc
 
 
 def moment_about(start: Vec, end: Vec, cog: Vec, weight: Vec) -> Scalar:
-    """Return the moment (N m) of a weight (N) at `cog` that turns inwards over the edge (m)."""
+    """Return the moment (N m) about an edge (m) of a weight (N) at `cog`: positive holds down."""
     edge = subtract(end, start)
     along = scale(edge, 1.0 / sqrt(dot(edge, edge)))
     return dot(cross(weight, subtract(cog, start)), along)
@@ -155,13 +155,13 @@ def _outputs(
 
 
 def _gravity(size: float, values: Mapping[str, Scalar]) -> Vec:
-    """Return gravity on a slope: `heading` is the uphill direction, 0 the robot's front."""
+    """Return gravity (m/s2, `base_link`) on a slope; heading is the uphill side, 0 the front."""
     slope, heading = values.get('slope', 0.0), values.get('heading', 0.0)
     return scale((sin(slope) * cos(heading), sin(slope) * sin(heading), cos(slope)), -size)
 
 
 def _moved(tree: Tree, values: Mapping[str, Scalar]) -> Tree:
-    """Return the tree with its joints where `values` puts them."""
+    """Return the tree with uncertain joint positions in the parent link replaced by `values`."""
     bodies = list(tree.bodies)
     for k, body in enumerate(bodies):
         offset: Any = tuple(
@@ -178,7 +178,7 @@ def _point(values: Mapping[str, Scalar], name: str, nominal: Vec) -> Vec:
 
 
 def _loads(robot: Robot, tree: Tree, pose: Pose, values: Mapping[str, Scalar]) -> list[Load]:
-    """Return the payload and the mass of each uncertain link."""
+    """Return the payload and each uncertain link as point masses."""
     loads: list[Load] = []
     if robot.payload_link is not None:
         cog = _point(values, 'payload', robot.payload.cog)
@@ -197,7 +197,7 @@ def _varies(link: Link, names: Container[str]) -> bool:
 
 
 def _without(robot: Robot, names: Container[str]) -> Tree:
-    """Return the tree without the masses of links that vary: those come as point masses."""
+    """Return the tree without the masses of uncertain links; `_loads` adds them as point masses."""
     links = tuple(replace(k, mass=0.0) if _varies(k, names) else k for k in robot.links)
     tree = tree_of(replace(robot, links=links))
     bodies = list(tree.bodies)
@@ -211,7 +211,7 @@ def _without(robot: Robot, names: Container[str]) -> Tree:
 
 
 def _weight(tree: Tree, pose: Pose, loads: Sequence[Load]) -> list[Scalar]:
-    """Return the mass and the centre of gravity's coordinates."""
+    """Return the whole robot's mass (kg) and the coordinates of its centre of gravity (m)."""
     mass: Scalar = 0.0
     moment: Vec = (0.0, 0.0, 0.0)
     for k, body in enumerate(tree.bodies):

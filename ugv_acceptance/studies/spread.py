@@ -1,4 +1,4 @@
-"""Distributions of uncertain numbers: uniform or normal."""
+"""Distributions of uncertain numbers (uniform or normal), and exact intervals of a probability."""
 
 import math
 from collections.abc import Callable
@@ -25,21 +25,21 @@ class Spread:
     high: float
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Return `count` draws."""
+        """Return `count` random values, shape (count,)."""
         return _DRAW[self.kind](self, rng, count)
 
     def rank(self, values: Floats) -> Floats:
-        """Return the fraction of the spread below each value: 0 to 1, evenly spread."""
+        """Return the cumulative distribution at each value: 0 to 1."""
         return _RANK[self.kind](self, values)
 
 
 def uniform(low: float, high: float) -> Spread:
-    """Return an even spread from `low` to `high`."""
+    """Return a uniform distribution from `low` to `high`."""
     return Spread(UNIFORM, low, high)
 
 
 def normal(mean: float, deviation: float) -> Spread:
-    """Return a normal spread."""
+    """Return a normal distribution with this mean and standard deviation."""
     return Spread(NORMAL, mean, deviation)
 
 
@@ -80,7 +80,7 @@ _RANK: dict[str, Callable[[Spread, Floats], Floats]] = {
 
 
 def generators(seed: int, count: int) -> list[np.random.Generator]:
-    """Return independent generators, one a chunk: draws do not depend on who runs which."""
+    """Return independent random generators, one per chunk: results do not depend on the workers."""
     return [
         np.random.Generator(np.random.SFC64(child))
         for child in np.random.SeedSequence(seed).spawn(count)
@@ -88,7 +88,7 @@ def generators(seed: int, count: int) -> list[np.random.Generator]:
 
 
 def clopper_pearson(failures: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Return the exact two-sided interval of a probability from `failures` in `trials`."""
+    """Return the exact (Clopper-Pearson) two-sided interval of a probability."""
     tail = (1.0 - confidence) / 2.0
     low = 0.0 if failures == 0 else float(betaincinv(failures, trials - failures + 1, tail))
     high = 1.0
@@ -98,7 +98,7 @@ def clopper_pearson(failures: int, trials: int, confidence: float = 0.95) -> tup
 
 
 def together(probabilities: list[float], repeats: list[int]) -> float:
-    """Return the probability of at least one failure in independent trials, each so often."""
+    """Return the probability of any failure in independent trials, each repeated some times."""
     logs = [
         n * math.log1p(-min(p, 1.0 - 1e-16)) for p, n in zip(probabilities, repeats, strict=True)
     ]

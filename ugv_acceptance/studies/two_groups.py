@@ -1,7 +1,7 @@
-"""Compares two groups by exact tests, and the chance that a difference would be seen.
+"""Compares MTBF or success of two groups by exact tests, and gives the power of the tests.
 
-Failure rates: given all failures, those of the first are binomial by its share of the hours.
-Successes: Fisher's exact test. Both hold for any number of failures, none included.
+Failure rates: given the total number of failures, those of the first group are binomial with its
+share of the hours. Successes: Fisher's exact test. Both hold for any number of failures, even none.
 """
 
 import math
@@ -12,16 +12,17 @@ from scipy.stats import binom, binomtest, fisher_exact, hypergeom, norm, poisson
 
 from ugv_acceptance.studies.spread import clopper_pearson
 
-# Terms of a sum over counts are left out once they weigh less than this together.
+# Terms of a sum over counts are left out if together they weigh less than this.
 _TAIL = 1e-9
 _MOST = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """Two-sided `p`, the ratio second / first with its bounds, and the power of the test.
+    """The comparison of two groups: p-value, ratio second / first with bounds, power of the test.
 
-    `power` is the chance that a true ratio of `assumed` gives p < alpha with as many hours or runs.
+    `p` is two-sided. `power` is the chance that a true ratio of `assumed` gives p < alpha with as
+    many hours or runs.
     """
 
     p: float
@@ -38,10 +39,10 @@ def compare_mtbf(
     confidence: float,
     assumed: float = 2.0,
 ) -> Compared:
-    """Return the comparison of two (hours, failures): ratio of MTBFs, second over first.
+    """Compare the MTBF of two groups (hours, failures); the ratio is second over first.
 
-    The power is for the rate of the first (of both, if it has none) and an MTBF `assumed` times
-    longer of the second.
+    The power assumes the failure rate of the first group (of both, if it has no failure) and an
+    MTBF of the second `assumed` times as long.
     """
     (hours1, failures1), (hours2, failures2) = first, second
     share = hours1 / (hours1 + hours2)
@@ -59,12 +60,12 @@ def compare_mtbf(
 
 
 def _mtbf_ratio(share: float, hours1: float, hours2: float) -> float:
-    """Return the ratio of MTBFs at which the first has this share of the failures."""
+    """Return the ratio of MTBFs at which the first group has this share of the failures."""
     return math.inf if share >= 1.0 else share / (1.0 - share) * hours2 / hours1
 
 
 def mtbf_power(rate: float, hours1: float, hours2: float, assumed: float, alpha: float) -> float:
-    """Return the chance of p < alpha where the MTBFs are 1/rate and assumed/rate: an exact sum."""
+    """Return the chance of p < alpha if the MTBFs are 1/rate and assumed/rate: an exact sum."""
     mean1, mean2 = rate * hours1, rate * hours2 / assumed
     share = hours1 / (hours1 + hours2)
     most = int(poisson.isf(_TAIL, mean1 + mean2))
@@ -85,11 +86,11 @@ def mtbf_power(rate: float, hours1: float, hours2: float, assumed: float, alpha:
 def _rejected(
     total: int, share: float, alpha: float
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Return for 0..total failures of the first whether the two-sided binomial test rejects."""
+    """Return for 0..total failures of the first group whether the binomial test rejects."""
     chances = binom.pmf(np.arange(total + 1), total, share)
     order = np.argsort(chances, kind='stable')
     sums = np.cumsum(chances[order])
-    # All outcomes at most as likely as one count for it; equal ones within rounding too.
+    # The p-value sums all outcomes that are at most as likely; 1e-7 allows for rounding of ties.
     reach = np.searchsorted(chances[order], chances * (1.0 + 1e-7), side='right') - 1
     return np.asarray(sums[reach] < alpha)
 
@@ -97,10 +98,10 @@ def _rejected(
 def compare_success(
     first: tuple[int, int], second: tuple[int, int], confidence: float, assumed: float = 0.5
 ) -> Compared:
-    """Return the comparison of two (successes, trials): odds ratio, second over first.
+    """Compare the success of two groups (successes, trials); the odds ratio is second over first.
 
-    The power is for a second that fails `assumed` times as often as the first. Bounds of the ratio
-    are not given: 0 and infinity.
+    The power assumes that the second fails `assumed` times as often as the first. No bounds of the
+    ratio are computed: they are 0 and infinity.
     """
     (good1, runs1), (good2, runs2) = first, second
     bad1, bad2 = runs1 - good1, runs2 - good2
@@ -112,7 +113,7 @@ def compare_success(
 
 
 def success_power(share1: float, share2: float, runs1: int, runs2: int, alpha: float) -> float:
-    """Return the chance that Fisher's test gives p < alpha for true shares of success: exact."""
+    """Return the exact chance that Fisher's test gives p < alpha for given true success rates."""
     ways1 = binom.pmf(np.arange(runs1 + 1), runs1, share1)
     ways2 = binom.pmf(np.arange(runs2 + 1), runs2, share2)
     power = 0.0
@@ -131,7 +132,7 @@ def _fisher_rejects(
     runs2: int,
     alpha: float,
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-    """Return for every table of these margins whether Fisher's two-sided test rejects."""
+    """Return for every 2 x 2 table with these margins whether Fisher's two-sided test rejects."""
     chances = hypergeom.pmf(good1, runs1 + runs2, total, runs1)
     ordered = np.sort(chances)
     reach = np.searchsorted(ordered, chances * (1.0 + 1e-7), side='right') - 1

@@ -1,8 +1,9 @@
 """Joint speeds up to which the static model holds: equations (9) and (10).
 
 A joint that moves at a constant rate v adds v^2 c(q) to the torques, exactly; the error of the
-static model is e = s + v^2 c, where s is what the two models differ by at rest. Its mean square is
-a polynomial of v^2, so F = MS(v) / MS(reference speed) and its root are closed forms.
+static model is e = s + v^2 c, where s is the difference of the static and the true model at rest.
+Its mean square is a polynomial of v^2, so F = MS(v) / MS(reference speed) and the speed at which F
+is critical are closed forms.
 """
 
 import math
@@ -22,13 +23,17 @@ PAPER_SPEEDS_DEG_S = (1.0, 5.0, 7.2, 36.0, 72.0, 108.0, 144.0, 180.0)
 REFERENCE_SPEED = math.radians(1.0)
 # The static model's own error (N m rms) that the paper's Table 2 implies (see offsets.py).
 REFERENCE_TORQUE = 1.0
-# Torques (N m) below this are rounding of what cancels.
+# Torques (N m) below this are rounding errors of terms that cancel.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedError:
-    """Mean squares (j,) over a sweep of e = s + v^2 c: of s (N2 m2), of s times c, of c."""
+    """The static model's mean square error of each joint's torque as a polynomial of joint speed.
+
+    Coefficients (j,) of MS = rest + 2 v^2 mixed + v^4 moving, for e = s + v^2 c over a sweep:
+    `rest` is the mean square of s (N2 m2), `mixed` the mean of s times c, `moving` that of c^2.
+    """
 
     rest: Floats
     mixed: Floats
@@ -41,13 +46,16 @@ class SpeedError:
         return result
 
     def f_value(self, speed: ArrayLike, reference: float = REFERENCE_SPEED) -> Floats:
-        """Return F of equation (10), shape (..., j); NaN where the reference has no error."""
+        """Return F of equation (10), shape (..., j), for speeds (...) in rad/s.
+
+        NaN or infinite where there is no error at the `reference` speed (rad/s).
+        """
         with np.errstate(divide='ignore', invalid='ignore'):
             ratio: Floats = self.mean_square(speed) / self.mean_square(reference)
         return ratio
 
     def speed_at(self, critical: float, reference: float = REFERENCE_SPEED) -> Floats:
-        """Return the speed (j,) in rad/s at which F is `critical`; infinite where it never is."""
+        """Return the speed (j,) in rad/s at which F reaches `critical`; infinite if never."""
         excess = critical * self.mean_square(reference) - self.rest
         with np.errstate(divide='ignore', invalid='ignore'):
             root = np.sqrt(self.mixed**2 + self.moving * excess)
@@ -57,14 +65,14 @@ class SpeedError:
 
 
 def mean_square(error: ArrayLike, axis: int = 0) -> Floats:
-    """Return the sum of squares over N - 1: equation (9)."""
+    """Return the sum of squares divided by N - 1 along an axis: equation (9)."""
     error = np.asarray(error, dtype=np.float64)
     result: Floats = (error**2).sum(axis=axis) / (error.shape[axis] - 1)
     return result
 
 
 def critical_value(alpha: float = 0.05, samples: int = PAPER_SAMPLES) -> float:
-    """Return the critical F at significance `alpha` for two sweeps of `samples` each."""
+    """Return the critical value of F at significance `alpha` for two sweeps of `samples` each."""
     return float(fdtri(samples - 1, samples - 1, 1.0 - alpha))
 
 
@@ -78,8 +86,9 @@ def speed_error(
 ) -> SpeedError:
     """Return the static model's error while joint number `joint` moves through postures `q` (n, j).
 
-    `robot` is the truth, `static` the model whose static torque is compared with it (left out: the
-    same, so that nothing but the motion differs). `gravity` is level unless given (m/s2).
+    `robot` is the truth, `static` the model whose static torque is compared with it; left out it is
+    the same robot, so that only the motion differs. `gravity` (m/s2) is that on level ground unless
+    given.
     """
     q = np.asarray(q, dtype=np.float64)
     down = (0.0, 0.0, -robot.gravity) if gravity is None else gravity
@@ -110,12 +119,12 @@ def speed_limit(
     critical: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> Floats:
-    """Return the rate (j,) of each joint, moving alone, up to which the static model may stand in.
+    """Return the rate (j,) of each joint, moving alone, up to which the static model is valid.
 
-    rad/s (m/s where prismatic), infinite where no rate loads any joint. `reference` is the static
-    model's own error (N m rms, one number or one a joint): without one the F statistic has nothing
-    to be compared with. The error of the motion is taken over `postures` (n, j); F is judged at
-    every joint, against the computed critical value for n samples unless `critical` is given.
+    rad/s (m/s if prismatic), infinite where no rate loads any joint. `reference` is the static
+    model's own error (N m rms, one number or one per joint), to which F relates the error of the
+    motion. That error is taken over `postures` (n, j); F is judged at every joint, against the
+    critical value for n samples unless `critical` is given.
     """
     q = np.asarray(postures, dtype=np.float64)
     bound = critical_value(samples=len(q)) if critical is None else critical

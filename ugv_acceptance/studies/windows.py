@@ -1,8 +1,8 @@
-"""Sliding-window bounds of a table whose value depends on i + j alone.
+"""Tests fast which cells of a grid lie between bounds, if a cell depends on i + j only.
 
 On a grid of equal steps cos(a_i + b_j) has only n + m - 1 values. They are ranked once; each row's
 two bounds become ranks too, so that a cell costs one 16-bit subtraction and one comparison. Ranks
-keep the order of floats: the booleans are those of comparing the floats.
+keep the order of floats, so the result is the same as comparing the floats.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -15,12 +15,15 @@ from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 
-# Rows a block: its 16-bit temporary (a quarter of a megabyte) stays in the cache.
+# Rows per block: its 16-bit temporary (a quarter of a megabyte) stays in the cache.
 _ROWS = 64
 
 
 def window_between(table: Floats, lower: Floats, upper: Floats, workers: int = 1) -> Mask:
-    """Return lower[i] <= table[i + j] <= upper[i], shape (n, m) for a table of n + m - 1."""
+    """Return whether lower[i] <= table[i + j] <= upper[i], shape (n, m).
+
+    `lower` and `upper` are (n,), `table` is (n + m - 1,).
+    """
     n = len(lower)
     m = len(table) - n + 1
     kind = np.uint16 if len(table) < 2**16 else np.uint32

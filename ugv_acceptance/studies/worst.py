@@ -1,6 +1,6 @@
 """Worst and safe positions of one joint in closed form: equations (3) to (8).
 
-Over one turning joint every static torque is c + R cos(x - phase); three postures tell it.
+Over one rotary joint every static torque is c + R cos(x - phase); three postures determine it.
 """
 
 import math
@@ -15,13 +15,16 @@ from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.studies.intervals import TURN, Intervals, intersect, where_cosine_between
 from ugv_acceptance.type_aliases import Floats
 
-# A wave of less (N m) is none: the joint moves nothing that this torque feels.
+# An amplitude below this (N m) counts as none: the moved joint does not load the other.
 _FLAT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waves:
-    """Each joint's torque over one joint's position x: mean + radius cos(x - phase), all (j,)."""
+    """Each joint's torque over one joint's position x: mean + radius cos(x - phase).
+
+    All (j,): `mean` and `radius` in N m (N if prismatic), `phase` in rad.
+    """
 
     mean: Floats
     radius: Floats
@@ -31,9 +34,9 @@ class Waves:
 def torque_waves(
     robot: Robot, q: ArrayLike, joint: str, gravity: ArrayLike, payload: Payload | None = None
 ) -> Waves:
-    """Return the torques (N m) over the position of `joint`, the others as in `q` (j,).
+    """Return every joint's torque as a sinusoid of the position of `joint`, others as in `q` (j,).
 
-    Raises BadConfig where the joint slides: its torques are no waves.
+    Raises BadConfig if the joint is prismatic: its torques are not sinusoidal.
     """
     if robot.joint(joint).kind == 'prismatic':
         raise BadConfig(f'joint {joint}: expected a turning joint, it slides')
@@ -48,7 +51,7 @@ def torque_waves(
 def worst_positions(waves: Waves, loaded: int) -> tuple[float, ...]:
     """Return the positions in [0, 2 pi) at which joint number `loaded` has the largest |torque|.
 
-    One, or two where both signs are equally bad; none where the moved joint does not load it.
+    One, or two if both signs are equally bad; none if the moved joint does not load it.
     """
     mean, radius, phase = (float(x[loaded]) for x in (waves.mean, waves.radius, waves.phase))
     if radius < _FLAT:
