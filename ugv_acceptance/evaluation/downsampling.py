@@ -1,4 +1,4 @@
-"""Thins a run to a bounded number of samples or columns, however long it is."""
+"""Thins a run to a bounded number of samples (Sampler) or of intervals for a chart (Strips)."""
 
 from dataclasses import dataclass, field
 
@@ -9,15 +9,15 @@ from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Floats, Times
 
-# Of more samples than this every second one is dropped, and as many fewer are taken from then on.
+# Above this number of samples every second one is dropped, and the spacing is doubled.
 MOST_SAMPLES = 40_000
 
 
 @dataclass(slots=True)
 class Sampler:
-    """Keeps a row a slot of `spacing` (ns) at most, and of over MOST_SAMPLES only every second.
+    """Keeps at most one known row per `spacing` (ns) and at most MOST_SAMPLES rows in all.
 
-    A row is `effort`, `torque`, `rate` and position of the joints (j each) and gravity (3).
+    A row is effort, torque, rate and position of the joints (j each) and gravity (3).
     """
 
     spacing: int
@@ -27,7 +27,7 @@ class Sampler:
     _slot: int = -1
 
     def add(self, rows: MarginRows, *, standing: bool = False) -> None:
-        """Take the next stretch of margins; with `standing` none of a robot that has tipped."""
+        """Take the margins of the next part of the recording; `standing` skips a tipped robot."""
         if not len(rows.time):
             return
         slots = rows.time // self.spacing
@@ -70,10 +70,11 @@ MOST_STRIPS = 150_000
 
 @dataclass(frozen=True, slots=True)
 class Strips:
-    """Columns (n,) in order of time: `time` in s since the start of the recording.
+    """A recording summed up in n short intervals, for charts: the worst margins of each.
 
-    `torque` (n, j) is the largest magnitude (N m; N), `angle` (n,) the smallest tilt left (rad),
-    NaN where unknown; `q` (n, j) the last posture.
+    `time` (n,) in s since the start of the recording; `torque` (n, j) is the largest magnitude
+    (N m; N), `angle` (n,) the smallest tilt left (rad), NaN where unknown; `q` (n, j) the last
+    posture.
     """
 
     time: Floats
@@ -84,7 +85,10 @@ class Strips:
 
 @dataclass(slots=True)
 class StripRecorder:
-    """Takes margins stretch by stretch; `start` is the recording's start (ns)."""
+    """Builds Strips while a recording is read; `start` is the recording's start (ns).
+
+    Intervals are 50 ms (WIDTH) long, and twice as long whenever there are over MOST_STRIPS.
+    """
 
     settings: Settings
     start: int
@@ -93,7 +97,7 @@ class StripRecorder:
     _width: int = WIDTH
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         if not len(rows.time):
             return
         first, last = self._slots(rows.time)
@@ -109,12 +113,12 @@ class StripRecorder:
             self._merge()
 
     def _slots(self, time: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Return the first and the last row of every column."""
+        """Return the first and the last row of every interval."""
         first = np.flatnonzero(np.diff(time // self._width, prepend=-1))
         return first, np.append(first[1:], len(time)) - 1
 
     def _merge(self) -> None:
-        """Make columns twice as wide."""
+        """Make the intervals twice as long."""
         self._width *= 2
         n = len(self.settings.joints)
         time, table = self._all()
@@ -130,7 +134,7 @@ class StripRecorder:
         return np.concatenate([t for t, _ in parts]), np.concatenate([x for _, x in parts])
 
     def strips(self) -> Strips:
-        """Return what was taken."""
+        """Return the intervals recorded so far."""
         n = len(self.settings.joints)
         time, held = self._all()
         table = held.astype(np.float64)

@@ -1,4 +1,7 @@
-"""Evaluates a running robot: each message gives the margins of the newest pair at once."""
+"""Evaluates a running robot: every joint or IMU message at once gives new margins and alerts.
+
+The counterpart for recordings is recorded.py, which gives the same margins and alerts.
+"""
 
 import math
 from collections.abc import Sequence
@@ -22,9 +25,10 @@ from ugv_acceptance.model.statics import torque_of
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """The margins of one pair of joints and attitude: `time` of receipt and header `stamp` (ns).
+    """The margins of the newest joint positions and gravity at one message.
 
-    `torque` is the static torque of each joint (N m; N); `stability` the tip-over margins.
+    `time` is that of receipt, `stamp` that of the header (ns). `q` (j,) rad or m, `gravity` (3,)
+    m/s2 in `base_link`, `torque` (j,) static (N m; N), `stability` the tip-over margins.
     """
 
     time: int
@@ -39,7 +43,8 @@ class Margins:
 class LiveEvaluator:
     """Takes messages as numbers with their receipt time (ns); holds the newest margins and alerts.
 
-    `margins` is None while they are not known: an input missing, stale or not to be used.
+    `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
+    the alert rules and the log of alerts, `evaluated` counts the margins computed.
     """
 
     settings: Settings
@@ -66,7 +71,7 @@ class LiveEvaluator:
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
 
     def start(self, now: int) -> None:
-        """Say when listening began: an input that never comes is stale from then on."""
+        """Begin to listen at `now` (ns), from when on a silent input counts as silent."""
         for fresh in self._fresh:
             fresh.started = now
         self._began = now
@@ -80,9 +85,9 @@ class LiveEvaluator:
         velocity: Sequence[float],
         effort: Sequence[float],
     ) -> Margins | None:
-        """Take a JointState; return the margins of the newest pair, None where they are unknown.
+        """Take a JointState message; return the new margins, None if they are unknown.
 
-        A message that names none of the robot's joints is no event at all.
+        A message that names none of the robot's joints is ignored.
         """
         joints, watch = self._joints, self.watch
         if not joints.merge(now, names, position, velocity, effort):
@@ -92,7 +97,7 @@ class LiveEvaluator:
         unusable = not known and any(
             t != NEVER and math.isnan(q) for q, t in zip(joints.q, joints.seen, strict=True)
         )
-        # Here and below: a quiet signal has nothing to do with a small value; most calls are saved.
+        # Here and below: a small value cannot change a quiet signal, so most calls are saved.
         if unusable or not watch.joints.invalid.quiet:
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
         old = now - min(joints.seen) > self._fresh[0].limit
@@ -131,7 +136,7 @@ class LiveEvaluator:
         return self._evaluate(now, stamp)
 
     def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
-        """Take a declared payload (kg, m); it counts from the next joint state on."""
+        """Take a declared payload (kg, m), in force from the next joint state on."""
         payload = payload_from(self.settings.robot, mass, com, frame)
         self.watch.payload.step(now, 0.0 if payload else 1.0)
         if payload:
@@ -140,7 +145,7 @@ class LiveEvaluator:
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits, delays and payload from now on; the robot's joints are the same.
 
-        What was learnt and what is active stays; an active alert is worded by its own rule.
+        Learnt periods and active alerts stay; an active alert keeps the rule it was raised by.
         """
         if settings.robot.payload != self.settings.robot.payload:
             self.payload = settings.robot.payload
@@ -151,7 +156,7 @@ class LiveEvaluator:
             fresh.judge_by(settings.delays)
 
     def tick(self, now: int) -> None:
-        """Let time pass without a message: silence and delays are judged."""
+        """Let time pass to `now` (ns) without a message: judge silence, delays and predictions."""
         for fresh, signals in zip(self._fresh, (self.watch.joints, self.watch.imu), strict=True):
             due = fresh.deadline
             if due is not None and now > due:
@@ -171,12 +176,12 @@ class LiveEvaluator:
 
     @property
     def orientations(self) -> dict[str, int]:
-        """How many messages' orientation was used, not given, told nothing."""
+        """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     @property
     def level(self) -> int:
-        """The most severe level now: STALE where the margins are not known."""
+        """The most severe level of the active alerts; at least STALE while margins are unknown."""
         active = [alert.rule.level for alert in self.watch.active]
         return max([*active, OK if self.margins else STALE])
 

@@ -1,4 +1,4 @@
-"""The margins of a part of a recording as columns: what everyone who goes on takes."""
+"""The margins of a part of a recording as columns, which summary, criteria and files work on."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,10 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """The newest message of each input at every row: row numbers `of_joints` and `of_imu` (n,)."""
+    """Which joint row and which IMU row were the newest at every row of margins.
+
+    `of_joints` and `of_imu` (n,) are row numbers in `joints` and `imu`.
+    """
 
     joints: JointRows
     imu: ImuRows
@@ -22,12 +25,12 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True)
 class MarginRows:
-    """Margins of a stretch of a recording, one row a message of either input, in order of receipt.
+    """Margins of a part of a recording, one row a message of either input, in order of receipt.
 
-    `until` (ns) is how long a row holds: to the next message or until an input is stale; `known`
-    says which rows have margins, the others are NaN and their `state` is UNKNOWN. Torques (n, j)
-    in N m (N), angles (n, 4) rad to SIDES. Moments (n, 4) N m, energies (n, 4) J and ZMP distance
-    (n,) m are empty unless the evaluator was asked for them.
+    `time` of receipt, `stamp` of the header (ns). `until` (ns) is how long a row holds: to the next
+    message or until an input is stale. `known` says which rows have margins; the others are NaN and
+    their `state` is UNKNOWN. Torques (n, j) in N m (N), angles (n, 4) rad to SIDES. Moments (n, 4)
+    N m, energies (n, 4) J and ZMP distance (n,) m are empty unless the evaluator computes them.
     """
 
     time: Times
@@ -49,7 +52,7 @@ class MarginRows:
 
     @property
     def qd(self) -> Floats:
-        """Joint rates (n, j), NaN where not reported."""
+        """Joint rates (n, j), rad/s or m/s, NaN where not reported."""
         return self.pairs.joints.qd[self.pairs.of_joints]
 
     @property

@@ -1,7 +1,8 @@
-"""The ranges of limits, delays and thresholds, and which of them are relaxed.
+"""The permitted ranges of limits, delays and thresholds, and which values are relaxed beyond them.
 
-A value outside its range would disarm a rule: it is refused, in a file and as a parameter alike,
-unless a reason is given (`unsafe_limits`). Then it is taken, and told as long as it is in force.
+A value outside its range would disable a rule: it is refused, in a file and as a parameter alike,
+unless a reason is given (`unsafe_limits`). Then it is accepted, and reported as long as it is in
+force.
 """
 
 import hashlib
@@ -16,17 +17,17 @@ from ugv_acceptance.evaluation.settings import Settings
 UNITS = {'deg': math.pi / 180.0}
 # Rounding of a unit's conversion, as a share of the bound.
 SLACK = 1e-9
-# Letters of a reason at most: it is told in every verdict.
+# Most characters of a reason, because every verdict repeats it.
 LONGEST_REASON = 200
 UNSAFE = 'unsafe_limits'
 
 
 @dataclass(frozen=True, slots=True)
 class Permitted:
-    """A setting's range, in its `unit` ('': none): `least` to `most`, with a reason `floor` on.
+    """The permitted range of one setting: `least` to `most`, with a reason `floor` to `ceiling`.
 
-    `part` and `key` are its fields in Settings, `name` its parameter, `path` its keys in a file.
-    `live`: it can be set while the monitor runs; `what` says what it is.
+    In `unit` ('': none). `part` and `key` are its fields in Settings, `name` its ROS parameter,
+    `path` its keys in a file. `live`: it can be set while the monitor runs; `what` describes it.
     """
 
     part: str
@@ -52,24 +53,24 @@ class Permitted:
 
     @property
     def factor(self) -> float:
-        """What a value in `unit` is multiplied by for SI."""
+        """Factor that converts a value from `unit` to SI."""
         return UNITS.get(self.unit, 1.0)
 
     @property
     def words(self) -> str:
-        """What is expected of a value."""
+        """The permitted range in words, for error messages."""
         return (
             f'{self.least:g} to {self.most:g}, or with {UNSAFE} and a reason '
             f'{self.floor:g} to {self.ceiling:g}'
         )
 
     def value(self, settings: Settings) -> float:
-        """Return the value in force, in `unit`."""
+        """Return the value of this setting in `settings`, in `unit`."""
         return float(getattr(getattr(settings, self.part), self.key)) / self.factor
 
 
-# Part, key, unit, least, most, floor, ceiling, what. A range ends where a rule would begin to be
-# silent (or, as with a deadband, never to end); its other end keeps out what cannot be meant.
+# Part, key, unit, least, most, floor, ceiling, what. One end of a range is where a rule would never
+# raise an alert (or, for a deadband, never end one); the other end excludes mistakes.
 _LIVE = (
     ('limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for WARN'),
     ('limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for ERROR'),
@@ -96,7 +97,7 @@ _AT_REST = (
     ('robot', 'contact_tolerance', 'm', 1e-9, 0.05, 1e-9, 1.0, 'how near the ground is on it'),
     ('robot', 'gravity', 'mps2', 9.7, 9.9, 0.01, 100.0, 'gravity, m/s2'),
 )
-# Where a file has other keys than Settings.
+# Settings whose keys in a file differ from their fields.
 _WRITTEN = {'contact_tolerance': ('ground', 'tolerance'), 'gravity': ('gravity',)}
 RANGES = (
     *(Permitted(*row) for row in _LIVE),
@@ -106,9 +107,9 @@ RANGES = (
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """A value outside its range: its parameter's name, keys in a file, value and what is expected.
+    """A value outside its permitted range: parameter name, keys in a file, value, expected range.
 
-    `never`: no reason helps.
+    `never`: it is refused even with a reason.
     """
 
     name: str
@@ -119,24 +120,24 @@ class Breach:
 
     @property
     def refusal(self) -> str:
-        """Say what was expected and what came, without the name."""
+        """Say what was expected and what was given, without the name."""
         return f'expected {self.expected}, got {self.value:g}'
 
     @property
     def words(self) -> str:
-        """Say what is in force, and what it may be."""
+        """Say which value is in force, and which range is permitted."""
         return f'{self.name} is {self.value:g} ({self.expected.partition(",")[0]} is permitted)'
 
 
 def torque_name(settings: Settings, j: int) -> str:
-    """Return the parameter of a joint's limit."""
+    """Return the parameter name of joint number j's limit, such as joints.elbow.limit_nm."""
     joint = settings.robot.joint_names[j]
     unit = 'n' if settings.robot.joint(joint).kind == 'prismatic' else 'nm'
     return f'joints.{joint}.limit_{unit}'
 
 
 def names_of(settings: Settings) -> tuple[str, ...]:
-    """Return the names of all that has a range, of the joints' limits too."""
+    """Return the parameter names of all settings with a range, joint limits included."""
     joints = range(len(settings.robot.joint_names))
     return (*(p.name for p in RANGES), *(torque_name(settings, j) for j in joints))
 
@@ -164,18 +165,18 @@ def _within(value: float, least: float, most: float) -> bool:
 
 
 def refused(settings: Settings) -> Breach | None:
-    """Return the first value that cannot be taken; None: all can."""
+    """Return the first value that is refused, None if all are accepted."""
     found = (b for b in breaches(settings) if b.never or not settings.unsafe)
     return next(found, None)
 
 
 def relaxed(settings: Settings) -> list[Breach]:
-    """Return the values that only a reason permits, in force now."""
+    """Return the values outside their range that are in force, which only a reason permits."""
     return list(breaches(settings))
 
 
 def relaxed_words(settings: Settings) -> str:
-    """Return which limits are relaxed and why, as one sentence; empty: none is."""
+    """Return which limits are relaxed and why, as one sentence; '' if none is."""
     found = relaxed(settings)
     if not found:
         return ''
@@ -183,7 +184,7 @@ def relaxed_words(settings: Settings) -> str:
 
 
 def checked_reason(text: str) -> str:
-    """Return a reason for relaxed limits. Raises ValueError where it says nothing, or too much."""
+    """Return a reason for relaxed limits, stripped; ValueError if it is empty or too long."""
     reason = text.strip()
     if not reason or len(reason) > LONGEST_REASON or not reason.isprintable():
         raise ValueError(
@@ -194,15 +195,16 @@ def checked_reason(text: str) -> str:
 
 
 def limits_hash(settings: Settings) -> str:
-    """Return 16 hex digits of what alerts are judged by: limits, delays, the IMU's thresholds.
+    """Return a hash (16 hex digits) of everything alerts are judged by.
 
-    Nine digits of each number count, so that no rounding of a unit's conversion changes it.
+    That is limits, delays and the IMU's thresholds. Numbers count with nine digits, so that
+    rounding in unit conversions does not change it.
     """
     limits, imu = asdict(settings.limits), asdict(settings.imu)
     names = settings.robot.joint_names
     for key in ('torque', 'speed'):
         limits[key] = dict(zip(names, limits[key] or (math.inf,) * len(names), strict=True))
-    for key in ('mounting', 'position', 'frame'):  # where it sits, not what is judged
+    for key in ('mounting', 'position', 'frame'):  # the IMU's place is not a threshold
         del imu[key]
     del limits['rated']
     told = {'limits': limits, 'delays': asdict(settings.delays), 'imu': imu}

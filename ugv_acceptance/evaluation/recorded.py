@@ -1,4 +1,7 @@
-"""Evaluates a recording: batches of columns in, margins out, by the same rules as live."""
+"""Evaluates a recording: batches of message columns in, margins and alerts out.
+
+By the same rules as live.py: a recording gives the margins and alerts that the live stream gave.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields
@@ -30,16 +33,19 @@ from ugv_acceptance.model.stability import (
 )
 from ugv_acceptance.type_aliases import Floats, Times
 
-# A stretch of silence (ns): from when the input was stale to its next message.
+# A period of silence (ns): from when the input became stale to its next message.
 Gap = tuple[int, int]
 
-# A row that stands for "no message yet".
+# Time and row number that stand for "no message yet".
 NEVER = -1
 
 
 @dataclass(frozen=True, slots=True)
 class _Newest:
-    """Rows of both inputs of a stretch, each led by the newest row of the stretch before."""
+    """The rows of both inputs in a batch, each preceded by the newest row of the batch before.
+
+    `joints_until`, `imu_until` (ns) are when each row becomes stale.
+    """
 
     joints: JointRows
     joints_until: Times
@@ -51,7 +57,8 @@ class _Newest:
 class RecordedEvaluator:
     """Takes the batches of a recording in order; `watch.log` holds the alerts at the end.
 
-    Moments, energies and ZMP are computed only with `detail`.
+    Moments, energies and ZMP are computed only with `detail`. `fresh` are the timeouts and `gaps`
+    the periods of silence (ns) of joint states and IMU.
     """
 
     settings: Settings
@@ -81,17 +88,17 @@ class RecordedEvaluator:
 
     @property
     def orientations(self) -> dict[str, int]:
-        """How many messages' orientation was used, not given, told nothing."""
+        """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     def start(self, now: int) -> None:
-        """Say when the recording began: an input that never comes is stale from then on."""
+        """Begin at the recording's start, `now` (ns), from when on a silent input is silent."""
         for fresh in self.fresh:
             fresh.started = now
         self.watch.relax(now)
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended: what fell due until then is judged."""
+        """Finish at the recording's end, `now` (ns): judge what becomes due until then."""
         inputs = (self.watch.joints, self.watch.imu)
         for fresh, signals, gaps in zip(self.fresh, inputs, self.gaps, strict=True):
             due = fresh.deadline
@@ -102,7 +109,10 @@ class RecordedEvaluator:
             signal.advance(now)
 
     def batch(self, batch: Batch) -> MarginRows:
-        """Take a batch; return the margins of its messages (all but `until` of the last known)."""
+        """Take a batch; return the margins of its messages; the last row's `until` is provisional.
+
+        It is when an input becomes stale, unless the next batch brings a message before.
+        """
         joints = self._joints.merge_columns(batch.joints)
         imu = self._imu.columns(batch.imu)
         joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
@@ -156,7 +166,7 @@ class RecordedEvaluator:
                 self._payload.declare(when, payload)
 
     def _margins(self, newest: _Newest) -> MarginRows:
-        """Return the margins of every message after the leading rows."""
+        """Return the margins of every message of the batch (not of the preceding rows)."""
         joints, imu = newest.joints, newest.imu
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
@@ -186,7 +196,10 @@ class RecordedEvaluator:
     def _table(
         self, pairs: Pairs, whole: NDArray[np.bool_], known: NDArray[np.bool_]
     ) -> tuple[Floats, NDArray[np.int8]]:
-        """Return torques, angles and what `detail` adds (lines of a table), and the states."""
+        """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
+
+        `whole` says which joint rows have all positions, `known` which rows have margins.
+        """
         q = pairs.joints.q
         payload = self._payload.at(pairs.joints.time)
         n = q.shape[1]
@@ -217,7 +230,7 @@ class RecordedEvaluator:
     def _stances(
         self, posture: Posture, count: int, j: NDArray[np.intp]
     ) -> Iterator[tuple[Rows, Stance]]:
-        """Yield the stances of the messages whose joint rows are `j`, each with its messages."""
+        """Yield each stance of `count` joint rows with its messages, whose joint rows are `j`."""
         place = np.empty(count, np.intp)
         for of, stance in stances_of(self._mechanics, posture, count):
             if of is ALL:
@@ -259,14 +272,14 @@ class RecordedEvaluator:
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401
-    """Return lever . gravity where the lever's numbers are floats or arrays of joint rows."""
+    """Return the static torque gradient . gravity; the gradient's numbers are floats or arrays."""
     x, y, z = pick(torque_gradient, rows)
     product: Floats = x * gravity[0] + y * gravity[1] + z * gravity[2]
     return product
 
 
 def _lead(before: Any, rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows
-    """Return `rows` led by the newest row of the stretch before."""
+    """Return `rows` preceded by the newest row of the batch before."""
     names = [f.name for f in fields(rows)]
     return type(rows)(*(np.concatenate((getattr(before, n), getattr(rows, n))) for n in names))
 

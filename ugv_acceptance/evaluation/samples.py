@@ -17,8 +17,8 @@ class JointStateColumns:
     """Messages of sensor_msgs/JointState that all carry the same `names`.
 
     `position`, `velocity`, `effort` have shape (n, len(names)), or (n, 0) where the messages
-    leave that array empty. Messages whose arrays have any other length are not columns: they are
-    counted as malformed by who decodes.
+    leave that array empty. Messages whose arrays have any other length are left out: the decoder
+    counts them as malformed.
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ class PayloadColumns:
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A stretch of a recording: no message of the next batch was logged before the last of this."""
+    """A part of a recording: no message of the next batch was logged before the last of this."""
 
     joints: Sequence[JointStateColumns] = field(default=())
     imu: Sequence[ImuColumns] = field(default=())

@@ -1,7 +1,7 @@
 """Settings of an evaluation: joints in messages, IMU, limits, delays of alerts.
 
 Joint order is `robot.joint_names`. SI and radians; times in seconds. `config` makes these from a
-YAML file and checks them; nothing here checks again.
+YAML file and validates them; they are not validated again here.
 """
 
 from dataclasses import dataclass
@@ -25,12 +25,14 @@ class JointInput:
 
 @dataclass(frozen=True, slots=True)
 class ImuInput:
-    """How the IMU sits on the robot and what of it is used.
+    """How the IMU is mounted on the robot, and how its messages are used.
 
-    `mounting` turns sensor axes into `base_link`, `position` is the sensor in `base_link` (m).
-    `attitude` is auto (orientation where it can be trusted, else accelerometer), orientation or
-    accelerometer. With `specific_force` the accelerometer takes gravity's place in every margin.
-    `frame` is the frame its messages name; '': not checked.
+    `mounting` rotates sensor axes into `base_link`, `position` is the sensor in `base_link` (m).
+    `attitude` is auto (orientation if it can be trusted, else accelerometer), orientation or
+    accelerometer. With `specific_force` the accelerometer replaces gravity in every margin.
+    `low_pass` (s) is the filter's time constant; `rest_acceleration` (m/s2) and `rest_rate` (rad/s)
+    define rest; `agreement` (rad) is how far orientation and accelerometer may differ at rest, for
+    at most `agreement_delay` (s). `frame` is the frame its messages must name; '': not checked.
     """
 
     mounting: Matrix = IDENTITY
@@ -47,13 +49,14 @@ class ImuInput:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Where margins turn into levels. WARN from `*_warn`, ERROR from `*_error`.
+    """The limits that turn margins into levels: WARN from `*_warn`, ERROR from `*_error` on.
 
-    `torque` limit of each joint (N m or N; infinite: not judged); `torque_warn` and `torque_error`
-    are utilisations |tau| / limit. Tip angles are the tilt left (rad). `speed` is the joint rate
-    (rad/s or m/s) to which the static model was shown valid; infinite: not judged. `friction` is
-    that of the tracks on the ground; infinite: not known. `rated` are the joints' limits as
-    configured, beyond which `torque` is relaxed (empty: not known).
+    `torque` is the limit of each joint (N m or N; infinite: not judged); `torque_warn` and
+    `torque_error` are utilisations |tau| / limit. Tip angles are the tilt left (rad). Deadbands are
+    in N m (N) and rad. `speed` is the joint rate (rad/s or m/s) up to which the static model is
+    valid; infinite: not judged. `friction` is that of the tracks on the ground; infinite: not
+    known. `rated` are the joints' limits as configured, beyond which `torque` is relaxed (empty:
+    not known).
     """
 
     torque: tuple[float, ...]
@@ -89,9 +92,9 @@ class Delays:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything an evaluation needs beside the messages. `joints` follows `robot.joint_names`.
+    """Everything an evaluation needs besides the messages; `joints` follows `robot.joint_names`.
 
-    `unsafe` is why limits are wider than permitted.py says; empty: none is.
+    `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is.
     """
 
     robot: Robot

@@ -21,9 +21,10 @@ MANAGEABLE, FLOOD_BEGINS, FLOOD_ENDS = 1.0, 10, 5
 
 @dataclass(frozen=True, slots=True)
 class AlarmRates:
-    """Alerts raised in a run: all, a ten-minute average, the most in any ten minutes.
+    """Alerts raised in a run: their number, ten-minute average, and most in any ten minutes.
 
-    A run shorter than ten minutes counts as ten. `floods` are (begin, end) in ns.
+    After ISA-18.2 and EEMUA 191. A run shorter than ten minutes counts as ten. `floods` are
+    (begin, end) in ns.
     """
 
     raised: int
@@ -33,12 +34,12 @@ class AlarmRates:
 
     @property
     def manageable(self) -> bool:
-        """Whether an operator can deal with it: at most one in ten minutes and no flood."""
+        """Whether an operator can handle the rate: at most one in ten minutes and no flood."""
         return self.average <= MANAGEABLE and not self.floods
 
 
 def alarm_rates(starts: Sequence[int], start: int, duration: int) -> AlarmRates:
-    """Return the rates of alerts raised at `starts` (ns, any order) in a run (ns)."""
+    """Return the rates of alerts raised at `starts` in a run from `start` of `duration`, all ns."""
     # Each alert enters the window when it is raised and leaves it a window later, leaving first.
     steps = sorted([*((t + WINDOW, -1) for t in starts), *((t, 1) for t in starts)])
     inside, peak, begin, end = 0, 0, None, start + duration
@@ -69,10 +70,10 @@ def rates_result(starts: Sequence[int], start: int, duration: int) -> dict[str, 
 
 @dataclass(frozen=True, slots=True)
 class AlertRecord:
-    """An alert of a run: its level is WARN, ERROR or STALE; times in s since the run began.
+    """An alert of a run for users: level WARN, ERROR or STALE; times in s since the run began.
 
-    `end_s` is None where it was active to the end. `peak` is the worst value in the unit of the
-    alert (degrees, N m, ...), None where it has none. `advice` says what to do.
+    `end_s` is None if it was active to the end. `peak` is the worst value in the unit of the alert
+    (degrees, N m, ...), None if it has none. `message` says what happened, `advice` what to do.
     """
 
     code: str
@@ -93,7 +94,7 @@ class Extreme:
     time: int = 0
 
     def see(self, values: NDArray[np.float64], times: NDArray[np.int64]) -> None:
-        """Take many values (NaN: unknown)."""
+        """Take many values (n,), NaN if unknown, with their times (n,) in ns."""
         if (values > self.value).any():
             k = int(np.nanargmax(values))
             self.value, self.time = float(values[k]), int(times[k])
@@ -101,7 +102,12 @@ class Extreme:
 
 @dataclass(slots=True)
 class Summary:
-    """Gathers margin rows stretch by stretch; times in ns, sums of time in ns."""
+    """Sums up the margins of a recording part by part; times and sums of time in ns.
+
+    `load` holds the largest |torque| of each joint (N m; N), `tip` the largest of minus the tilt
+    left (rad) to each of SIDES, `*_violation` the time beyond the ERROR limit, `states` the number
+    of messages in each stability state.
+    """
 
     settings: Settings
     evaluated: int = 0
@@ -119,7 +125,7 @@ class Summary:
         self.tip = [Extreme() for _ in SIDES]
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch."""
+        """Take the margins of the next part of the recording."""
         if not len(rows.time):
             return
         self._close(int(rows.time[0]))
@@ -148,11 +154,11 @@ class Summary:
             self._open = (*last, over[:, -1].tolist(), bool(tipping[-1]))
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended (ns)."""
+        """Finish at the end of the recording, `now` (ns)."""
         self._close(now)
 
     def _close(self, now: int) -> None:
-        """The last row holds until the next message, the input's deadline or the end."""
+        """Count the last row's time, now that the next message or the end (`now`, ns) is known."""
         if self._open is None:
             return
         time, until, over, tipping = self._open
@@ -173,9 +179,9 @@ def result_of(
     duration: int,
     told: Mapping[int, str] | None = None,
 ) -> dict[str, Any]:
-    """Return the part of a result that the margins and alerts decide, ready for JSON.
+    """Return the part of a result that follows from margins and alerts, ready for JSON.
 
-    `told` is what to do, computed, by an alert's `id`; the others get what helps in general.
+    `told` is the computed advice by an alert's `id`; other alerts get the general advice.
     """
     settings = summary.settings
     seconds = duration / 1e9
@@ -201,14 +207,14 @@ def result_of(
 
 
 def ordered(alerts: Sequence[Alert]) -> list[Alert]:
-    """Return alerts by start, code, subject and level: the same order whoever gathered them."""
+    """Return alerts sorted by start, code, subject and level, so that their order is unique."""
     return sorted(alerts, key=lambda a: (a.start, a.rule.code, a.rule.subject, a.rule.level))
 
 
 def alert_result(
     alert: Alert, settings: Settings, start: int, told: str | None = None
 ) -> dict[str, Any]:
-    """Return one alert for JSON; times in seconds since `start` (ns), `told` computed advice."""
+    """Return one alert for JSON; times in seconds since `start` (ns); `told` is computed advice."""
     rule = alert.rule
     return {
         'code': rule.code,

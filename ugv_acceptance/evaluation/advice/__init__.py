@@ -1,1 +1,6 @@
-"""What to do about a margin: the moves that help, live and for a recording."""
+"""Advice to the operator: which motion or action improves a margin that is too small.
+
+In: settings, joint positions, gravity and payload of one moment. Out: `Advice`, best first: move a
+joint, turn the robot, or set the load down, as a sentence with the gain. Read search.py first;
+paths.py makes the candidate motions, recorded.py gives advice for the alerts of a recording.
+"""

@@ -1,4 +1,4 @@
-"""Candidate motions: one joint moved one way, or the robot turned on the spot."""
+"""Candidate motions for advice: one joint moved in one direction, or the robot turned in place."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ from ugv_acceptance.model.stability import STANDING, stability
 from ugv_acceptance.model.tree import point_of, pose_of
 from ugv_acceptance.type_aliases import Floats
 
-# A path is followed this long (s), in so many steps; a joint that moves contact points in finer
-# ones (rad), since a point counts only while it is within the ground's tolerance.
+# Duration of a path (s) and its number of steps; a joint that moves contact points takes finer
+# steps (rad), since a contact counts only while it is within the ground's tolerance.
 HORIZON, STEPS, FINE = 4.0, 16, 0.01
-# Speed of a joint (rad/s; m/s) whose speed is not known, and the share of a known one to be used.
+# Speed assumed for a joint (rad/s; m/s) without a known speed; share of a known speed that is used.
 CAREFUL, SHARE = 0.3, 0.9
-# What an arm stays above the ground (m): joints, hand and load are no points.
+# Clearance of the arm above the ground (m), since joints, hand and load have a size.
 CLEARANCE = 0.06
 # Turning on the spot: rate and step (rad/s, rad), and the slope (as sin) from which it matters.
 TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(5.0)), 0.05
@@ -33,9 +33,11 @@ GRIP = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """Postures `q` (n, j) and gravity (n, 3) step by step after now; `amount` (n,) in rad or m.
+    """A candidate motion of `subject` (a joint, or 'robot') in n steps from the present posture.
 
-    `seconds` (n,) is the time each step is reached; `forbidden` (n,) is where it must not lead.
+    `q` (n, j) and `gravity` (n, 3) are posture and gravity after each step, `amount` (n,) the
+    motion so far (rad, or m if prismatic), `seconds` (n,) the time at which the step is reached.
+    `forbidden` (n,) marks steps that the motion must not reach.
     """
 
     subject: str
@@ -47,7 +49,7 @@ class Path:
 
 
 def joint_speed(settings: Settings, j: int) -> float:
-    """Return a speed (rad/s; m/s) at which joint j can move and the static model holds."""
+    """Return a speed (rad/s; m/s) that joint j can reach and at which the static model is valid."""
     robot, speeds = settings.robot, settings.limits.speed
     known = [robot.joint(robot.joint_names[j]).velocity, speeds[j] if speeds else np.inf]
     least = min(known)
@@ -55,7 +57,10 @@ def joint_speed(settings: Settings, j: int) -> float:
 
 
 def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) -> list[Path]:
-    """Return a path a joint and direction; none against a load that the motor does not hold."""
+    """Return one path per joint and direction, but none that lifts what the motor cannot hold.
+
+    `q` (j,) rad or m, `gravity` (3,) m/s2 in `base_link`, `torque` (j,) static, N m or N.
+    """
     robot = settings.robot
     found: list[Path] = []
     for j, name in enumerate(robot.joint_names):
@@ -73,7 +78,7 @@ def joint_paths(settings: Settings, q: Floats, gravity: Floats, torque: Floats) 
 
 
 def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
-    """Return the steps of a joint's path, which ends where the joint does."""
+    """Return the steps (n,) of a joint's path from `start` by `reach`, cut at the joint's limit."""
     end = float(np.clip(start + reach, joint.lower, joint.upper)) - start
     if np.sign(end) != np.sign(reach):
         return np.empty(0)
@@ -84,14 +89,14 @@ def _amounts(robot: Robot, joint: Joint, start: float, reach: float) -> Floats:
 
 
 def _moves_contacts(robot: Robot, link: str) -> bool:
-    """Return whether a contact point is on `link` or on what it carries."""
+    """Return whether a contact point is on `link` or on a link that it carries."""
     carried = [j.child for j in robot.joints if j.parent == link]
     here = any(contact.link == link for contact in robot.contacts)
     return here or any(_moves_contacts(robot, child) for child in carried)
 
 
 def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
-    """Return the paths, forbidden where the arm comes lower than CLEARANCE and than it is now."""
+    """Return the paths with steps forbidden where the arm is below CLEARANCE and lower than now."""
     if not paths:
         return paths
     height = _lowest(robot, np.vstack((q, *(path.q for path in paths))))
@@ -102,7 +107,7 @@ def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
 
 
 def _lowest(robot: Robot, q: Floats) -> Floats:
-    """Return the height (n,) in m, `base_link`, of the lowest joint of the arm, or of its load."""
+    """Return the height (n,) in m, `base_link`, of the arm's lowest joint or its load."""
     heights = _arm_heights(mechanics_of(robot)).run(*q.T)
     lowest: Floats = np.min([np.broadcast_to(z, len(q)) for z in (np.inf, *heights)], axis=0)
     return lowest
@@ -110,7 +115,10 @@ def _lowest(robot: Robot, q: Floats) -> Floats:
 
 @lru_cache(maxsize=16)
 def _arm_heights(mechanics: Mechanics) -> Kernel:
-    """Compile the heights (m) of the arm's joints and its load; what carries contacts is no arm."""
+    """Compile the heights (m) of the arm's joints and its load.
+
+    Joints that carry contact points, such as flippers, do not belong to the arm.
+    """
     robot, tree = mechanics.robot, mechanics.tree
     names = [body.joint for body in tree.bodies]
     arm = [
@@ -128,9 +136,9 @@ def _arm_heights(mechanics: Mechanics) -> Kernel:
 
 
 def turn_paths(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> Iterator[Path]:
-    """Yield a path to the left and one to the right, half a turn each; none on level ground.
+    """Yield a half turn to the left and one to the right; none on level ground.
 
-    Forbidden where the tracks do not share the weight: skid steering turns only what both push.
+    Steps are forbidden where one track carries too little weight: skid steering needs both.
     """
     across = float(np.hypot(gravity[0], gravity[1]))
     if across < LEVEL * float(np.linalg.norm(gravity)):
@@ -148,10 +156,10 @@ def turn_paths(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> It
 
 
 def _slips(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> NDArray[np.bool_]:
-    """Return where (n,) one track carries too little, or the robot stands on other points."""
+    """Return at which postures (n,) one track carries too little, or the robot is not on both."""
     found = stability(robot, q, gravity, payload)
     left, right = (np.asarray(found.moment[k], dtype=np.float64) for k in (1, 3))
-    # What holds a robot down on one side is carried by the other.
+    # The moment that holds the robot down about one side's edge is carried by the other side.
     shared = np.minimum(left, right) >= GRIP * (left + right)
     slips: NDArray[np.bool_] = ~(shared & (np.asarray(found.state) == STANDING))
     return slips

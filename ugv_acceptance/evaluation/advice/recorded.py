@@ -1,6 +1,7 @@
 """Advice for each alert of a recording, for the moment it was raised.
 
-A case is kept an alert, not a message; what costs milliseconds is done at the end, for so many.
+Posture and gravity are kept for each alert while the recording is read; the search itself, which
+takes milliseconds, runs at the end for at most MOST alerts.
 """
 
 from collections.abc import Callable
@@ -13,13 +14,13 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.type_aliases import Floats
 
-# Advice is computed for so many alerts of a run, the most severe first.
+# Advice is computed for at most this many alerts of a run, the most severe first.
 MOST = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moment:
-    """Positions (j,), gravity (3,) m/s2 in `base_link`, and when (ns) the joints were heard."""
+    """Joint positions (j,), gravity (3,) m/s2 in `base_link`, receipt time of the joints (ns)."""
 
     q: Floats
     gravity: Floats
@@ -28,7 +29,10 @@ class _Moment:
 
 @dataclass(slots=True)
 class AlertAdvice:
-    """Gathers the cases while a recording is read; `log` grows, `payload_at` takes a time (ns)."""
+    """Collects posture and gravity of each alert while a recording is read, and then its advice.
+
+    `log` is the evaluator's growing list of alerts; `payload_at` gives the payload at a time (ns).
+    """
 
     settings: Settings
     log: list[Alert]
@@ -38,7 +42,7 @@ class AlertAdvice:
     _last: _Moment | None = None
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins, after the log has its alerts."""
+        """Take the margins of the next part of the recording; its alerts must be in `log`."""
         for alert in self._fresh():
             k = int(rows.time.searchsorted(alert.start, side='right')) - 1
             moment = _moment(rows, k) if k >= 0 else self._last
@@ -53,9 +57,9 @@ class AlertAdvice:
         return fresh
 
     def sentences(self) -> dict[int, str]:
-        """Return what to do, by the alert's `id`; none where the model knows nothing better.
+        """Return the advice by the alert's `id`; alerts for which the model finds none are missing.
 
-        What fell due after the last message is judged by that.
+        For an alert raised after the last message the posture of that message is used.
         """
         if self._last is not None:
             self._cases.extend((alert, self._last) for alert in self._fresh())

@@ -1,9 +1,9 @@
-"""Searches advice: which motion helps the worst margin most, and its words.
+"""Searches for advice: which motion improves the worst margin most, and the sentence for it.
 
-Each candidate is a path, followed step by step with the compiled model: it is left where another
-margin falls below its warning limit, where a motor would have to lift more than it can, or where
-the robot would come to stand on other points. Of the paths that bring the margin back the fastest
-comes first, then the others by what they gain; turning, which shakes the robot, comes last.
+Each candidate is a path, followed step by step with the compiled model. It ends where another
+margin would fall below its warning limit, where a motor would have to lift more than it can, or
+where the robot would come to stand on other points. Of the paths that restore the margin the
+fastest comes first, then the others by gain; turning, which shakes the robot, comes last.
 """
 
 import math
@@ -21,7 +21,7 @@ from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
 from ugv_acceptance.model.statics import centre_of_gravity, payload_capacity
 from ugv_acceptance.type_aliases import Floats
 
-# A motion is up or down where the height is at least this share of the way.
+# A motion is called up or down if its height is at least this share of its length.
 STEEP = 0.35
 
 
@@ -46,7 +46,10 @@ def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
 
 
 def turn_words(amount: float, gravity: Floats) -> str:
-    """Return how to turn the robot, and what it then faces; `gravity` is that after the turn."""
+    """Return how to turn the robot by `amount` (rad), and if it then faces up- or downhill.
+
+    `gravity` (3,) is that after the turn, in `base_link`.
+    """
     side = 'left' if amount > 0.0 else 'right'
     downhill = math.degrees(math.atan2(gravity[1], gravity[0]))
     faces = ''
@@ -58,7 +61,7 @@ def turn_words(amount: float, gravity: Floats) -> str:
 
 
 def load_words(mass: float, holds: float | None) -> str:
-    """Return that the load is to be set down; `holds` (kg) is what this posture can hold."""
+    """Return the sentence that the load be set down; `holds` (kg) is what this posture can hold."""
     if holds is None or holds >= mass:
         return f'set the load of {mass:.1f} kg down'
     return f'set the load down: {mass:.1f} kg is {mass - holds:.1f} kg too heavy in this posture'
@@ -66,17 +69,17 @@ def load_words(mass: float, holds: float | None) -> str:
 
 # Codes of alerts whose advice is computed; their subject is the margin.
 COMPUTED = frozenset({'TIP_OVER', 'TORQUE_LIMIT'})
-# Slack of comparisons; a path that gains less than this share of the way from ERROR to WARN is
-# none.
+# Slack of comparisons; a path must gain at least this share of the way from ERROR to WARN.
 SLACK, LEAST_GAIN = 1e-6, 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """One thing to do. `kind` is joint, turn or payload; `amount` in rad (m where prismatic) or kg.
+    """One piece of advice: a motion or action, how long it takes and what a margin gains by it.
 
-    It takes `seconds`; the `margin`, a side or a joint, then gains `gain` (rad of tilt; N m or N of
-    torque), which is enough to end the warning where `enough`. `sentence` says it in plain words.
+    `kind` is joint, turn or payload; `amount` in rad (m if prismatic) or kg. After `seconds` the
+    `margin` (a side or a joint) has gained `gain` (rad of tilt; N m or N of torque); `enough` says
+    whether that ends the warning. `sentence` is for the operator.
     """
 
     kind: str
@@ -91,7 +94,11 @@ class Advice:
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """The situation: scores (m,) of all margins, the smallest one, its score that is enough."""
+    """The situation for which advice is searched.
+
+    `scores` (m,) of all margins (see `scores_of`), `worst` the number of the margin to improve,
+    `enough` the score at which its warning ends.
+    """
 
     settings: Settings
     q: Floats
@@ -105,24 +112,24 @@ class _Case:
 
     @property
     def subject(self) -> str:
-        """Name of the smallest margin."""
+        """Name of the margin to improve: a side or a joint."""
         return margin_names(self.settings)[self.worst]
 
     @property
     def tips(self) -> bool:
-        """Whether the smallest margin is one of tip-over."""
+        """Whether the margin to improve is a tip-over margin."""
         return self.worst < len(SIDES)
 
 
 def margin_names(settings: Settings) -> tuple[str, ...]:
-    """Return what the scores are of: the sides, then the joints."""
+    """Return the names of the margins in order of their scores: the sides, then the joints."""
     return (*SIDES, *settings.robot.joint_names)
 
 
 def scores_of(settings: Settings, torque: Floats, angle: Floats) -> Floats:
-    """Return each margin (..., 4 + j) so that WARN begins at 1 and ERROR at 0; unjudged: infinite.
+    """Return each margin (..., 4 + j) scaled so that WARN begins at 1 and ERROR at 0.
 
-    `torque` (..., j) in N m (N), `angle` (..., 4) in rad.
+    Infinite if not judged. `torque` (..., j) in N m (N), `angle` (..., 4) in rad.
     """
     limits = settings.limits
     tip, torque_span = _spans(settings)
@@ -134,7 +141,7 @@ def scores_of(settings: Settings, torque: Floats, angle: Floats) -> Floats:
 
 
 def _spans(settings: Settings) -> tuple[float, float]:
-    """Return how far WARN is from ERROR: in rad of tilt, and as a share of the torque's limit."""
+    """Return the distance from ERROR to WARN: rad of tilt, and as a share of the torque limit."""
     limits = settings.limits
     tip = max(limits.tip_warn - limits.tip_error, math.radians(0.5))
     return tip, max(limits.torque_error - limits.torque_warn, 0.02)
@@ -147,10 +154,10 @@ def advise(
     payload: Payload,
     of: str | None = None,
 ) -> tuple[Advice, ...]:
-    """Return what to do, the best first; nothing where the margin is above its warning limit.
+    """Return advice, the best first; none if the margin is above its warning limit or unknown.
 
-    `q` (j,), `gravity` (3,) m/s2 in `base_link`. The margin is `of` a side or joint, else the one
-    to speak of first. Nothing too where no margin is known.
+    `q` (j,) rad or m, `gravity` (3,) m/s2 in `base_link`. `of` names the margin to improve (a side
+    or a joint); None chooses the most severe one.
     """
     return advise_each(settings, [q], [gravity], payload, [of])[0]
 
@@ -162,9 +169,9 @@ def advise_each(
     payload: Payload,
     of: Sequence[str | None],
 ) -> list[tuple[Advice, ...]]:
-    """Return `advise` of many situations: `q` (n, j), `gravity` (n, 3), `of` (n,).
+    """Return `advise` for many situations: `q` (n, j), `gravity` (n, 3), `of` (n,).
 
-    All go through the model together: fifty then take little longer than one.
+    The model evaluates all together, so that fifty take little longer than one.
     """
     cases = _cases(settings, q, gravity, payload, of)
     warned = [case for case in cases if case is not None and case.scores[case.worst] < 1.0]
@@ -175,7 +182,7 @@ def advise_each(
 
 
 def _order(advice: Advice) -> tuple[bool, bool, float]:
-    """Enough comes first, then what is no turn, then the fastest; else what gains most."""
+    """Return the sort key: advice that is enough first, turns last; then by speed, else by gain."""
     by = advice.seconds if advice.enough else -advice.gain
     return not advice.enough, advice.kind == 'turn', by
 
@@ -187,7 +194,7 @@ def _cases(
     payload: Payload,
     of: Sequence[str | None],
 ) -> list[_Case | None]:
-    """Return the situations, None where no margin is known."""
+    """Return the situations; None if no margin is known."""
     at, down = np.array(q, dtype=np.float64), np.array(gravity, dtype=np.float64)
     now = margins(settings.robot, at, down, payload)
     with np.errstate(invalid='ignore'):
@@ -207,7 +214,7 @@ def _cases(
 
 
 def _enough(settings: Settings, worst: int) -> float:
-    """Return the score from which a margin's warning ends: beyond its deadband."""
+    """Return the score at which a margin's warning ends, its deadband included."""
     limits, (tip, span) = settings.limits, _spans(settings)
     if worst < len(SIDES):
         reserve = limits.tip_deadband / tip
@@ -217,7 +224,7 @@ def _enough(settings: Settings, worst: int) -> float:
 
 
 def _most_severe(scores: Floats) -> int:
-    """Return the margin to speak of: past ERROR first, of those a tip-over, then the least."""
+    """Return the number of the most severe margin: by level, then tip-over first, then by score."""
     order = [
         (int(score > 0.0) + int(score >= 1.0), k >= len(SIDES), score)
         for k, score in enumerate(scores.tolist())
@@ -235,7 +242,7 @@ def _paths(case: _Case) -> Iterator[tuple[_Case, Path]]:
 
 
 def _ends(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Path, int, float, bool]]:
-    """Yield every path that gains something, and where to stop as `_end` says."""
+    """Yield every path that gains something, with step, score and `enough` as `_end` gives them."""
     paths = [found for case in cases for found in _paths(case)]
     if not paths:
         return
@@ -254,7 +261,10 @@ def _ends(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Path, int, float, boo
 def _end(
     case: _Case, scores: Floats, forbidden: NDArray[np.bool_]
 ) -> tuple[int, float, bool] | None:
-    """Return the step at which to stop, what the worst margin scores there, and if it is enough."""
+    """Return the step at which to stop, the worst margin's score there, and whether it is enough.
+
+    None if the path gains too little. `scores` (n, m) are those of every step.
+    """
     floor = np.minimum(case.scores, 1.0)
     floor[case.worst] = case.scores[case.worst]
     bad = ~(scores >= floor - SLACK).all(axis=1) | forbidden
@@ -265,14 +275,14 @@ def _end(
         return int(reached[0]), float(mine[reached[0]]), True
     if not last or not mine.max() > case.scores[case.worst] + LEAST_GAIN:
         return None
-    # Stop where nearly all that can be gained is gained.
+    # Stop at 95 % of the possible gain.
     gained = mine - case.scores[case.worst]
     k = int(np.argmax(gained >= 0.95 * gained.max()))
     return k, float(mine[k]), False
 
 
 def _gain(case: _Case, score: float) -> float:
-    """Return a score's gain in rad of tilt, N m or N."""
+    """Return the gain of a score over the present one, in rad of tilt, N m or N."""
     tip, span = _spans(case.settings)
     more = score - float(case.scores[case.worst])
     if case.tips:
@@ -295,14 +305,14 @@ def _moves(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
 
 
 def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
-    """Setting the load down: how much of it is too much, and what is gained without it."""
+    """Yield the advice to set the load down, with the excess mass and the gain without the load."""
     if not cases or cases[0].payload.mass <= 0.0:
         return
     settings, payload = cases[0].settings, cases[0].payload
     q, down = (np.array([getattr(case, name) for case in cases]) for name in ('q', 'gravity'))
     found = margins(settings.robot, q, down, Payload(0.0, payload.cog))
     scores = scores_of(settings, found.torque, found.angle)
-    # The mass that no joint's warning limit forbids in this posture.
+    # The largest mass within every joint's warning limit in this posture.
     torque = settings.limits.torque_warn * np.array(settings.limits.torque)
     holds = np.maximum(payload_capacity(settings.robot, q, down, torque), 0.0).tolist()
     for case, mine, held in zip(cases, scores, holds, strict=True):
@@ -312,7 +322,7 @@ def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
         gain, enough = _gain(case, score), score >= 1.0
         words = load_words(payload.mass, None if case.tips else held)
         sentence = f'{words}: {_gain_words(case, gain)}'
-        # Nobody sets a load down as fast as a joint moves: it comes after what moves in time.
+        # Setting a load down takes longer than moving a joint, so motions are sorted before it.
         told = Advice(
             'payload', 'payload', -payload.mass, 10.0, case.subject, gain, enough, sentence
         )

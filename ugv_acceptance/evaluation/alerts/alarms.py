@@ -1,7 +1,7 @@
 """Alarm management (ISA-18.2, IEC 62682): acknowledged, shelved, latched.
 
-An alert is active or over; an alarm also remembers whether somebody acknowledged it. Pure: events
-and their times (ns) come in, changes go out.
+An alert is active or over; an alarm also remembers whether somebody acknowledged it. Without a
+clock: every event comes with its time (ns), every method returns the changes it caused.
 """
 
 from dataclasses import dataclass, field
@@ -10,7 +10,8 @@ from enum import Enum
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 
-# What stays after it is over and was seen, until a person resets it: the robot may lie on its side.
+# Codes of alarms that stay, over and acknowledged, until a person resets them: the robot may lie on
+# its side.
 LATCHING = frozenset({'TIP_OVER', 'NO_SUPPORT'})
 # Longest shelving (ns).
 LONGEST_SHELVING = 600 * 1_000_000_000
@@ -39,8 +40,8 @@ class State(Enum):
         return self in {State.ACTIVE_UNACKNOWLEDGED, State.RETURNED_UNACKNOWLEDGED}
 
 
-# (state, event) -> state; what is not here changes nothing. AFTERWARDS stands for what follows when
-# an alarm is over and seen: NORMAL, or LATCHED for one that latches.
+# (state, event) -> state; a pair that is not here changes nothing. _AFTERWARDS is the state of an
+# alarm that is over and acknowledged: LATCHED for one that latches, else NORMAL (`next_state`).
 _AFTERWARDS = State.LATCHED
 TRANSITIONS: dict[tuple[State, str], State] = {
     (State.NORMAL, 'raised'): State.ACTIVE_UNACKNOWLEDGED,
@@ -62,10 +63,10 @@ def next_state(state: State, event: str, *, latches: bool) -> State:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What happened to an alarm at `time` (ns), and the state it is in since.
+    """A change of an alarm: what happened at `time` (ns), and the state that followed.
 
-    `how` is raised, cleared, acknowledged, reset, shelved or unshelved; `who` and `note` are of the
-    person who did it.
+    `how` is raised, cleared, acknowledged, reset, shelved or unshelved; `who` is the person who did
+    it, `note` what that person wrote.
     """
 
     time: int
@@ -92,30 +93,30 @@ class Alarm:
 
 
 def key_of(rule: Rule) -> Key:
-    """Return what tells an alarm from others."""
+    """Return the key of a rule's alarm: code, subject and level."""
     return rule.code, rule.subject, rule.level
 
 
 def latches(rule: Rule) -> bool:
-    """Return whether an alarm stays until it is reset."""
+    """Return whether an alarm of this rule latches: stays until a person resets it."""
     return rule.code in LATCHING and rule.level == ERROR
 
 
 @dataclass(slots=True)
 class Alarms:
-    """All alarms that are not NORMAL, and those that are shelved."""
+    """The table of all alarms that are not NORMAL or that are shelved, and the events on them."""
 
     table: dict[Key, Alarm] = field(default_factory=dict)
 
     def raised(self, now: int, alert: Alert) -> list[Change]:
-        """Take an alert that was raised; a new one of an active alarm asks to be seen anew."""
+        """Take an alert that was raised; even an acknowledged alarm then needs acknowledging."""
         alarm = self.table.setdefault(key_of(alert.rule), Alarm(alert))
         alarm.alert, alarm.acknowledged = alert, None
         alarm.state = State.ACTIVE_UNACKNOWLEDGED
         return [Change(now, alert, 'raised', alarm.state)]
 
     def cleared(self, now: int, alert: Alert) -> list[Change]:
-        """Take an alert that is over; one that a newer alert replaced changes nothing."""
+        """Take an alert that is over; nothing changes if a newer alert has replaced it."""
         alarm = self.table.get(key_of(alert.rule))
         if alarm is None or alarm.alert is not alert:
             return []
@@ -124,7 +125,7 @@ class Alarms:
     def acknowledge(
         self, now: int, who: str, note: str = '', key: Key | None = None
     ) -> list[Change]:
-        """Take one alarm (None: all) as seen by `who`. What is active stays active."""
+        """Acknowledge one alarm (None: all) in the name of `who`; an active alarm stays active."""
         chosen = [a for k, a in self.table.items() if key in {None, k} and a.state.unseen]
         changes = []
         for alarm in chosen:
@@ -134,15 +135,15 @@ class Alarms:
         return changes
 
     def reset(self, now: int, who: str, note: str = '', key: Key | None = None) -> list[Change]:
-        """Let go of one alarm (None: all) if it is latched: over and seen. All else stays."""
+        """Reset one alarm (None: all) if it is latched; alarms in other states stay as they are."""
         latched = {k: a for k, a in self.table.items() if a.state is State.LATCHED}
         chosen = [a for k, a in latched.items() if key in {None, k}]
         return [c for alarm in chosen for c in self._event(now, alarm, 'reset', who, note)]
 
     def shelve(self, now: int, key: Key, length: int, who: str, note: str = '') -> list[Change]:
-        """Put a warning aside for `length` (ns): it is still judged, but nobody is called.
+        """Shelve a warning for `length` (ns): it is still judged, but the operator is not called.
 
-        AcceptanceError where there is no such alarm, it is critical, or the time is too long.
+        Raises AcceptanceError if there is no such alarm, it is critical, or the time too long.
         """
         alarm = self.table.get(key)
         if alarm is None:
@@ -158,7 +159,7 @@ class Alarms:
         return [Change(now, alarm.alert, 'shelved', alarm.state, who, note)]
 
     def unshelve(self, now: int, key: Key, who: str = '') -> list[Change]:
-        """Take an alarm back from the shelf."""
+        """End the shelving of an alarm; nothing changes if it is not shelved."""
         alarm = self.table.get(key)
         if alarm is None or alarm.shelved_until is None:
             return []
@@ -168,7 +169,7 @@ class Alarms:
         return [change]
 
     def advance(self, now: int) -> list[Change]:
-        """Let time pass: shelving that is over ends, dated to the moment it was over."""
+        """Let time pass to `now` (ns): end shelvings that have run out, dated to when they did."""
         over = [(a.shelved_until, k) for k, a in self.table.items() if a.shelved_until is not None]
         return [c for at, key in sorted(over) if at <= now for c in self.unshelve(at, key)]
 
@@ -178,7 +179,7 @@ class Alarms:
         return alarm is not None and alarm.shelved_until is not None
 
     def state(self, key: Key) -> State:
-        """Return the state of an alarm; NORMAL where nothing is known of it."""
+        """Return the state of an alarm; NORMAL if it is not in the table."""
         alarm = self.table.get(key)
         return State.NORMAL if alarm is None else alarm.state
 

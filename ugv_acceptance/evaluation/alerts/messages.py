@@ -1,4 +1,4 @@
-"""The sentences of alerts, the words of levels, and where a failure has its source."""
+"""The sentences of alerts for people: what happened, what to do, and which part to suspect."""
 
 import math
 from enum import Enum
@@ -26,14 +26,14 @@ class FailureSource(Enum):
 
     @property
     def path(self) -> str:
-        """The way down the tree, such as "physical / effector"."""
+        """The path from the root of the taxonomy, such as "physical / effector"."""
         return f'{"physical" if self.physical else "human"} / {self.value}'
 
 
 HUMAN = frozenset({FailureSource.DESIGN, FailureSource.INTERACTION})
 
-# Alert code -> where to look first. An alert shows an effect, so this is a suspicion, no verdict:
-# a robot that tips was most often led there, an input that is silent most often lost its way.
+# Alert code -> where to look first. An alert shows an effect, so this is a suspicion, no verdict: a
+# robot that tips was most often driven there, a silent input is most often a communication fault.
 FIRST_SUSPECT = {
     'TORQUE_LIMIT': FailureSource.EFFECTOR,
     'TIP_OVER': FailureSource.INTERACTION,
@@ -59,7 +59,7 @@ FIRST_SUSPECT = {
 }
 
 
-# Code -> (what happened, what to do). {subject} is the joint, input or robot, {peak} the worst.
+# Code -> (what happened, what to do). {subject} is a joint, input or robot, {peak} the worst value.
 WORDS = {
     'TORQUE_LIMIT': (
         '{subject} needs {peak:.1f} {unit}; its limit is {limit:.1f} {unit}',
@@ -149,7 +149,7 @@ WORDS = {
 
 
 def describe(alert: Alert, settings: Settings) -> str:
-    """Return the alert as one sentence: what happened."""
+    """Return one sentence that says what happened in an alert."""
     rule = alert.rule
     peak, limit = alert.peak, rule.on
     robot = settings.robot
@@ -175,7 +175,7 @@ def describe(alert: Alert, settings: Settings) -> str:
 
 
 def _relaxed(name: str, settings: Settings) -> str:
-    """Return why a limit is wider than permitted, as it is now."""
+    """Return how far the limit of this name is relaxed now, and the reason given for it."""
     found = next((b for b in relaxed(settings) if b.name == name), None)
     if found is None:
         return f'{name} was wider than permitted'
@@ -183,18 +183,18 @@ def _relaxed(name: str, settings: Settings) -> str:
 
 
 def _torque(subject: str, settings: Settings) -> float:
-    """Return the limit (N m; N) of a joint; infinite for what is none."""
+    """Return the limit (N m; N) of a joint; infinite for a subject that is not a joint."""
     names = settings.robot.joint_names
     return settings.limits.torque[names.index(subject)] if subject in names else math.inf
 
 
 def tilt_left(degrees: float) -> str:
-    """Return a tilt that is left, or how far the robot is past its tipping point, in words."""
+    """Return in words how much tilt is left, or how far the robot is past its tipping point."""
     if degrees >= 0.0:
         return f'{degrees:.1f} degrees of tilt left before it tips'
     return f'{-degrees:.1f} degrees past its tipping point'
 
 
 def advice(code: str) -> str:
-    """Return what to do about an alert."""
+    """Return what to do in general about an alert of this code."""
     return WORDS[code][1]

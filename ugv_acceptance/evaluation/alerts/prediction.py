@@ -1,7 +1,8 @@
 """Short-horizon prediction: time to a limit from the last half second of margins.
 
-Looked at every 50 ms of receipt time, so that a message costs a comparison. A recording and a live
-stream are judged by the same columns: the live one whenever time passes (`judge`).
+Also finds weak motors and frozen encoders from the same history. One sample every 50 ms of receipt
+time (a *look*) is kept, so that other messages cost one comparison. Live and recorded looks are
+judged by the same array code; live ones wait until time passes (`judge`).
 """
 
 from collections import deque
@@ -21,10 +22,10 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 
 def time_to(limit: ArrayLike, now: ArrayLike, then: ArrayLike, seconds: float) -> Floats:
-    """Return after how long (s) a value that is `now` and `then`, `seconds` later, reaches `limit`.
+    """Return the time (s) until a value reaches `limit`, extrapolated along a straight line.
 
-    The value is taken to rise evenly; 0 where it is there already, infinite where it does not rise,
-    NaN where it is not known.
+    The value is `now` and, `seconds` later, `then`. 0 where it is past the limit already, infinite
+    where it does not rise, NaN where it is not known.
     """
     bound, start, end = (np.asarray(x, dtype=np.float64) for x in (limit, now, then))
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
@@ -36,34 +37,35 @@ def time_to(limit: ArrayLike, now: ArrayLike, then: ArrayLike, seconds: float) -
 
 SignalOf = Callable[[str, str, tuple[float, float], float], Signal]
 
-# Time (ns) between two looks, and looks that are remembered.
+# Time (ns) between two looks, and number of looks kept.
 SPACING, KEPT = 50_000_000, 10
-# Rates are those over so many looks, if these took at most so long (ns).
+# Rates are taken over this many looks, if these span at most this time (ns).
 OVER, LONGEST = 4, 400_000_000
-# Time left (s) from which a margin's end is told, and from which it no longer is.
+# Time to a limit (s) at which the warning begins, and at which it ends.
 SOON, LATER = 1.0, 1.5
-# Slowest rates that count: rad/s of tilt, share of the limit a second of torque.
+# Slowest rates that count: tilt in rad/s, torque as a share of its limit per second.
 TILT_RATE, LOAD_RATE = 0.0175, 0.03
-# A weak motor: effort even to this share of the limit while the posture comes to need this share
-# more. A frozen encoder: not a bit changes for so many looks, but effort by this share.
+# A weak motor: effort is constant to EVEN while the posture needs GROWN more (shares of the limit).
+# A frozen encoder: the position is bit-identical for STUCK looks while effort changes by CHANGED.
 EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
 # A motor is weak (1) or not (0).
 WEAK = 0.5
-# Shares of the limit between which an even effort may mean a weak motor.
+# A constant effort may mean a weak motor between these shares of the limit.
 LOW, HIGH = 0.3, 0.97
-# What changes by more than this share of the whole between two looks has jumped.
+# A change counts as a jump, not as a rate, if one step makes more than this share of it.
 JUMP = 0.6
-# So few looks, as live, are taken one at a time.
+# Up to this many looks, as live, are fed to the rules one at a time.
 FEW = 3
-# Looks that wait at most for `judge`: who never lets time pass needs no memory for them.
+# Looks that may wait for `judge`; the oldest are dropped if time never passes.
 MOST = 1024
 
 
 @dataclass(slots=True)
 class Prediction:
-    """One signal a rule; `tip` follows SIDES, the others `robot.joint_names`.
+    """The rules on rates of change, and the history of looks they are judged on.
 
-    `due` (ns) is when the next look is.
+    One signal per side (`tip`, in order of SIDES) or per joint (the others). `due` (ns) is when the
+    next look is to be taken.
     """
 
     tip: list[Signal]
@@ -85,7 +87,7 @@ class Prediction:
         self._since = np.full((3, n), np.nan)
 
     def signals(self) -> list[Signal]:
-        """Return all signals."""
+        """Return the signals of all rules, in a fixed order."""
         return [*self.tip, *self.torque, *self.effort, *self.weak, *self.frozen]
 
     def keep(
@@ -96,19 +98,19 @@ class Prediction:
         effort: Sequence[float],
         q: Sequence[float],
     ) -> None:
-        """Remember a sample at `now` (ns) until `judge`; to be called from `due` on."""
+        """Keep a live sample at `now` (ns) for the next `judge`; call it only from `due` on."""
         self.due = now - now % SPACING + SPACING
         self._waiting.append((now, (*angle, *torque, *effort, *q)))
 
     def judge(self, limit: Sequence[float]) -> None:
-        """Judge what waits by the torque limits (j,)."""
+        """Judge the live samples kept since the last call; `limit` (j,) are torque limits."""
         if self._waiting:
             time, rows = zip(*self._waiting, strict=True)
             self._waiting.clear()
             self._judge(np.array(time, np.int64), np.array(rows, np.float64), np.array(limit))
 
     def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
-        """Take the next stretch of a recording."""
+        """Judge the next part of a recording; `limit` (j,) are torque limits (N m; N)."""
         at = np.flatnonzero(rows.known)
         cell = rows.time[at] // SPACING
         at = at[np.diff(cell, prepend=self.due // SPACING - 1) > 0]
@@ -137,8 +139,9 @@ class Prediction:
         self._time, self._looks = time[-KEPT:], looks[-KEPT:]
 
     def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
-        """Return by how much (N m; N) effort changed since each position did, beyond gravity's.
+        """Return how much effort (n, j) in N m (N) changed while each joint's position did not.
 
+        The change of the static torque is taken off; 0 until a position stood for STUCK looks.
         `_since` holds looks, effort and torque at the last change of each position.
         """
         rows = np.arange(len(q))[:, None]
@@ -165,13 +168,16 @@ def _feed(signals: list[Signal], time: Times, values: Floats) -> None:
         return
     for now, row in zip(time.tolist(), values.tolist(), strict=True):
         for signal, value in zip(signals, row, strict=True):
-            # A quiet signal has nothing to do with a small value.
+            # A small value cannot change a quiet signal.
             if value >= signal.on or not signal.quiet:
                 signal.step(now, value)
 
 
 def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 - float or (m,)
-    """Return minus the time (n, m) in s until what is `left` is gone; NaN: no rate is known."""
+    """Return minus the time (n, m) in s until the margin `left` is used up; NaN without a rate.
+
+    Rates slower than `slowest` (per second) do not count.
+    """
     found = np.full(left.shape, np.nan)
     if len(time) > OVER:
         step = (time[OVER:] - time[:-OVER])[:, None]
@@ -185,7 +191,7 @@ def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 -
 
 
 def _weak(time: Times, tau: Floats, effort: Floats, limit: Floats) -> Floats:
-    """Return 1 where effort is even, below its limit, while the posture comes to need more."""
+    """Return 1 (n, j) where effort is constant below its limit while the static torque grows."""
     found, over = np.zeros(tau.shape), KEPT - 1
     grown = np.abs(tau[over:]) - np.abs(tau[:-over]) >= GROWN * limit
     if grown.any():
@@ -198,16 +204,19 @@ def _weak(time: Times, tau: Floats, effort: Floats, limit: Floats) -> Floats:
 
 
 def _standing(angle: Floats) -> NDArray[np.bool_]:
-    """Return (n, 1) where no look of the last KEPT was past tipping: the ground bears the arm."""
+    """Return (n, 1) whether none of the last KEPT looks was past tipping.
+
+    A robot that has tipped may rest on its arm, and efforts then say nothing about motors.
+    """
     tipped = np.convolve((angle < 0.0).any(axis=1), np.ones(KEPT))[: len(angle)]
     standing: NDArray[np.bool_] = (tipped == 0.0)[:, None]
     return standing
 
 
 def _steady(values: Floats, over: int) -> NDArray[np.bool_]:
-    """Return where values (n, m) rose over so many looks, and not for the most part in one.
+    """Return where values (n, m) rose over `over` looks, but not mostly in a single step.
 
-    A load that is declared makes a step of all margins; that is no rate.
+    A newly declared payload makes a step of all margins, which is not a rate.
     """
     largest = _largest(values[1:] - values[:-1], over)
     steady: NDArray[np.bool_] = largest <= JUMP * (values[over:] - values[:-over])
@@ -215,13 +224,16 @@ def _steady(values: Floats, over: int) -> NDArray[np.bool_]:
 
 
 def _largest(values: Floats, over: int) -> Floats:
-    """Return the largest of each column of values (n, m) in every `over` neighbours; NaN counts."""
+    """Return the running maximum of each column of values (n, m) over `over` rows; NaN wins."""
     last = len(values) - over + 1
     return reduce(np.maximum, [values[k : last + k] for k in range(over)])
 
 
 def foresight_of(settings: Settings, signal: SignalOf) -> Prediction:
-    """Return the rules of a robot; `signal` makes one of code, subject, (on, off) and delay (s)."""
+    """Return the prediction rules of a robot; `signal` makes one from code, subject, limits, delay.
+
+    The limits are (on, off), the delay is in s.
+    """
     names, limits, delays = settings.robot.joint_names, settings.limits, settings.delays
     ahead, levels = (-SOON, -LATER), [limits.torque_warn * limit for limit in limits.torque]
     at = [(level, level - min(limits.torque_deadband, level / 2.0)) for level in levels]

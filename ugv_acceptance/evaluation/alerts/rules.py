@@ -1,4 +1,4 @@
-"""The rules of alerts: what is watched at which limit, live and recorded alike."""
+"""The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
 from dataclasses import dataclass, field
 
@@ -10,19 +10,20 @@ from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
-# Alerts of level ERROR with these codes are failures of the robot; all others are of the input.
+# Alerts of level ERROR with these codes are failures of the robot; all others are input faults.
 FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
-# Times its greatest speed at which a joint cannot move: the numbers are of another unit or joint.
+# A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
 
 
 @dataclass(slots=True)
 class RuleSet:
-    """One signal a rule, (WARN, ERROR) where a rule has two levels. `log` receives all alerts.
+    """The signals of all alert rules of a robot; `log` receives every alert that is raised.
 
-    `torque` and `speed` follow `robot.joint_names`, `tip` follows SIDES.
+    One signal per rule, a pair (WARN, ERROR) if a rule has two levels. `torque` and `speed` are in
+    order of `robot.joint_names`, `tip` in order of SIDES.
     """
 
     settings: Settings
@@ -72,7 +73,7 @@ class RuleSet:
         self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
 
     def relax(self, now: int) -> None:
-        """Say which limits are relaxed at `now` (ns): a standing warning of each."""
+        """Raise a warning for each limit that is relaxed at `now` (ns), and end the others."""
         if self._told is not self.settings:
             self._told = self.settings
             found = {breach.name for breach in relaxed(self.settings)}
@@ -80,11 +81,11 @@ class RuleSet:
                 signal.step(now, 1.0 if name in found else 0.0)
 
     def predict(self) -> None:
-        """Judge what live samples gave the foresight; before time passes."""
+        """Judge the live samples kept for the prediction; call it before time passes."""
         self.prediction.judge(self.settings.limits.torque)
 
     def predict_rows(self, rows: MarginRows) -> None:
-        """Judge what a stretch of a recording gives the foresight."""
+        """Judge the prediction rules on the next part of a recording."""
         self.prediction.rows(rows, self.settings.limits.torque)
 
     def _warning(self, code: str, subject: str, at: tuple[float, float], delay: float) -> Signal:
@@ -102,24 +103,24 @@ class RuleSet:
         return self._signal('TORQUE_LIMIT', joint, level, at, self.settings.delays.torque_on)
 
     def _tip(self, side: str, level: int, angle: float) -> Signal:
-        """The watched value is minus the tilt left (rad), so that larger is worse."""
+        """Return a tip-over signal; its value is minus the tilt left (rad): larger is worse."""
         at = (-angle, -angle - self.settings.limits.tip_deadband)
         return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
 
     def _slide(self) -> Signal:
-        """The watched value is minus the slope left (rad) where it slides before it tips."""
+        """Return the sliding signal; its value is minus the slope left (rad), see slides_first."""
         limits, delay = self.settings.limits, self.settings.delays.tip_on
         known = limits.friction < float('inf')
         on = -limits.tip_warn if known else float('inf')
         return self._warning('SLIDE', 'robot', (on, on - limits.tip_deadband), delay)
 
     def _fault(self, code: str, subject: str, level: int, on_delay: float | None = None) -> Signal:
-        """A fault is watched as 1 (there) or 0 (not there)."""
+        """Return the signal of a fault, whose value is 1 (there) or 0 (not there)."""
         delay = self.settings.delays.fault_on if on_delay is None else on_delay
         return self._signal(code, subject, level, (0.5, 0.5), delay)
 
     def _relaxed(self, name: str) -> Signal:
-        """It stands as long as the limit is in force: no delay, whatever the delays are."""
+        """Return the signal of a relaxed limit: without delays, active while it is in force."""
         return Signal(Rule('LIMITS_RELAXED', name, WARN, 0.5, 0.5, 0, 0), self.log)
 
     def _jump_signal(self, joint: str) -> Signal:
@@ -131,7 +132,7 @@ class RuleSet:
         imu = self.settings.imu
         delay = imu.agreement_delay
         apart = (imu.agreement, imu.agreement / 2)
-        # Who asks for the orientation alone is told, and gets its margins.
+        # With attitude 'orientation' this is a warning only: margins do not need the accelerometer.
         level = WARN if imu.attitude == 'orientation' and not imu.specific_force else ERROR
         return AttitudeSignals(
             self._fault('IMU_FRAME', 'imu', ERROR),
@@ -149,12 +150,12 @@ class RuleSet:
 
     @property
     def active(self) -> list[Alert]:
-        """Return the alerts that are active now, the most severe first."""
+        """Alerts that are active now, the most severe first."""
         found = [signal.alert for signal in self.signals() if signal.alert is not None]
         return sorted(found, key=lambda alert: -alert.rule.level)
 
     def signals(self) -> list[Signal]:
-        """Return all signals."""
+        """Return the signals of all rules, in a fixed order."""
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
         inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
         of = self.attitude
@@ -174,7 +175,7 @@ class RuleSet:
 
 @dataclass(frozen=True, slots=True)
 class InputSignals:
-    """What is watched of an input: silence, content that cannot be used, and its clock."""
+    """The signals of one input: silence, unusable content, and a header clock that is off."""
 
     stale: Signal
     invalid: Signal

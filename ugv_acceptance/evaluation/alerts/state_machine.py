@@ -1,7 +1,7 @@
 """The state machine of an alert: limit, deadband, on-delay and off-delay.
 
-The machine has no clock. What falls due between two samples is dated to the moment it fell due, so
-the same data give the same alerts whether they come one at a time or as runs of a recording.
+The machine has no clock. An alert that becomes due between two samples is dated to the time it was
+due, so the same data give the same alerts whether they come one at a time or in columns.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """When a value is bad: from `value >= on` until `value < off` (a deadband), each held a while.
+    """The rule of an alert: limits with a deadband, and delays.
 
-    The alert is raised when the value has been bad for `on_delay` and cleared when it has been good
-    for `off_delay` (ns). A NaN value changes nothing. `source` names the values' rows: pair, joints
-    or imu.
+    A value is bad from `value >= on` until `value < off`. The alert is raised when it has been bad
+    for `on_delay` and cleared when it has been good for `off_delay` (ns). NaN changes nothing.
+    `source` says to which messages the values belong: pair, joints or imu.
     """
 
     code: str
@@ -46,10 +46,11 @@ class Alert:
 
 @dataclass(slots=True)
 class Signal:
-    """The state of one rule. `log` receives alerts as they are raised; they are closed in place.
+    """The state machine of one rule; `log` receives its alerts, whose `end` is set later in place.
 
-    `raw` is the value's side of the deadband, `alert` the active alert, `due` the time at which the
-    state changes unless the value does first. While `quiet`, only a value of `on` or more matters.
+    `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
+    when the state changes unless the value does first. While `quiet`, only a value of `on` or more
+    can change anything, so callers may skip smaller ones.
     """
 
     rule: Rule
@@ -65,7 +66,7 @@ class Signal:
         self.on = self.rule.on
 
     def judge_by(self, rule: Rule) -> None:
-        """Take another rule from now on; an alert that is active keeps its own."""
+        """Replace the rule from now on; an active alert keeps the one it was raised by."""
         self.rule, self.on = rule, rule.on
 
     def step(self, now: int, value: float) -> None:
@@ -84,7 +85,7 @@ class Signal:
             self.advance(now)
 
     def set(self, now: int, peak: float) -> None:
-        """Say that the value is bad at `now`, and how bad it becomes before it is good again."""
+        """Take that the value is bad from `now` (ns) on; `peak` is its worst until it is good."""
         if not self.raw:
             self.advance(now)
             self.raw = True
@@ -98,7 +99,7 @@ class Signal:
         self.advance(now)
 
     def clear(self, now: int) -> None:
-        """Say that the value is good at `now`."""
+        """Take that the value is good from `now` (ns) on."""
         if self.raw:
             self.advance(now)
             self.raw = False
@@ -106,7 +107,7 @@ class Signal:
         self.advance(now)
 
     def advance(self, now: int) -> None:
-        """Let time pass up to `now`: raise or clear what fell due."""
+        """Let time pass up to `now` (ns): raise or clear the alert if that has become due."""
         if self.due is not None and self.due <= now:
             if self.raw:
                 self.alert = Alert(self.rule, self.due, self.peak)
@@ -124,9 +125,9 @@ class Signal:
 
 
 def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, int, bool]]:
-    """Yield (first row, row after the last, bad) for every run of `values` on one side.
+    """Yield (first row, row after the last, bad) for every run of rows that are bad or good.
 
-    `raw` is the side before the first row; rows inside the deadband, and NaN, prolong a run.
+    `raw` is the state before the first row; rows inside the deadband, and NaN, extend a run.
     """
     bad = values >= rule.on
     decided = np.flatnonzero(bad | (values < rule.off))
@@ -141,7 +142,10 @@ def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, 
 
 
 def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[Any]) -> None:
-    """Give a signal many samples (numbers, or whether it is bad): the alerts of `step` for each."""
+    """Give a signal many samples (n,) at `times` (n,) in ns: the same alerts as `step` for each.
+
+    `values` are numbers, or booleans: whether the value is bad.
+    """
     if not len(values):
         return
     if signal.quiet and not (values >= signal.on).any():

@@ -1,7 +1,7 @@
 """Acceptance criteria as data, and the default ones from the limits of the robot.
 
 Values are SI and radians; times in windows are seconds since the start of the recording. `config`
-reads criteria from YAML, examination.py measures, verdicts.py judges. docs/criteria.md explains.
+reads criteria from YAML, measurement.py measures, verdict.py judges. docs/criteria.md explains.
 """
 
 import hashlib
@@ -13,11 +13,11 @@ from typing import Any
 from ugv_acceptance.evaluation.settings import Settings
 
 PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
-# How bounds of several sources become one; IGNORED: a bound is shown but decides nothing.
+# How the uncertainties of several sources are combined; IGNORED: shown, but it decides nothing.
 RSS, WORST_CASE, IGNORED = 'rss', 'worst_case', 'ignored'
-# Less of a window than this evaluated can never be a pass.
+# Share of a window that must be evaluated for a PASS.
 LEAST_COVERAGE = 0.95
-# In less (s) no input can be told to be silent, nor an IMU to contradict itself.
+# A shorter recording (s) cannot show that an input is silent or that an IMU contradicts itself.
 LEAST_DURATION = 1.0
 ANY = 'any'
 
@@ -26,11 +26,11 @@ Window = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """A margin or input that must stay on one side of `limit`; the limit itself is a violation.
+    """The demand that a value stays on one side of `limit`; the limit itself is a violation.
 
-    `signal` is a key of signals.SIGNALS, `of` a joint, a side or any. With a time allowance (s, or
-    a share of the evaluated time) violations up to it are accepted; with `dwell` the value must
-    keep to its side for so many seconds at a stretch, and may do as it likes otherwise.
+    `signal` is a key of quantities.SIGNALS, `of` a joint, a side or any. With a time allowance (s,
+    or a share of the evaluated time) violations up to it are accepted; with `dwell` the value must
+    stay on its side for that many seconds without a break, once.
     """
 
     signal: str
@@ -44,7 +44,7 @@ class Value:
 
     @property
     def always(self) -> bool:
-        """Whether not a single sample may be in violation."""
+        """Whether no sample at all may be in violation."""
         allowances = (
             self.time_in_violation,
             self.longest_violation,
@@ -54,13 +54,13 @@ class Value:
         return all(x is None for x in allowances)
 
     def distance(self, value: float) -> float:
-        """Return what is left to the limit, negative in violation; unit of the signal."""
+        """Return a value's distance to the limit, negative in violation; unit of the signal."""
         return self.limit - value if self.below else value - self.limit
 
 
 @dataclass(frozen=True, slots=True)
 class AlertDemand:
-    """An alert that has to be raised (start in the window), or must not be active in it.
+    """The demand that an alert is raised in the window, or (not `raised`) that none is active.
 
     `code`, `of` and `level` choose alerts; None: any.
     """
@@ -73,9 +73,9 @@ class AlertDemand:
 
 @dataclass(frozen=True, slots=True)
 class DataDemand:
-    """A number about the data (a key of verdicts.DATA) within bounds; `fails`: else FAIL.
+    """The demand that a number about the data (a key of quantities.DATA) lies within bounds.
 
-    Without `fails` data that do not meet the demand make the run INCONCLUSIVE.
+    Data that do not meet it make the run INCONCLUSIVE, or FAIL with `fails`.
     """
 
     quantity: str
@@ -87,7 +87,7 @@ class DataDemand:
 
 @dataclass(frozen=True, slots=True)
 class MapDemand:
-    """The share of the cells (rad, m) of two joints' ranges that the run has to visit."""
+    """The demand that a run visits at least a share of the cells of two joints' ranges."""
 
     joints: tuple[str, str]
     ranges: tuple[Window, Window]
@@ -100,7 +100,7 @@ Demand = Value | AlertDemand | DataDemand | MapDemand
 
 @dataclass(frozen=True, slots=True)
 class Criterion:
-    """A demand with its name, the requirement in words, where that stands, and when it counts.
+    """A demand with its name, the requirement in words, its reference, and its time window.
 
     `window` in seconds since the start; None: the whole recording. `uncertainty` overrides the
     set's.
@@ -116,7 +116,10 @@ class Criterion:
 
 @dataclass(frozen=True, slots=True)
 class CriteriaSet:
-    """Criteria that are judged together. `sha256` is that of the file, or of the defaults' JSON."""
+    """A set of criteria judged together; `sha256` is of its file, or of the defaults as JSON.
+
+    `coverage` is the share of each window that must be evaluated for a PASS.
+    """
 
     name: str
     version: int
@@ -127,12 +130,12 @@ class CriteriaSet:
     uncertainty: str = RSS
 
     def uncertainty_of(self, criterion: Criterion) -> str:
-        """Return how bounds are combined for a criterion."""
+        """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""
         return criterion.uncertainty or self.uncertainty
 
 
 def default_criteria(settings: Settings) -> CriteriaSet:
-    """Return what holds without a file: every limit of the configuration, at every moment."""
+    """Return the criteria used without a file: the configuration's limits hold at all times."""
     robot, limits = settings.robot, settings.limits
     torque = [
         Criterion(

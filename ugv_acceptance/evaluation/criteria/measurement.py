@@ -1,4 +1,4 @@
-"""Measures for criteria while a recording is read: worst values, time in violation."""
+"""Measures what criteria need while a recording is read: worst values, time in violation."""
 
 from dataclasses import dataclass, field
 from heapq import nsmallest
@@ -24,13 +24,16 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 Span = tuple[int, int]
 
-# Spans kept as evidence.
+# Number of time spans kept as evidence.
 MOST = 20
 
 
 @dataclass(slots=True)
 class Spans:
-    """Takes spans (ns) in order and joins those that touch; memory does not grow."""
+    """Sums up time spans (ns) given in order, and joins those that touch; memory is bounded.
+
+    `first` are the first MOST spans, `longest` the longest one.
+    """
 
     total: int = 0
     count: int = 0
@@ -39,7 +42,7 @@ class Spans:
     _open: Span | None = None
 
     def add(self, start: Times, end: Times) -> None:
-        """Take spans (n,) in order of time; none overlaps."""
+        """Take spans (n,) in order of time that do not overlap."""
         if not len(start):
             return
         self.total += int((end - start).sum())
@@ -55,7 +58,7 @@ class Spans:
         self._open = (begins[-1], ends[-1])
 
     def close(self) -> None:
-        """Say that no span follows."""
+        """Finish: no span follows, so that the last one is complete."""
         if self._open is not None:
             self._note(self._open)
         self._open = None
@@ -68,7 +71,7 @@ class Spans:
             self.longest = span
 
 
-# Rows whose bound is computed: the worst of so many stretches.
+# Number of worst rows, from different parts of the recording, whose uncertainty is computed.
 CANDIDATES = 4
 
 
@@ -86,9 +89,11 @@ class Moment:
 
 @dataclass(slots=True)
 class ValueMeasure:
-    """What a criterion on a value comes to; `span` is its window in log time (ns).
+    """The measurement of one criterion on a value; `span` is its window in log time (ns).
 
-    `worst` holds the worst row of the worst stretches, `first` the first row in violation.
+    `worst` holds the worst rows, at most one per part of the recording, the worst first; `first`
+    is the first row in violation. `evaluated` (ns) is the time with a known value, `violation`
+    the spans in violation, `kept` those without (for `dwell` only).
     """
 
     criterion: Criterion
@@ -105,13 +110,13 @@ class ValueMeasure:
 
     @property
     def demand(self) -> Value:
-        """Return the demand."""
+        """The demand of the criterion."""
         demand = self.criterion.demand
         assert isinstance(demand, Value)  # noqa: S101 - made only for such
         return demand
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         if not len(rows.time):
             return
         demand = self.demand
@@ -122,13 +127,13 @@ class ValueMeasure:
         self._spend(rows.time[:-1], rows.until[:-1], values[:-1])
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended (ns)."""
+        """Finish at the end of the recording, `now` (ns)."""
         self._settle(now)
         self.violation.close()
         self.kept.close()
 
     def _settle(self, now: int) -> None:
-        """The last row holds until the next message, the input's deadline or the end."""
+        """Count the last row's time, now that the next message or the end (`now`, ns) is known."""
         if self._last is None:
             return
         time, until, value = self._last
@@ -137,7 +142,7 @@ class ValueMeasure:
         self._last = None
 
     def _spend(self, start: Times, end: Times, values: Floats) -> None:
-        """Add up the time for which values held."""
+        """Add up the time from `start` to `end` (n,) in ns for which `values` (n,) held."""
         start, end = np.maximum(start, self.span[0]), np.minimum(end, self.span[1])
         seen = (end > start) & ~np.isnan(values)
         self.evaluated += int((end - start)[seen].sum())
@@ -157,7 +162,7 @@ class ValueMeasure:
         return found
 
     def _see(self, rows: MarginRows, values: Floats) -> None:
-        """Keep the first row in violation, and the worst if it is among the worst of all."""
+        """Keep the first row in violation, and these rows' worst if it is among the worst."""
         inside = (rows.time >= self.span[0]) & (rows.time <= self.span[1])
         if not inside.all():
             values = np.where(inside, values, np.nan)
@@ -199,7 +204,7 @@ class ValueMeasure:
 
 @dataclass(slots=True)
 class MapMeasure:
-    """The cells of two joints' ranges that a run visited."""
+    """The measurement of a map criterion: the cells of two joints' ranges that a run visited."""
 
     criterion: Criterion
     settings: Settings
@@ -211,7 +216,7 @@ class MapMeasure:
 
     @property
     def demand(self) -> MapDemand:
-        """Return the demand."""
+        """The demand of the criterion."""
         demand = self.criterion.demand
         assert isinstance(demand, MapDemand)  # noqa: S101 - made only for such
         return demand
@@ -222,7 +227,7 @@ class MapMeasure:
         return x, y
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         names = self.settings.robot.joint_names
         inside = rows.known & (rows.time >= self.span[0]) & (rows.time <= self.span[1])
         q = rows.q[inside]
@@ -236,19 +241,19 @@ class MapMeasure:
         self.visited[places[0][keep], places[1][keep]] = True
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended; nothing is outstanding."""
+        """Do nothing at the end of the recording: nothing is pending."""
 
 
 @dataclass(slots=True)
 class KnownTime:
-    """For how long (ns) the margins were known within a window in log time."""
+    """The time (ns) for which the margins were known within a window `span` in log time (ns)."""
 
     span: tuple[int, int]
     evaluated: int = 0
     _last: tuple[int, int] | None = None
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         if not len(rows.time):
             return
         self._settle(int(rows.time[0]))
@@ -260,7 +265,7 @@ class KnownTime:
             self._last = int(rows.time[-1]), int(rows.until[-1])
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended (ns)."""
+        """Finish at the end of the recording, `now` (ns)."""
         self._settle(now)
 
     def _settle(self, now: int) -> None:
@@ -275,7 +280,7 @@ Measure = ValueMeasure | MapMeasure | KnownTime
 
 @dataclass(slots=True)
 class CriteriaMeasurement:
-    """Everything that is measured for a set of criteria, and the payloads it needs for that."""
+    """The measurements of all criteria of a set, by the criterion's name; `start`, `end` in ns."""
 
     criteria: CriteriaSet
     settings: Settings
@@ -299,7 +304,7 @@ class CriteriaMeasurement:
 
     @property
     def detail(self) -> bool:
-        """Whether moments, energies or ZMP are needed."""
+        """Whether a criterion needs moments, energies or ZMP, which are computed only on demand."""
         demands = [c.demand for c in self.criteria.criteria]
         return any(SIGNALS[d.signal].detail for d in demands if isinstance(d, Value))
 
@@ -310,11 +315,11 @@ class CriteriaMeasurement:
         return self.start + round(window[0] * 1e9), self.start + round(window[1] * 1e9)
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         for measure in self.measures.values():
             measure.add(rows)
 
     def finish(self, now: int) -> None:
-        """Say when the recording ended (ns)."""
+        """Finish at the end of the recording, `now` (ns)."""
         for measure in self.measures.values():
             measure.finish(now)

@@ -1,4 +1,4 @@
-"""The sentences of criteria and their outcomes."""
+"""The sentences of criteria: what each demands, how it was violated, why margins are missing."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from ugv_acceptance.evaluation.settings import Settings
 
 
 def demand_words(criterion: Criterion, settings: Settings) -> str:
-    """Return what a criterion demands."""
+    """Return in words what a criterion demands, with its time window."""
     demand = criterion.demand
     if isinstance(demand, Value):
         text = _value_words(demand, settings)
@@ -55,7 +55,7 @@ def _value_words(demand: Value, settings: Settings) -> str:
 
 
 def number(value: float, demand: Value, settings: Settings) -> str:
-    """Return a signal's value (SI) as a person reads it."""
+    """Return a signal's value (SI) as text with the unit for people."""
     if demand.signal == 'torque_utilisation':
         return f'{value:.0%}'
     scale, unit = shown(demand.signal, demand.of, settings)
@@ -86,7 +86,7 @@ def _map_words(demand: MapDemand) -> str:
 
 
 def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[str, Any]) -> str:
-    """Return how a value broke its demand."""
+    """Return the sentence that says how a value violated its demand: worst value, time, limit."""
     demand, worst = measure.demand, measure.worst[0]
     if demand.dwell is not None:
         kept = measured['longest_kept_s']

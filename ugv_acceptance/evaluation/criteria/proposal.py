@@ -1,4 +1,4 @@
-"""Proposes criteria from a good run, as YAML: its worst values and some room."""
+"""Proposes acceptance criteria as YAML from a good run: its worst values plus an allowance."""
 
 import json
 import math
@@ -6,14 +6,14 @@ from typing import Any
 
 from ugv_acceptance.type_aliases import Json
 
-# Room beside the worst value of a good run.
+# Allowance beyond the worst value of a good run, as a share of it.
 ROOM = 0.1
 
 
 def proposed_criteria(result: Json, name: str) -> str:
-    """Return a file of criteria that the run of `result` (a PASS) meets; for a person to edit.
+    """Return the YAML of criteria that the run of `result` (a PASS) meets, for a person to edit.
 
-    No limit is beyond that of the configuration.
+    No limit is looser than that of the configuration.
     """
     lines = [
         '# Proposed from a run: its worst values, the bound of their uncertainty, and a tenth of',
@@ -61,7 +61,7 @@ def _value(outcome: Json, measured: Json) -> list[str]:
 
 
 def _rounded(value: float, towards: Any) -> float:  # noqa: ANN401 - math.ceil or math.floor
-    """Return a value rounded to two digits."""
+    """Return a value rounded to two significant digits, up or down by `towards`."""
     if value == 0.0:
         return 0.0
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 1)

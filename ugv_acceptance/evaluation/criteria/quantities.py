@@ -1,4 +1,4 @@
-"""The quantities a criterion can be about: margins, other values, quality of the data."""
+"""Tables of the quantities a criterion can be about: margins, other values, quality of the data."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ _DEGREES = 180.0 / np.pi
 
 @dataclass(frozen=True, slots=True)
 class SignalKind:
-    """A signal: `of` gives its columns (n, k); `subjects` says what they are: joints, sides, robot.
+    """A value that a criterion can limit, with one column per joint, per side, or for the robot.
 
-    `kinds` are the quantities (config/units.py) of a limit for a turning and a sliding joint, ''
-    without unit. `scale` and `unit` show it to a person. `detail`: moments, energies and ZMP are
-    needed.
+    `of` returns the columns (n, k), SI; `subjects` says what they belong to: joints, sides, robot.
+    `kinds` are the quantities (config/units.py) of a limit for a rotary and a prismatic joint, ''
+    without unit. `scale` converts to the `unit` people see. `detail`: it needs moments, energies
+    or ZMP.
     """
 
     of: Callable[[MarginRows, Settings], Floats]
@@ -92,13 +93,13 @@ SIGNALS = {
 
 
 def subjects_of(kind: SignalKind, settings: Settings) -> tuple[str, ...]:
-    """Return the names of a signal's columns."""
+    """Return the names of a signal's columns: joints, SIDES, or ('robot',)."""
     names = {'joints': settings.robot.joint_names, 'sides': SIDES, 'robot': ('robot',)}
     return names[kind.subjects]
 
 
 def shown(signal: str, subject: str, settings: Settings) -> tuple[float, str]:
-    """Return factor and unit with which a person sees a signal of a joint, side or the robot."""
+    """Return the factor from SI and the unit in which people see a signal of this subject."""
     kind = SIGNALS[signal]
     sliding = (
         kind.subjects == 'joints'
@@ -114,9 +115,9 @@ def shown(signal: str, subject: str, settings: Settings) -> tuple[float, str]:
 def columns_of(
     signal: str, subject: str, rows: MarginRows, settings: Settings, *, largest: bool
 ) -> Floats:
-    """Return a signal's values (n,), SI; of `any` the largest or smallest of all subjects.
+    """Return a signal's values (n,), SI; for subject `any` the largest or smallest of all.
 
-    NaN where the value is not known at a row.
+    NaN at rows where the value is not known.
     """
     kind = SIGNALS[signal]
     table = kind.of(rows, settings)
@@ -128,7 +129,7 @@ def columns_of(
 
 
 def _extreme(table: Floats, *, largest: bool) -> Floats:
-    """Return the extreme of the columns; columns of NaN alone (not judged) do not count."""
+    """Return the extreme over the columns (n,); NaN is skipped."""
     pick = np.fmax if largest else np.fmin
     found: Floats = pick.reduce(table, axis=1)
     return found
@@ -139,7 +140,10 @@ INPUTS = ('joint_states', 'imu')
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A number of the whole run (`of` None), or one of each input; a `share` is from 0 to 1."""
+    """A number about the data of a run, or of each of its inputs; a `share` is from 0 to 1.
+
+    `of` takes it from the result of the run, or (`each_input`) from that of one input.
+    """
 
     of: Callable[[Json], float | None]
     words: str
@@ -178,7 +182,7 @@ DATA = {
 
 
 def measured_of(quantity: str, of: str | None, result: Json) -> dict[str, float | None]:
-    """Return the numbers of a quantity: of the run, of one input, or (None) of both inputs."""
+    """Return the values of a quantity by name: 'run', or the input `of`, or (None) both inputs."""
     found = DATA[quantity]
     if not found.each_input:
         return {'run': found.of(result)}
@@ -186,5 +190,5 @@ def measured_of(quantity: str, of: str | None, result: Json) -> dict[str, float 
 
 
 def unit_of(quantity: str) -> str:
-    """Return the unit of a quantity."""
+    """Return the unit of a quantity of DATA as people see it; '' without unit."""
     return DATA[quantity].unit

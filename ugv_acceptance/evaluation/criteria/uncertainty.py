@@ -1,8 +1,8 @@
-"""Uncertainty of worst values, from the stated +/- of the numbers they come from.
+"""Uncertainty of worst margins, from the stated +/- of the numbers they are computed from.
 
-First order: every number is moved by its +/- to both sides while the posture, the payload and the
-support polygon stay what they are; half the difference is that number's effect. Effects are
-combined as a root sum of squares (independent numbers) or as a sum (worst case).
+First order: each number is changed by its +/- to both sides while the support polygon stays the
+same; half the difference of the margins is that number's effect. Effects are combined as a root sum
+of squares (independent numbers) or as a sum (worst case).
 """
 
 import math
@@ -23,16 +23,16 @@ from ugv_acceptance.model.statics import torque_of
 from ugv_acceptance.type_aliases import Floats
 
 Gravity = tuple[float, float, float]
-# Contacts that are all moved, the payload in force, and the IMU: subjects beside links and joints.
+# Subjects of a source besides links and joints: all contact points, the payload, the IMU.
 CONTACTS, PAYLOAD, IMU = 'contacts', 'payload', 'imu'
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One uncertain number: +/- `value` (SI) of `what` of `subject`, `name` as in the file.
+    """A source of uncertainty: +/- `value` (SI) on the number `what` of `subject`.
 
-    `what` is mass, cog, place (of a joint or contacts), offset, limit, roll or pitch (of the IMU);
-    `axis` 0, 1, 2 where it is a vector.
+    `name` is its name in the configuration. `what` is mass, cog, place (of a joint or contacts),
+    offset, limit, roll or pitch (of the IMU); `axis` is 0, 1 or 2 if it is a vector.
     """
 
     name: str
@@ -44,9 +44,10 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """What every source does to one row: `torque` (s, j) N m (N), `angle` (s, 4) rad to SIDES.
+    """The effect of each of s sources on the margins of one row.
 
-    `position` (s, j) rad or m, `tilt` (s,) rad, `limit` (s, j) N m (N). NaN angle: no edge there.
+    `torque` (s, j) N m (N), `angle` (s, 4) rad to SIDES (NaN on a side without an edge), `position`
+    (s, j) rad or m, `tilt` (s,) rad, `limit` (s, j) N m (N).
     """
 
     sources: tuple[Source, ...]
@@ -59,7 +60,7 @@ class Effects:
 
 @dataclass(frozen=True, slots=True)
 class _Point:
-    """What a row's margins are computed from."""
+    """The numbers from which a row's margins are computed: robot, posture, gravity, payload."""
 
     robot: Robot
     q: tuple[float, ...]
@@ -74,7 +75,7 @@ def effects_of(
     gravity: Gravity,
     payload: Payload,
 ) -> Effects:
-    """Return the effect of each source on the margins of one row."""
+    """Return the effect of each source on the margins of one row: `q` (j), `gravity` (3) m/s2."""
     robot = settings.robot
     point = _Point(robot, q, gravity, payload)
     margins = _margins_near(point)
@@ -94,14 +95,14 @@ def effects_of(
 
 
 def combined(effects: Floats, method: str) -> Floats:
-    """Return the bound (...) of effects (s, ...): their root sum of squares or their sum."""
+    """Return the combined bound (...) of effects (s, ...): root sum of squares, or sum."""
     size = np.abs(effects)
     bound: Floats = size.sum(axis=0) if method == WORST_CASE else np.sqrt((size**2).sum(axis=0))
     return bound
 
 
 def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
-    """Return torques and tip angles (j + 4,) of points near this one, on its support polygon."""
+    """Return a function of torques and tip angles (j + 4,) near a point, on its support polygon."""
     mechanics = mechanics_of(point.robot)
     nominal: Any = _posture(point)
     stance = stance_of(mechanics, nominal)
@@ -115,7 +116,7 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
         torque = torque_of(posture, at.gravity)
         if stance.edges is None:
             return np.array([*torque, *(math.nan for _ in SIDES)])
-        # The kernel holds the base's corners fixed: what moves them moves all else the other way.
+        # The kernel has the base's corners as constants: shift everything else the other way.
         shift = np.zeros(3)
         if on_base is not None:
             shift = np.array(posture.contacts[on_base]) - np.array(nominal.contacts[on_base])
@@ -184,7 +185,7 @@ def _added(v: Vector, axis: int, by: float) -> Vector:
 
 
 def _turned(g: Gravity, what: str, by: float) -> Gravity:
-    """Return gravity as an IMU that is off by a roll or pitch angle (rad) shows it."""
+    """Return gravity as measured by an IMU whose mounting is off by a roll or pitch angle (rad)."""
     x, y, z = g
     s, c = math.sin(by), math.cos(by)
     if what == 'roll':
@@ -192,22 +193,22 @@ def _turned(g: Gravity, what: str, by: float) -> Gravity:
     return (c * x + s * z, y, -s * x + c * z)
 
 
-# Sources named beside a bound.
+# Number of sources named with a bound.
 NAMED = 5
 
 
 @dataclass(slots=True)
 class Bounds:
-    """Bounds of moments; the effects of the sources on one moment are computed once."""
+    """Computes bounds of margins at given moments; the effects at one moment are computed once."""
 
     settings: Settings
     sources: tuple[Source, ...]
     _known: dict[tuple[Any, ...], Effects] = field(default_factory=dict)
 
     def worst(self, measure: ValueMeasure, method: str) -> dict[str, Any] | None:
-        """Return the bound at the moment that has least left beyond it; None: no bound is known.
+        """Return the bound for JSON at the moment with the least `excess`; None if not known.
 
-        `excess` is what is left to the limit less the bound; unit as people see it.
+        `excess` is the distance to the limit less the bound, in the unit people see.
         """
         demand = measure.demand
         ones = [self._one(demand, moment, method) for moment in measure.worst]
@@ -230,7 +231,7 @@ class Bounds:
         }
 
     def of(self, signal: str, moment: Moment) -> Floats | None:
-        """Return the effects (s,) of the sources on a signal at a moment; None: not known."""
+        """Return the effects (s,) of the sources on a signal at a moment; None if not known."""
         if not self.sources or signal not in _OF:
             return None
         key = (moment.q, moment.gravity, moment.payload)
@@ -239,7 +240,7 @@ class Bounds:
         return _OF[signal](self._known[key], moment, self.settings)
 
     def largest(self, effects: Floats, scale: float) -> list[dict[str, Any]]:
-        """Return the sources that count most, with what each does."""
+        """Return the NAMED sources with the largest effects, for JSON."""
         order = np.argsort(-np.abs(effects), kind='stable')[:NAMED]
         return [
             {'name': self.sources[k].name, 'effect': float(effects[k]) * scale}
@@ -283,7 +284,7 @@ def _tilt(effects: Effects, _: Moment, __: Settings) -> Floats:
     return effects.tilt
 
 
-# Sources are distinct, so a source of torque never is one of the limit: signs do not matter.
+# A source affects either the torque or the limit, never both, so signs do not matter.
 _OF: dict[str, Callable[[Effects, Moment, Settings], Floats]] = {
     'torque': _torque,
     'torque_margin': _margin,
@@ -295,7 +296,7 @@ _OF: dict[str, Callable[[Effects, Moment, Settings], Floats]] = {
 
 
 def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
-    """Return posture, attitude and payload of a moment for JSON; degrees, metres, kg."""
+    """Return posture, attitude and payload of a moment for JSON, in degrees, metres and kg."""
     gx, gy, gz = moment.gravity
     joints = {}
     for name, q in zip(settings.robot.joint_names, moment.q, strict=True):
@@ -310,7 +311,7 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
 
 
 def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: Bounds) -> None:
-    """Add to every joint's and to the tip-over margin of a result the bound at its worst moment."""
+    """Add the bound at the worst moment to each joint's and to the tip-over margin of `result`."""
     for measure in limits.measures.values():
         if not isinstance(measure, ValueMeasure):
             continue
@@ -323,7 +324,7 @@ def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: B
 
 
 def _scaled(bound: dict[str, Any], by: float, unit: str) -> dict[str, Any]:
-    """Return the bound of a utilisation as one of a torque."""
+    """Return the bound of a utilisation converted to torque by the limit `by` (N m; N)."""
     return {
         **bound,
         'bound': bound['bound'] * by,

@@ -1,7 +1,7 @@
-"""Judges each criterion, and the run by the worst of them: PASS, FAIL, INCONCLUSIVE.
+"""Judges each criterion, and the run by its worst outcome: PASS, FAIL or INCONCLUSIVE.
 
-A violation is a FAIL however little was evaluated; a PASS needs the data, and a margin beyond the
-bound of its uncertainty.
+A violation is a FAIL however little was evaluated; a PASS needs enough data, and a margin larger
+than the bound of its uncertainty.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,7 +42,10 @@ from ugv_acceptance.type_aliases import Json
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What verdicts are made from: measures, alerts, the data's numbers (a result), bounds."""
+    """What verdicts are made from: measurements, alerts, numbers about the data, uncertainty.
+
+    `data` is the part of the result that `quantities.DATA` reads.
+    """
 
     measurement: CriteriaMeasurement
     alerts: Sequence[Alert]
@@ -51,17 +54,17 @@ class Findings:
 
     @property
     def settings(self) -> Settings:
-        """Return the settings of the evaluation."""
+        """Settings of the evaluation."""
         return self.measurement.settings
 
     def seconds(self, time: int) -> float:
-        """Return seconds since the start of the recording."""
+        """Return a log time (ns) as seconds since the start of the recording."""
         return (time - self.measurement.start) / 1e9
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A verdict, why, and the numbers and sentences behind it, ready for JSON."""
+    """The verdict on one criterion with its reason, and the numbers and sentences behind it."""
 
     verdict: str
     reason: str
@@ -70,7 +73,7 @@ class Outcome:
 
 
 def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> str | None:
-    """Return why too little of a criterion's window was evaluated; None where enough was."""
+    """Return the reason if too little of a criterion's window was evaluated; None if enough was."""
     measurement = findings.measurement
     start, end = measurement.span_of(criterion.window)
     share, needed = evaluated / (end - start) if end > start else 0.0, measurement.criteria.coverage
@@ -83,7 +86,7 @@ def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> s
 
 
 def alert_words(alert: Alert, findings: Findings) -> str:
-    """Return an alert as a sentence with its times."""
+    """Return an alert as a sentence with level, code, begin and end."""
     end = 'the end' if alert.end is None else f'{findings.seconds(alert.end):.2f} s'
     return (
         f'{LEVELS[alert.rule.level]} {alert.rule.code} from {findings.seconds(alert.start):.2f} s '
@@ -92,7 +95,7 @@ def alert_words(alert: Alert, findings: Findings) -> str:
 
 
 def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
-    """Return what becomes of a criterion on a value."""
+    """Return the outcome of a criterion on a value."""
     measure = findings.measurement.measures[criterion.name]
     assert isinstance(measure, ValueMeasure)  # noqa: S101 - by its demand
     measured = _measured(measure, findings)
@@ -143,7 +146,7 @@ def _length(span: tuple[int, int]) -> float:
 
 
 def _measured(measure: ValueMeasure, findings: Findings) -> Json:
-    """Return a value's numbers in the unit people see."""
+    """Return a value criterion's measurement for JSON, in the unit people see."""
     demand, violation = measure.demand, measure.violation
     scale, unit = shown(demand.signal, demand.of, findings.settings)
     method = findings.measurement.criteria.uncertainty_of(measure.criterion)
@@ -188,7 +191,7 @@ _ALERT_OF = {
 
 
 def _related(measure: ValueMeasure, findings: Findings) -> list[str]:
-    """Return the alerts about the same margin, in words with their times."""
+    """Return the alerts about the same margin as sentences: the evidence for the outcome."""
     code, subject = _ALERT_OF.get(measure.demand.signal), measure.demand.of
     start, end = measure.span
     return [
@@ -202,7 +205,7 @@ def _related(measure: ValueMeasure, findings: Findings) -> list[str]:
 
 
 def judge_criteria(findings: Findings) -> Json:
-    """Return verdict, reasons and every criterion's outcome, ready for JSON."""
+    """Return the verdict of the run, its reasons and every criterion's outcome, for JSON."""
     criteria = findings.measurement.criteria
     outcomes = [(c, _outcome(c, findings)) for c in criteria.criteria]
     word, reasons = _overall([outcome for _, outcome in outcomes], findings)

@@ -1,7 +1,7 @@
-"""Compares measured efforts with static torques over a run: scale, offset, intervals.
+"""Compares measured efforts with static torques over a run, by least squares with intervals.
 
 At rest: bias, scale and sign of each joint's effort, and the payload that would explain the
-difference. In motion: friction, and the paper's F test of the run against its own slow part.
+difference. In motion: friction, and the paper's F test of the moving part against that at rest.
 """
 
 from dataclasses import dataclass, field
@@ -22,9 +22,9 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Coefficients (k,), half the width of each one's 95 % interval, and what samples count for.
+    """A least-squares fit: coefficients (k,) and half the width of each one's 95 % interval.
 
-    `independent` is the number of independent samples that n samples of one run are worth.
+    `independent` is the number of independent samples that the n samples of a run are worth.
     """
 
     value: Floats
@@ -33,7 +33,10 @@ class Fit:
 
 
 def independent_samples(residual: Floats) -> float:
-    """Return n (1 - r) / (1 + r) for the correlation r of neighbours (not below 0)."""
+    """Return the number of independent samples that correlated residuals (n,) are worth.
+
+    n (1 - r) / (1 + r) for the correlation r of neighbours, taken as at least 0.
+    """
     n = len(residual)
     centred = residual - residual.mean()
     power = float(centred @ centred)
@@ -44,7 +47,7 @@ def independent_samples(residual: Floats) -> float:
 
 
 def least_squares(columns: Floats, y: Floats) -> Fit | None:
-    """Return the fit of y (n,) by columns (n, k); None where it is not determined."""
+    """Return the least-squares fit of y (n,) by columns (n, k); None if it is not determined."""
     n, k = columns.shape
     scale = np.sqrt((columns**2).sum(axis=0))
     if n <= k or not (scale > 0.0).all():
@@ -64,18 +67,19 @@ def least_squares(columns: Floats, y: Floats) -> Fit | None:
     return Fit(value / scale, quantile * deviation / scale, worth)
 
 
-# Slower than this (rad/s or m/s) is at rest, faster than MOVING is in motion.
+# A joint slower than REST is at rest, one faster than MOVING in motion (rad/s or m/s).
 REST, MOVING = 0.02, 0.05
-# Samples are taken this far apart (ns).
+# Time between samples (ns).
 SPACING = 100_000_000
-# Fewer samples tell nothing.
+# Least number of samples for any statement.
 LEAST = 30
-# A scale needs torques that differ (standard deviation, N m or N), a payload a lever (N m a kg).
+# A scale needs torques that differ this much (standard deviation, N m or N), a payload this much
+# torque per kg (N m/kg).
 SPREAD, LEVER = 0.5, 0.5
 ALPHA = 0.05
-# An effort from this share of the joint's limit on is clipped: it does not tell the load.
+# An effort at this share of the joint's limit or above is clipped: it says nothing about the load.
 CLIPPED = 0.99
-# Less friction (N m, N m s/rad; N, N s/m) than this is rounding.
+# Friction (N m, N m s/rad; N, N s/m) below this is rounding.
 ROUNDING = 1e-6
 
 
@@ -87,7 +91,10 @@ class ModelCheck:
     _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins. A robot that has tipped rests on its arm: not those."""
+        """Take the margins of the next part of the recording, but none of a robot that has tipped.
+
+        It may rest on its arm, and then the efforts do not hold the arm against gravity.
+        """
         self._samples.add(rows, standing=True)
 
     def _lever(self, q: Floats, gravity: Floats) -> Floats:
@@ -99,7 +106,7 @@ class ModelCheck:
         return torque_gradient
 
     def result(self) -> Json:
-        """Return the comparison for JSON: each joint's, the payload of all, the speed's share."""
+        """Return the comparison for JSON: by joint, payload fitting all, share of slow samples."""
         names = self.settings.robot.joint_names
         time, (effort, torque, rate, q, gravity) = self._samples.samples(len(names))
         torque_gradient = self._lever(q, gravity)
@@ -130,7 +137,11 @@ class ModelCheck:
 
 @dataclass(frozen=True, slots=True)
 class _Samples:
-    """One joint's samples (n,): effort, torque, lever of a kg of payload, rate; slow: all rest."""
+    """One joint's samples (n,): measured effort, static torque, rate, and which are usable.
+
+    `torque_gradient` is the torque per kg of payload (N m/kg; N/kg), `slow` says that all joints
+    are at rest, `clipped` that the effort stands at its limit.
+    """
 
     effort: Floats
     torque: Floats
@@ -141,15 +152,15 @@ class _Samples:
 
     @property
     def difference(self) -> Floats:
-        """Measured effort less static torque."""
+        """Measured effort minus static torque (n,), N m or N."""
         return self.effort - self.torque
 
     def rest(self) -> NDArray[np.bool_]:
-        """Which samples tell of the robot at rest."""
+        """Return which samples (n,) are of the robot at rest with a known effort."""
         return self.slow & np.isfinite(self.effort)
 
     def motion(self) -> NDArray[np.bool_]:
-        """Which samples tell of this joint in motion."""
+        """Return which samples (n,) are of this joint in motion with a known effort."""
         return (np.abs(np.nan_to_num(self.rate)) > MOVING) & np.isfinite(self.effort)
 
 
@@ -202,7 +213,7 @@ def _sign(scale: Fit | None) -> str:
 
 
 def _interval(fit: Fit | None, k: int = 0) -> Json | None:
-    """Return a coefficient with its 95 % interval."""
+    """Return coefficient number k with its 95 % interval for JSON; None if there is none."""
     if fit is None or not np.isfinite([fit.value[k], fit.half_width[k]]).all():
         return None
     value, half = float(fit.value[k]), float(fit.half_width[k])
@@ -210,28 +221,28 @@ def _interval(fit: Fit | None, k: int = 0) -> Json | None:
 
 
 def _friction(s: _Samples) -> Json:
-    """Return Coulomb (N m) and viscous (N m s/rad) friction of difference against rate.
+    """Return Coulomb (N m) and viscous (N m s/rad) friction, from the difference over the rate.
 
-    `friction` is None where the run does not tell it; `friction_unknown` says why, else is empty.
+    `friction` is None if the run does not determine it; `friction_unknown` then says why.
     """
     motion = s.motion()
     rate = s.rate[motion]
     if len(rate) < LEAST:
         return {'friction': None, 'friction_unknown': 'too little motion'}
-    # Of motion one way alone the sign and the bias are one column: there is no fit.
+    # If all motion is in one direction, sign and bias are the same column: there is no fit.
     columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
     fit = least_squares(columns, s.difference[motion])
     if fit is None:
         return {'friction': None, 'friction_unknown': 'motion one way or at one speed alone'}
     found = {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
-    # Friction takes power: what certainly gives some is inertia, or a load that moves the arm.
+    # Friction dissipates: a surely negative coefficient is inertia, or a load that moves the arm.
     if any(part is not None and part['high'] < -ROUNDING for part in found.values()):
         return {'friction': None, 'friction_unknown': 'other forces outweigh it'}
     return {'friction': found, 'friction_unknown': ''}
 
 
 def _f_test(s: _Samples) -> Json | None:
-    """Return F of the motion's mean square error against that at rest (equations 9 and 10)."""
+    """Return the F test of the mean square error in motion against that at rest (eq. 9, 10)."""
     rest, motion = s.difference[s.rest()], s.difference[s.motion()]
     if min(len(rest), len(motion)) < LEAST or not (rest**2).sum() > 0.0:
         return None
@@ -251,7 +262,7 @@ def _f_test(s: _Samples) -> Json | None:
 
 
 def _pooled_payload(samples: list[_Samples]) -> Json | None:
-    """Return the payload beside the declared one that explains all joints at rest best (kg)."""
+    """Return the payload (kg) in addition to the declared one that best fits all joints at rest."""
     columns, y = [], []
     for s in samples:
         rest = s.rest()

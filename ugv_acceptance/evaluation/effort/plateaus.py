@@ -1,4 +1,4 @@
-"""Measured effort beside static torque where joints rest, and the payload it tells of."""
+"""Compares measured effort with static torque while joints rest, and estimates the payload."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -23,21 +23,22 @@ SPACING = 50_000_000
 BIN = 1_000_000_000
 STEP_SHARE = 0.05
 STEP_LEAST = 1.0
-# A joint that feels less than this of a kg (N m or N) tells nothing of a payload.
+# A joint with less torque per kg of payload than this (N m or N) does not determine the payload.
 SLOPE_LEAST = 1.0
 # An effort this close to a limit (as a share of it) is clipped there.
 CLIPPED = 0.999
-# The share of a joint's limit that its load must need before the sign of its effort tells anything,
-# and how far from the load, as a share of it, the opposite effort may be.
+# The sign of an effort is checked if the static torque is at least this share of the limit; it is
+# opposite if effort and minus the torque differ by at most this share of the torque.
 TELLING, ALIKE = 0.1, 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
-    """A stretch at rest: times (ns), medians of measured effort and static torque (N m; N).
+    """A period at rest with constant effort: medians of measured effort and static torque (N m; N).
 
-    `slope` is what the joint feels of a kg of payload (N m or N); `payload` (kg) would explain the
-    difference, None where the joint cannot tell. `saturated`: the effort was clipped at a limit.
+    `start`, `end` in ns; `slope` is the torque per kg of payload (N m or N); `payload` (kg) would
+    explain the difference, None if the joint does not determine it. `saturated`: the effort was
+    clipped at a limit.
     """
 
     start: int
@@ -51,23 +52,23 @@ class Plateau:
 
 @dataclass(frozen=True, slots=True)
 class _Held:
-    """What the model says of samples (n,): a joint's static torque, postures (n, j), gravity."""
+    """Samples of a joint at rest: its static torque (n,), postures (n, j) and gravity (n, 3)."""
 
     torque: Floats
     q: Floats
     gravity: Floats
 
     def rows(self, rows: slice) -> '_Held':
-        """Some of the samples."""
+        """Return the given samples."""
         return _Held(self.torque[rows], self.q[rows], self.gravity[rows])
 
 
 def opposed_joints(
     settings: Settings, torque: Sequence[float], rates: Sequence[float], effort: Sequence[float]
 ) -> list[str]:
-    """Return the joints at rest whose effort is about minus what their load needs.
+    """Return the joints at rest whose effort is about minus their static torque: a wrong sign.
 
-    N m (N), rad/s (m/s); a rate or effort that is not known is NaN.
+    `torque` and `effort` in N m (N), `rates` in rad/s (m/s); unknown rates or efforts are NaN.
     """
     joints = zip(
         settings.robot.joint_names, settings.limits.torque, torque, rates, effort, strict=True
@@ -83,17 +84,17 @@ def opposed_joints(
 
 @dataclass(slots=True)
 class EffortComparison:
-    """Gathers samples of a run, at most twenty a second; splits rest into plateaus of effort."""
+    """Collects samples of a run, at most twenty a second, and finds its plateaus of effort."""
 
     settings: Settings
     _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
 
     def add(self, rows: MarginRows) -> None:
-        """Take the next stretch of margins."""
+        """Take the margins of the next part of the recording."""
         self._samples.add(rows)
 
     def plateaus(self, j: int) -> list[Plateau]:
-        """Return the plateaus of joint number j; none where no effort was recorded."""
+        """Return the plateaus of joint number j; none if no effort was recorded."""
         time, (effort, torque, rate, q, gravity) = self._samples.samples(len(self.settings.joints))
         moving = np.abs(np.nan_to_num(rate[:, j])) > REST
         good = np.isfinite(effort[:, j]) & ~moving
@@ -119,7 +120,7 @@ class EffortComparison:
         return Plateau(int(time[0]), int(time[-1]), measured, model, slope, payload, saturated)
 
     def _saturated(self, j: int, effort: Floats, model: float, most: float) -> bool:
-        """Return whether an effort stands at a known limit, or at the run's largest."""
+        """Return whether an effort stands at a known limit, or at the largest of the run."""
         name = self.settings.robot.joint_names[j]
         level = abs(float(np.median(effort)))
         limits = (self.settings.limits.torque[j], self.settings.robot.joint(name).effort)
@@ -166,26 +167,27 @@ def _split(time: NDArray[np.int64], effort: Floats) -> Iterator[slice]:
             first = k
 
 
-# An estimate needs joints that feel at least this (N m a kg, all together); a load that differs by
-# less (kg) is not told; and it must explain this share of what the model leaves unexplained.
+# An estimate needs at least FELT torque per kg over all joints (N m/kg); a load that differs by
+# less than DIFFERS (kg) counts as the declared one; the estimate must explain the share EXPLAINED
+# of the difference.
 FELT, DIFFERS, EXPLAINED = 1.0, 0.5, 0.75
 
 
 @dataclass(frozen=True, slots=True)
 class PayloadEstimate:
-    """The `mass` (kg) that explains the efforts, and the one that is declared."""
+    """The payload `mass` (kg) that explains the measured efforts, and the declared one."""
 
     mass: float
     declared: float
 
     @property
     def differs(self) -> bool:
-        """Whether it is another load than the declared one."""
+        """Whether the estimate differs from the declared payload by at least DIFFERS."""
         return abs(self.mass - self.declared) >= DIFFERS
 
     @property
     def sentence(self) -> str:
-        """What to tell the operator."""
+        """The sentence for the operator."""
         return (
             f'the motors work as if {max(self.mass, 0.0):.1f} kg were in the hand, '
             f'{self.declared:.1f} kg are declared'
@@ -200,10 +202,10 @@ def payload_estimate(
     gravity: Sequence[float],
     payload: Payload,
 ) -> PayloadEstimate | None:
-    """Return the payload that explains `effort` (j,), be it the declared one or another.
+    """Return the payload that best explains the measured `effort` (j,): declared or another.
 
-    None while a joint moves, where no effort is known, where the posture does not tell, or where no
-    payload would explain it. rad, rad/s, N m (N), m/s2.
+    None while a joint moves, if no effort is known, if the posture does not determine it, or if no
+    payload explains the efforts. rad, rad/s, N m (N), m/s2.
     """
     measured, rates = np.array(effort, dtype=np.float64), np.nan_to_num(np.array(qd))
     # Many drivers that measure no effort send zeros.
@@ -218,10 +220,10 @@ def payload_estimate(
         return None
     more = float(felt @ open_ / (felt @ felt))
     rest = open_ - more * felt
-    # A difference that no load explains tells nothing of the load.
+    # A difference that no load explains says nothing about the load.
     if rest @ rest > max((1.0 - EXPLAINED) * (open_ @ open_), DIFFERS**2 * (felt @ felt)):
         return None
-    # Nothing that hangs in a hand pulls it up: the arm leans on something, or a sign is wrong.
+    # A load cannot have a negative mass: the arm leans on something, or a sign is wrong.
     return (
         None
         if payload.mass + more < -DIFFERS

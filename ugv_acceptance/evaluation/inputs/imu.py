@@ -1,10 +1,10 @@
-"""IMU messages to gravity in `base_link`, and what is wrong with them.
+"""From IMU messages to gravity in `base_link`, and the faults of the IMU.
 
-The orientation is used where the message claims it and it is a rotation that says something; else
-the low-passed accelerometer, and unless the message says that it has none, that is a fault.
-Orientation and accelerometer must agree at rest, and the accelerometer must show gravity: while
-they do not, there is no gravity. The same steps are written for one message and for columns; a
-property test holds that both give the same rows.
+The orientation is used if the message provides one that is a valid rotation and not just a default;
+else the low-passed accelerometer, which is a fault unless the message declares that it has no
+orientation. Orientation and accelerometer must agree at rest, and the accelerometer must measure g:
+otherwise gravity is unknown. The same steps are written for one message and for columns; a property
+test holds that both give the same rows.
 """
 
 import math
@@ -32,19 +32,20 @@ Mask = NDArray[np.bool_]
 
 # A unit quaternion's norm may be this far from 1 (single precision, rounding).
 NORM_SLACK = 0.01
-# Share of g by which the accelerometer may differ from g and still show where up is.
+# Share of g by which the accelerometer may differ from g and still give the direction of gravity.
 GRAVITY_SLACK = 0.15
-# A specific force below this share of g is that of a fall, or no specific force.
+# A specific force below this share of g means a fall, or is not a specific force.
 FALL = 0.5
-# What came of the orientations of messages.
+# How the orientation of a message was treated; 'told_nothing': invalid, or only a default.
 ORIENTATIONS = ('used', 'not_given', 'told_nothing')
 
 
 @dataclass(frozen=True, slots=True)
 class ImuRows:
-    """One row a message: `gravity` (n, 3) m/s2 in `base_link`, NaN where it cannot be told.
+    """Gravity from IMU messages, one row a message: `gravity` (n, 3) m/s2 in `base_link`.
 
-    `unusable` (n,) says that gravity cannot be told or that a number cannot be believed.
+    NaN where it is unknown. `unusable` (n,) says that gravity is unknown or a number implausible.
+    `time` is of receipt, `stamp` of the header (ns).
     """
 
     time: Times
@@ -55,7 +56,7 @@ class ImuRows:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSignals:
-    """What is watched of the way to gravity: where the IMU sits, what it says, what contradicts."""
+    """The signals of IMU faults: foreign frame, empty orientation, wrong g, disagreement."""
 
     frame: Signal
     orientation: Signal
@@ -65,10 +66,10 @@ class AttitudeSignals:
 
 @dataclass(slots=True)
 class ImuTracker:
-    """The smooth acceleration, and the faults of what messages say about the attitude.
+    """Turns IMU messages into gravity; holds the low-pass filter and the signals of IMU faults.
 
-    While one of them is active and not just a warning there is no gravity. `taken` counts messages
-    as ORIENTATIONS says; not given is covariance -1.
+    While a fault of a level above WARN is active, gravity is unknown. `taken` counts messages by
+    ORIENTATIONS; an orientation is 'not_given' if its covariance is -1 (REP-145).
     """
 
     settings: Settings
@@ -92,7 +93,7 @@ class ImuTracker:
         acceleration: Sequence[float],
         frame: str = '',
     ) -> tuple[Vector, bool]:
-        """Take one message; return its gravity and unusable as in ImuRows."""
+        """Take one message in sensor axes; return `gravity` and `unusable` as in ImuRows."""
         smooth = self.low_pass.step(stamp, acceleration)
         size = _norm(smooth)
         imu, g = self.settings.imu, self.settings.robot.gravity
@@ -115,7 +116,7 @@ class ImuTracker:
         believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
         doubted = apart if told else math.nan
         of, seen = self.faults, self._busy or self._foreign or empty >= 0.5
-        # Quiet signals have nothing to do with small values: most calls are saved.
+        # Small values cannot change quiet signals: most calls are saved.
         seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
         if seen and self._judge(now, empty, strange, doubted):
             return NOWHERE, True
@@ -129,7 +130,7 @@ class ImuTracker:
         return (-g * up[0], -g * up[1], -g * up[2]), not believable or up[0] != up[0]
 
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
-        """Feed the faults with a message; return whether one of them takes gravity away."""
+        """Feed the fault signals with a message; return whether a fault makes gravity unknown."""
         of, lost = self.faults, False
         signals = (of.frame, of.orientation, of.strange, of.disagreement)
         for signal, value in zip(signals, (self._foreign, empty, strange, apart), strict=True):
@@ -167,7 +168,10 @@ class ImuTracker:
         smooth: Floats,
         foreign: Floats,
     ) -> ImuRows:
-        """Return the rows of orientation, its covariance and rate, and the smooth acceleration."""
+        """Return the rows from `told_by` (orientation, covariance, rate) and filtered acceleration.
+
+        Shapes (4, n), (n,), (3, n) and (3, n); `foreign` (n,) is 1 for messages of another frame.
+        """
         imu, g = self.settings.imu, self.settings.robot.gravity
         q, covariance_0, omega = told_by
         size, spin = _norms(smooth), _norms(omega)
@@ -206,7 +210,7 @@ class ImuTracker:
         ]
 
     def _judge_rows(self, time: Times, faults: Sequence[Floats], gravity: Floats) -> None:
-        """Feed the faults; take gravity away while one is active that is not just a warning."""
+        """Feed the fault signals; set gravity to NaN while one above the level WARN is active."""
         of = self.faults
         signals = (of.frame, of.orientation, of.strange, of.disagreement)
         for signal, values in zip(signals, faults, strict=True):
@@ -216,7 +220,7 @@ class ImuTracker:
 
 
 def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[float, float]]:
-    """Feed a signal; yield from when until before when (ns) each of its alerts is active."""
+    """Feed a signal with columns; yield begin and end (ns) of each alert, infinite while active."""
     before, seen = signal.alert, len(signal.log)
     feed(signal, time, values)
     for alert in [before, *signal.log[seen:]]:
@@ -225,7 +229,7 @@ def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[fl
 
 
 def _foreign(frame: str, expected: str) -> float:
-    """Return 1 where a message names another frame than it should; a prefix of names is none."""
+    """Return 1 if a message names another frame than `expected` (a namespace may precede)."""
     named = frame.lstrip('/')
     same = named in ('', expected) or named.endswith(f'/{expected}')
     return 0.0 if same or not expected else 1.0
@@ -236,9 +240,9 @@ def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:
 
 
 def _empty(rotation: bool, apart: float, imu: ImuInput) -> float:  # noqa: FBT001 - as of rows
-    """Return 1 where an orientation that is given tells nothing; NaN where that is not known.
+    """Return 1 if a given orientation is invalid or only a default, else 0; NaN if not known.
 
-    The identity may be true: it tells nothing where the accelerometer at rest denies it.
+    A level orientation may be true: it counts as a default if the accelerometer at rest disagrees.
     """
     if imu.attitude == 'accelerometer':
         return 0.0
@@ -248,7 +252,7 @@ def _empty(rotation: bool, apart: float, imu: ImuInput) -> float:  # noqa: FBT00
 
 
 def _empty_rows(rotation: Mask, apart: Floats, imu: ImuInput) -> Floats:
-    """Return `_empty` of many."""
+    """Return `_empty` of many messages, shape (n,)."""
     if imu.attitude == 'accelerometer':
         return np.zeros(len(apart))
     denied = np.where(np.isnan(apart), np.nan, apart >= imu.agreement)
@@ -261,7 +265,7 @@ def _norm(v: Sequence[float]) -> float:
 
 
 def _lines(tables: Sequence[Floats]) -> Floats:
-    """Return tables (n, k) one after the other as k contiguous lines."""
+    """Concatenate tables (n, k) and return them transposed, (k, sum of n), in contiguous rows."""
     out = np.empty((tables[0].shape[1], sum(map(len, tables))))
     return np.concatenate([table.T for table in tables], axis=1, out=out)
 
@@ -273,7 +277,10 @@ def _norms(v: Floats) -> Floats:
 
 
 def _force(smooth: Values, omega: Values, imu: ImuInput) -> Values:
-    """Return minus the specific force at base_link's origin (m/s2, base axes)."""
+    """Return minus the specific force at the origin of `base_link` (m/s2, base axes).
+
+    `smooth` (m/s2) and `omega` (rad/s) in sensor axes; the angular acceleration is left out.
+    """
     force = rotate(imu.mounting, smooth)
     spin = rotate(imu.mounting, omega)
     arm = scale(imu.position, -1.0)

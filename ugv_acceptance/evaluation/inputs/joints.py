@@ -1,8 +1,9 @@
-"""Joint states to the robot's joints: names, signs, offsets, partial messages merged.
+"""From JointState messages to the robot's joints: names, signs, offsets, partial messages merged.
 
-Once a second every joint's position is compared with that of the second before: what moves faster
-than the joint can is another unit or another joint, and counts for nothing. So does what jumps to
-and fro between messages: two robots tell of one joint, and nobody knows which to believe.
+Implausible jumps are found as well. Once a second every joint's position is compared with that of
+the second before: one that moved faster than the joint can has another unit or belongs to another
+joint, and is unknown. So is one that jumps back and forth between messages: two robots publish the
+same joint.
 """
 
 import math
@@ -22,25 +23,26 @@ from ugv_acceptance.type_aliases import Floats, Times
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-# A position this far (rad or m) beyond a joint's limits cannot be the joint's.
+# A position further than this (rad or m) beyond a joint's limits is not the joint's.
 BEYOND = 0.1
-# Larger than any position a turning joint can have gathered: the number is not an angle.
+# Larger than any angle (rad) a continuous joint can have reached: the number is not an angle.
 ABSURD = 1e5
 NEVER = -1
-# Positions are compared in every one of these stretches of time (ns), if so much lies between them.
+# Positions are compared once in every SECOND (ns), if at least APART (ns) lies between them.
 SECOND, APART = 1_000_000_000, 500_000_000
-# Two messages may hold what lies this much (ns) apart: they are late, or overtake each other. A
-# joint that was homed jumps once, a wrong reading there and back; so many jumps contradict.
+# Two messages may hold positions measured up to SHORTEST (ns) further apart than their receipt: one
+# was late, or overtook the other. A joint that was homed jumps once, a wrong reading twice (there
+# and back); MANY jumps within a second mean two publishers.
 SHORTEST, MANY = 10_000_000, 3
 
 
 @dataclass(frozen=True, slots=True)
 class JointRows:
-    """Merged joint states, one row a message that names one of the robot's joints.
+    """Merged joint states, one row a message that names at least one of the robot's joints.
 
-    `q` (n, j) is NaN where a joint is unknown or its value cannot be used; `qd` and `effort` NaN
-    where not reported or beyond belief; `oldest` (n,) is the receipt time of the oldest position in
-    the row.
+    `q` (n, j) in rad (m) is NaN where a joint is unknown or its value unusable; `qd` in rad/s (m/s)
+    and `effort` in N m (N) where not reported or implausible; `oldest` (n,) is the receipt time
+    (ns) of the oldest position in the row; `unusable` (n,) marks a value that cannot be used.
     """
 
     time: Times
@@ -54,9 +56,10 @@ class JointRows:
 
 @dataclass(slots=True)
 class Layout:
-    """The robot's joints in messages of some names, and the second last looked at for jumps.
+    """Where the robot's joints stand in messages with one list of names.
 
-    `pairs` are (joint number, place in the message).
+    `pairs` are (joint number, place in the message); `second` is the last second in which their
+    positions were checked for jumps.
     """
 
     pairs: list[tuple[int, int]]
@@ -65,10 +68,11 @@ class Layout:
 
 @dataclass(slots=True)
 class JointMerger:
-    """Holds the newest position, rate and effort of every joint, in robot convention.
+    """Merges JointState messages: the newest position, rate and effort of every joint.
 
-    `jump_signals` are those of the joints for implausible jumps; while one has an alert, the
-    position of its joint is unknown.
+    In the robot's convention (sign and offset applied). `jump_signals` are the joints' signals for
+    implausible jumps; while one has an alert, the position of its joint is unknown. `seen` (j,) is
+    when each joint was last received (ns).
     """
 
     settings: Settings
@@ -95,14 +99,14 @@ class JointMerger:
         self._range = list(map(_believable, joints))
         self._before = [(NEVER, math.nan)] * n
         self._told, self._jumps = [math.nan] * n, [0] * n
-        # What a joint can move by between two messages that come at once.
+        # The most a joint can move (rad, m) between two messages received at the same time.
         self._most = [s.rule.on * SHORTEST / SECOND for s in self.jump_signals] or [math.inf] * n
         self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
 
     def layout(self, names: tuple[str, ...]) -> Layout:
         """Return where the robot's joints stand among `names`.
 
-        A name that stands twice in a message cannot be told apart and is left out.
+        A name that occurs twice in a message is ambiguous and left out.
         """
         found = self._layouts.get(names)
         if found is None:
@@ -149,7 +153,7 @@ class JointMerger:
         return True
 
     def _look(self, now: int, layout: Layout) -> None:
-        """Look for leaps of the joints that a message named; forget the positions of those."""
+        """Check the joints that a message named for implausible jumps; drop positions with one."""
         if now // SECOND != layout.second:
             layout.second = now // SECOND
             for j, _ in layout.pairs:
@@ -162,7 +166,7 @@ class JointMerger:
         self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
 
     def _compare(self, j: int, now: int, q: float) -> None:
-        """Compare joint number j's position with the one before; a turn of it may be wrapped."""
+        """Compare joint j's position with that of the second before; a full turn may be wrapped."""
         then, before = self._before[j]
         if not self.jump_signals or math.isnan(q) or (then != NEVER and now - then < APART):
             return
@@ -176,7 +180,7 @@ class JointMerger:
             )
 
     def _jumped(self, j: int, way: Values, apart: Values) -> Values:
-        """Return whether joint number j cannot have moved so far in so long (ns), nor turned."""
+        """Return whether joint j cannot have moved by `way` (rad, m; wrapped) in `apart` (ns)."""
         way = np.minimum(way, abs(way - self._turn[j]))
         return way > self._most[j] * np.maximum(apart / SHORTEST, 1.0)
 
@@ -209,7 +213,10 @@ class JointMerger:
     def _look_at(
         self, time: Times, q: Floats, named: Mask, rows_of: Sequence[tuple[Layout, Indices]]
     ) -> None:
-        """Look for leaps in the positions (j, n) that messages name, as `_look` at each of them."""
+        """Check the positions (j, n) for implausible jumps, as `_look` does for each message.
+
+        Positions with a jump become NaN in place. `rows_of` pairs each layout with its rows.
+        """
         before, seen = [signal.alert for signal in self.jump_signals], len(self.jump_signals[0].log)
         looks: list[tuple[int, int]] = []
         for layout, rows in rows_of:
@@ -233,7 +240,7 @@ class JointMerger:
         self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
 
     def _jump_rows(self, j: int, time: Times, q: Floats, named: Mask) -> Indices:
-        """Return the rows at which joint number j jumps, as `merge` finds them."""
+        """Return the rows at which joint number j jumps, as `merge` counts them."""
         rows = np.arange(len(q)) if named.all() else np.flatnonzero(named)
         if not len(rows) or self._most[j] == math.inf:
             return rows[:0]
@@ -291,12 +298,12 @@ class JointMerger:
 
 
 def _believe(values: Floats, limits: tuple[float, float]) -> None:
-    """Put NaN in place of values that cannot be believed."""
+    """Replace values outside `limits` by NaN, in place."""
     inside = (values >= limits[0]) & (values <= limits[1])
     if not inside.all():
         values[~inside] = np.nan
 
 
 def _believable(joint: Joint) -> tuple[float, float]:
-    """Return the positions that can be this joint's: its limits and a little more."""
+    """Return the range of plausible positions of a joint: its limits plus BEYOND (rad or m)."""
     return max(joint.lower - BEYOND, -ABSURD), min(joint.upper + BEYOND, ABSURD)

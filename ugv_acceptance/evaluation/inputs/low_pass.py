@@ -11,7 +11,7 @@ from ugv_acceptance.model.robot import Vector
 from ugv_acceptance.type_aliases import Floats, Times
 
 NOWHERE: Vector = (math.nan, math.nan, math.nan)
-# Seconds between stamps over which the low-pass may be carried; else it starts again.
+# After a longer gap between stamps (s) the filter starts anew.
 LONGEST_STEP = 1.0
 # Larger than any acceleration (m/s2) or rate (rad/s) of a vehicle: the number is something else.
 BELIEVABLE = 1e3
@@ -19,14 +19,14 @@ BELIEVABLE = 1e3
 
 @dataclass(slots=True)
 class LowPass:
-    """A filter of first order with a time `constant` (s); holds what came out last, and when."""
+    """A first-order low-pass filter with a time `constant` (s); `smooth` is its last output."""
 
     constant: float
     smooth: Vector = NOWHERE
     stamp: int = 0
 
     def step(self, stamp: int, acceleration: Sequence[float]) -> Vector:
-        """Take an acceleration (m/s2), its stamp (ns); return the smooth one, NaN if unknown."""
+        """Take an acceleration (m/s2) and its stamp (ns); return it filtered, NaN if unknown."""
         ax, ay, az = acceleration
         if not ax * ax + ay * ay + az * az <= BELIEVABLE * BELIEVABLE:
             ax = ay = az = math.nan
@@ -40,10 +40,10 @@ class LowPass:
         return self.smooth
 
     def columns(self, stamp: Times, x: Floats) -> Floats:
-        """Low-pass many accelerations (3, n): the recursion of `step` in closed form.
+        """Filter accelerations (3, n) with stamps (n,): the recursion of `step` in closed form.
 
-        Stretches of a few time constants at a time, so that the products of the decay factors stay
-        far from the ends of the number range.
+        A few time constants at a time, so that the products of the decay factors neither overflow
+        nor underflow.
         """
         step = np.diff(stamp, prepend=self.stamp) * 1e-9
         self.stamp = int(stamp[-1])
@@ -61,7 +61,7 @@ class LowPass:
         last = np.array(self.smooth)
         for first, end in pairwise(edges.tolist()):
             part, w = x[:, first:end], y[:, first:end]
-            # What the output lacks of the input decays, and grows by each step of the input.
+            # The output's lag behind the input decays, and grows by each change of the input.
             fresh = not carried[first] or not np.isfinite(last).all()
             since = elapsed[first] if fresh else elapsed[first] - decay[first]
             keep = np.exp(since - elapsed[first:end])

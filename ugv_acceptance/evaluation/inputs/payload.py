@@ -1,4 +1,4 @@
-"""The declared payload: which messages can be believed, and what held at which time."""
+"""The declared payload: which messages are plausible, and which payload was in force when."""
 
 import math
 from collections.abc import Sequence
@@ -11,18 +11,18 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.type_aliases import Floats, Times
 
-# More than any load or reach of a robot arm: the number is not a mass (kg), not a distance (m).
+# More than any load (kg) or reach (m) of a robot arm: the number is something else.
 ABSURD_MASS = 1e5
 ABSURD_DISTANCE = 1e3
-# Before any message.
+# A time (ns) before any message.
 BEFORE = -(2**62)
 
 
 def payload_from(robot: Robot, mass: float, com: Sequence[float], frame: str) -> Payload | None:
-    """Return the payload of a message, None where it cannot be used.
+    """Return the payload of a message, None if it cannot be used.
 
-    The mass (kg) must be a believable number and not negative, the centre of gravity (m) too, and
-    given in the axes of the robot's payload link (an empty frame is taken for that).
+    The mass (kg) must be plausible and not negative, the centre of gravity (m) plausible and given
+    in the axes of the robot's payload link (an empty frame means that link).
     """
     x, y, z = (float(c) for c in com)
     known = robot.payload_link is not None and frame.lstrip('/') in ('', robot.payload_link)
@@ -35,7 +35,7 @@ def payload_from(robot: Robot, mass: float, com: Sequence[float], frame: str) ->
 
 @dataclass(slots=True)
 class PayloadHistory:
-    """Which payload was in force when: since (ns) and the payload, oldest first."""
+    """The payloads in force while a recording is read; old ones are forgotten."""
 
     initial: Payload
     _since: list[int] = field(init=False)
@@ -45,14 +45,15 @@ class PayloadHistory:
         self._since, self._declared = [BEFORE], [self.initial]
 
     def declare(self, when: int, payload: Payload) -> None:
-        """Take a payload that counts from the first joint state at or after `when` (ns) on."""
+        """Add a payload, in force from the first joint state received at or after `when` (ns)."""
         self._since.append(when)
         self._declared.append(payload)
 
     def at(self, times: Times) -> tuple[Floats | float, ...]:
-        """Return mass and centre of gravity (4) in force at `times` (n,): floats if all the same.
+        """Return mass and centre of gravity (4) in force at `times` (n,) in ns, in order.
 
-        What was in force before the last of `times` is forgotten.
+        Floats if all are the same, else arrays (n,). Payloads that ended before the last of `times`
+        are forgotten.
         """
         since = np.array(self._since)
         first, last = (np.searchsorted(since, times[[0, -1]], side='right') - 1).tolist()
@@ -66,14 +67,14 @@ class PayloadHistory:
 
 @dataclass(slots=True)
 class PayloadLog:
-    """Every declared payload and since when (ns), so that a row's can be found again."""
+    """All payloads declared in a recording and since when (ns), to look one up later."""
 
     settings: Settings
     since: list[int] = field(default_factory=list)
     payloads: list[Payload] = field(default_factory=list)
 
     def take(self, segments: Sequence[PayloadColumns]) -> None:
-        """Take the payload messages of a batch."""
+        """Add the payload messages of a batch."""
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
             payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)

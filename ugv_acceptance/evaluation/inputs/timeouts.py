@@ -1,4 +1,4 @@
-"""Timeouts of inputs, by the time of receipt, and doubts about header stamps."""
+"""When an input is stale, judged by the time of receipt, and when its header stamps are wrong."""
 
 import math
 from dataclasses import dataclass, field
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.settings import Delays
 from ugv_acceptance.type_aliases import Times
 
-# Messages over which a period is learnt; until then the start-up limit holds.
+# Number of messages from which a period is learnt; until then silence is limited by STARTUP (ns).
 WINDOW = 32
 STARTUP = 500_000_000
-# Silence (s) that is stale whatever an input's period is: an operator must know within that time.
+# Silence (s) after which any input is stale, whatever its period: an operator must know by then.
 LONGEST_SILENCE = 2.0
 # Time (ns) by which two clocks may differ, or a stamp may jump, before it is worth a warning.
 CLOCK_SLACK = 1_000_000_000
-# Time (ns) for which messages may come with one and the same stamp.
+# Time (ns) for which messages may repeat the same stamp.
 STANDSTILL = 500_000_000
 
 
@@ -25,8 +25,8 @@ class InputTimeout:
     """Learns an input's period (median of each WINDOW intervals) and how long it may be silent.
 
     `started` is when listening began (ns), `last` when the newest message was received (None: none
-    yet), `moved` when its stamp was last another one than before, `limit` the silence (ns) after
-    which the input is stale.
+    yet), `stamp` its header stamp, `moved` when that stamp last changed, `limit` the silence (ns)
+    after which the input is stale.
     """
 
     delays: Delays
@@ -40,14 +40,14 @@ class InputTimeout:
 
     @property
     def deadline(self) -> int | None:
-        """When the input is stale unless a message comes first; None before listening began."""
+        """Time (ns) from which the input is stale without a message; None before listening."""
         since = self.started if self.last is None else self.last
         return None if since is None else since + self.limit
 
     def clock(self, now: int, stamp: int) -> float:
-        """Return 1 where a header stamp is far from the receipt time, jumped or stands, else 0.
+        """Return 1 if a header stamp is far from the receipt time, jumped or stands still, else 0.
 
-        To be asked before `message`.
+        Call it before `message`.
         """
         wrong = abs(now - stamp) > CLOCK_SLACK
         if self.last is not None:
@@ -57,7 +57,7 @@ class InputTimeout:
         return 1.0 if wrong or now - self.moved > STANDSTILL else 0.0
 
     def clocks(self, times: Times, stamps: Times) -> NDArray[np.float64]:
-        """Return `clock` of many messages, to be asked before `messages`."""
+        """Return `clock` of many messages (n,); call it before `messages`."""
         if not len(times):
             return np.zeros(0)
         ahead = times - stamps
@@ -76,7 +76,7 @@ class InputTimeout:
         return np.where(wrong, 1.0, 0.0)
 
     def judge_by(self, delays: Delays) -> None:
-        """Take other delays from now on; what was learnt of the period counts at once."""
+        """Use other delays from now on; a period already learnt gets its new limit at once."""
         self.delays = delays
         if not math.isnan(self.period):
             self.limit = self._silence(self.period)
@@ -90,7 +90,7 @@ class InputTimeout:
         self.last = now
 
     def messages(self, times: Times) -> tuple[Times, Times]:
-        """Take many (n,); return the limit (ns) in force before and after each one."""
+        """Take many receipt times (n,); return the limit (ns) in force before and after each."""
         fresh = self.last is None
         steps = np.diff(times, prepend=times[0] if self.last is None else self.last)
         known = np.array(self._intervals, dtype=np.int64)
