@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 
-# What users import from here -> the module it stands in, and its name there.
+# Public name -> the module that defines it, and its name there.
 _PUBLIC = {
     'Config': ('config', 'Config'),
     'Evaluation': ('offline.evaluation', 'Evaluation'),
@@ -57,10 +57,11 @@ __all__ = [
     'open_recording',
 ]
 
-# What only some verbs need, by pip's names. setup.py reads this table as text, the messages of
-# those verbs are made of it: this package is on no index, so its name with [console] gets nothing.
+# Packages that only some commands need, by their names on PyPI. setup.py reads this table as text,
+# and those commands name them in their error messages: this package itself is not on PyPI, so
+# `pip install ugv_acceptance[console]` would not work.
 EXTRAS: dict[str, tuple[str, ...]] = {
-    # Older ones of s3fs know no `endpoint_url`; pip falls back to them beside a newer botocore.
+    # Older versions of s3fs lack `endpoint_url`; pip falls back to them beside a newer botocore.
     'cluster': ('dask', 'distributed', 'fsspec', 's3fs>=2023.1'),
     'console': ('starlette', 'textual', 'uvicorn', 'websockets'),
     'fast': ('isal',),
@@ -72,14 +73,14 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 
 
 def pip_install(extra: str) -> str:
-    """Return the command that installs what an extra needs."""
+    """Return the pip command that installs the packages of one of EXTRAS."""
     import shlex  # noqa: PLC0415 - only errors need it: the import of the package stays cheap
 
     return f'pip install {shlex.join(EXTRAS[extra])}'
 
 
 class AcceptanceError(Exception):
-    """An error a user can act on: says where, what was expected and what came."""
+    """An error a user can act on: the message says where, what was expected and what was found."""
 
 
 class BadConfig(AcceptanceError):

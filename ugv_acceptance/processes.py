@@ -1,7 +1,7 @@
-"""Worker processes that end at once with the process that gave them work.
+"""Worker processes that end at once with the process that started them.
 
-A Ctrl-C on a terminal reaches every process there. Workers are deaf to it, so that none of them
-prints how it was broken off: this process hears it, and ends them.
+Ctrl-C on a terminal sends SIGINT to every process there. Workers ignore it, so that none of them
+prints a traceback: the parent process receives it and kills them.
 """
 
 import signal
@@ -16,10 +16,10 @@ _ENDING = (signal.SIGINT, signal.SIGTERM)
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool whose work is given up where its block is left by an exception, such as a signal's."""
+    """A process pool that kills its workers when its `with` block ends by an exception."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:  # noqa: ANN401 - as its base says
-        """Give work to a process, which may be started for it."""
+        """Submit a call as ProcessPoolExecutor does; a new worker starts with SIGINT blocked."""
         with _uninterrupted(), _deaf():
             return super().submit(fn, *args, **kwargs)
 
@@ -32,7 +32,7 @@ class Workers(ProcessPoolExecutor):
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Hear signals only after the block: a process broken off while it starts would say so."""
+    """Delay SIGINT and SIGTERM to the end of the block, so that no worker dies while it starts."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -49,8 +49,8 @@ def _uninterrupted() -> Iterator[None]:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Let processes that start meanwhile never hear SIGINT; this one hears it a little later."""
-    # Its start would end the block on the signal.
+    """Block SIGINT in processes started inside the block; this process gets it afterwards."""
+    # Started here, because starting it later would unblock SIGINT.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -1,13 +1,13 @@
-"""Names of types that stand in many signatures: arrays of numbers and times, and plain JSON."""
+"""Types that many signatures share: arrays of floats, arrays of times in ns, and JSON objects."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-# Numbers in SI units and radians; the shape stands where one is used.
+# Numbers in SI units and radians; each use says the shape.
 Floats = NDArray[np.float64]
-# Moments in ns: of receipt, of the log, of a header's stamp.
+# Times in ns: of receipt, of logging, or of a header's stamp.
 Times = NDArray[np.int64]
-# What json.dumps takes.
+# A JSON object, as json.dumps accepts it.
 Json = dict[str, Any]

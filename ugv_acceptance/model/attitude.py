@@ -1,8 +1,8 @@
 """The direction of gravity from an orientation or from an accelerometer.
 
 `mounting` turns sensor axes into `base_link`. `up` is the unit vector against gravity in
-`base_link`; level ground gives (0, 0, 1) (REP-103, REP-145). Where nothing can be said, a vector of
-length zero or an unknown number, the result is NaN.
+`base_link`; level ground gives (0, 0, 1) (REP-103, REP-145). A vector of length zero or a NaN gives
+NaN.
 """
 
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ def _roll_pitch_kernel() -> Kernel:
 
 
 def is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:
-    """Return whether a quaternion's norm is 1 to NORM_SLACK; False for NaN."""
+    """Return whether a quaternion's norm is within NORM_SLACK of 1; False for NaN."""
     square = x * x + y * y + z * z + w * w
     return (square >= (1.0 - NORM_SLACK) ** 2) & (square <= (1.0 + NORM_SLACK) ** 2)
 
@@ -78,16 +78,16 @@ def is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:
 def up_from_orientation(
     x: Values, y: Values, z: Values, w: Values, mounting: Matrix
 ) -> tuple[Any, Any, Any]:
-    """Return up from a quaternion that turns sensor axes into a world whose z is up.
+    """Return `up` (unit, `base_link`) from a quaternion from sensor axes to a world with z up.
 
-    Of any length but zero; `is_rotation` says whether it is one to be used.
+    Any length but zero will do; `is_rotation` tells whether the quaternion is a valid rotation.
     """
     ux, uy, uz = _orientation_kernel(mounting).run(x, y, z, w)
     return ux, uy, uz
 
 
 def up_from_acceleration(x: Values, y: Values, z: Values, mounting: Matrix) -> tuple[Any, Any, Any]:
-    """Return up from a specific force (sensor axes): +g upwards at rest."""
+    """Return `up` (unit, `base_link`) from a specific force in sensor axes: +g upwards at rest."""
     ux, uy, uz = _acceleration_kernel(mounting).run(x, y, z)
     return ux, uy, uz
 
@@ -99,7 +99,7 @@ def angle_between(a: Sequence[Any], b: Sequence[Any]) -> Values:
 
 
 def roll_pitch(up: Sequence[Any]) -> tuple[Any, Any]:
-    """Return roll and pitch (rad) of `base_link` from up: fixed axes x, then y (REP-103)."""
+    """Return roll and pitch (rad) of `base_link` from `up`: fixed axes x, then y (REP-103)."""
     roll, pitch = _roll_pitch_kernel().run(*up)
     return roll, pitch
 

@@ -1,4 +1,4 @@
-"""Runs a function of columns over arrays in blocks that fit the processor cache."""
+"""Runs a function over large arrays in blocks that fit the processor cache."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.type_aliases import Floats
 
-# Samples a block: more of them fall out of the cache, fewer pay more for each Python call.
+# Samples per block: more would not fit the cache, fewer would cost more Python calls.
 BLOCK = 65536
 
 
@@ -19,10 +19,10 @@ def in_blocks(
     *arrays: ArrayLike,
     workers: int = 1,
 ) -> Floats:
-    """Return `function` of the last axes' columns of `arrays`, shape (..., width).
+    """Return the `width` outputs of `function` for every sample of `arrays`, shape (..., width).
 
-    The arrays' leading axes broadcast together; their last axes are spread over the arguments, so
-    that arrays of shape (..., 2) and (..., 3) call function(a0, a1, b0, b1, b2) with (n,) columns.
+    The arrays' leading axes broadcast together; their last axes become the arguments, so that
+    arrays of shape (..., 2) and (..., 3) call function(a0, a1, b0, b1, b2) with (n,) columns.
     NumPy releases the interpreter inside each operation, so `workers` threads use as many cores.
     """
     parts = [np.asarray(a, dtype=np.float64) for a in arrays]

@@ -1,4 +1,7 @@
-"""Joint forces and torques: the recursive Newton-Euler algorithm over the tree, in base axes."""
+"""Joint forces and torques by the recursive Newton-Euler algorithm (Luh, Walker, Paul 1980).
+
+All vectors in base axes. Used for the dynamic torques; static ones come from torque_gradients.py.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +33,10 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Angular velocity, angular acceleration and acceleration of the origin of every body."""
+    """Motion of every body: angular velocity and acceleration, linear acceleration of its origin.
+
+    rad/s, rad/s2, m/s2, in base axes; index 0 is the base.
+    """
 
     omega: list[Vec]
     alpha: list[Vec]
@@ -64,12 +70,15 @@ def motion_of(
 
 
 def _carried(omega: Vec, alpha: Vec, arm: Vec) -> Vec:
-    """Return the acceleration of a point at `arm` on a rotating body, less its origin's."""
+    """Return a point's acceleration relative to its body's origin: alpha x r + omega x (omega x r).
+
+    `arm` is r, from the origin to the point (m).
+    """
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
 def joint_forces(tree: Tree, pose: Pose, motion: Motion, loads: Sequence[Load]) -> list[Scalar]:
-    """Return the torque (N m; N where prismatic) every joint must give to cause the motion."""
+    """Return the torque (N m; N if prismatic) every joint must exert to cause the motion."""
     forces: list[Vec] = []
     moments: list[Vec] = []
     for k, body in enumerate(tree.bodies):
@@ -87,7 +96,10 @@ def joint_forces(tree: Tree, pose: Pose, motion: Motion, loads: Sequence[Load]) 
 
 
 def _inertial(mass: Scalar, arm: Vec, motion: Motion, k: int) -> tuple[Vec, Vec]:
-    """Return force on a point mass at `arm` from body k's origin, and its moment about that."""
+    """Return the force that accelerates a point mass at `arm` on body k, and its moment.
+
+    `arm` (m) is from body k's origin, about which the moment (N m) is taken.
+    """
     carried = _carried(motion.omega[k], motion.alpha[k], arm)
     force = scale(add(motion.acceleration[k], carried), mass)
     return force, cross(arm, force)

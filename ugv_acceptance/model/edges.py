@@ -1,8 +1,9 @@
-"""Margins about the edges of one support polygon, compiled: force-angle, moment, energy, ZMP.
+"""Tip-over margins about each edge of a support polygon: force-angle, moment, energy, ZMP.
 
 Force-angle after Papadopoulos and Rey (2000): with gravity alone the angle is the tilt that is left
 about the edge. Energy margin after Messuri and Klein (1985), for a robot that rotates about the
-edge's line. What an edge between two points of the base contributes is folded to a few constants.
+edge's line. The formulas are compiled for each polygon; edges between two points of the base are
+constants of the compiled code.
 """
 
 import math
@@ -32,18 +33,19 @@ from ugv_acceptance.model.robot import ZERO
 from ugv_acceptance.model.row_selection import Values
 from ugv_acceptance.model.tree import in_body
 
-# Sides of the robot, by the direction in which an edge's outward normal points most.
+# Sides of the robot: an edge belongs to the side its outward normal points towards most.
 SIDES = ('front', 'left', 'rear', 'right')
 _NO_EDGE = float('inf')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corners:
-    """A support polygon of one robot: `moving` are the corners that do not belong to the base.
+    """A support polygon of one robot, and which of its corners move with a joint.
 
-    `sides` (numbers in SIDES) are those of its edges where no corner moves, else None.
-    The terms of a stance are the centre of gravity (3) and each moving corner (3): m, `base_link`.
-    `outward` takes the terms and returns each edge's outward normal (x, y; not of unit length).
+    `moving` are the corners on links other than the base. `sides` (numbers in SIDES) are the sides
+    of the edges if no corner moves, else None. The *terms* of a stance are the coordinates of the
+    centre of gravity (3) and of each moving corner (3): m, `base_link`. `outward` takes the terms
+    and returns each edge's outward normal (x, y; not of unit length).
     """
 
     polygon: Cycle
@@ -54,11 +56,11 @@ class Corners:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """The margins of a polygon whose edges lie on known sides.
+    """Compiled tip-over margins of one polygon, given on which side of the robot each edge lies.
 
-    Both take the terms of a stance, then mass (kg) and gravity (3). `angles` returns the tip angle
-    (rad) to each of SIDES; `margins` returns a tuple of them, one of moments (N m), one of energies
-    (J), and the ZMP distance (m). Infinite where there is no edge on a side.
+    Both kernels take the terms of a stance (see Corners), then mass (kg) and gravity (3).
+    `angles` returns the tip angle (rad) to each of SIDES; `margins` returns these angles, then the
+    moments (N m), the energies (J), and the ZMP distance (m). Infinite on a side without an edge.
     """
 
     angles: Kernel
@@ -67,7 +69,7 @@ class Edges:
 
 @lru_cache(maxsize=256)
 def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
-    """Return the corners of a polygon."""
+    """Return the Corners of a polygon: which of them move, and the outward normals of its edges."""
     contacts, frames = mechanics.robot.contacts, mechanics.tree.frames
     moving = tuple(k for k in polygon if frames[contacts[k].link][0] != 0)
 
@@ -84,7 +86,7 @@ def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
 
 @lru_cache(maxsize=256)
 def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> Edges:
-    """Return the kernels for a polygon whose edges lie on `sides`, numbers in SIDES."""
+    """Return the compiled margins of a polygon whose edges lie on `sides` (numbers in SIDES)."""
 
     def table(inputs: Sequence[Scalar]) -> tuple[list[list[Scalar]], Scalar]:
         *terms, mass, gx, gy, gz = inputs
@@ -117,7 +119,7 @@ def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> 
 def _points(
     mechanics: Mechanics, polygon: Cycle, moving: Sequence[int], terms: Sequence[Scalar]
 ) -> dict[int, Vec]:
-    """Return the polygon's corners: constants where the base carries them."""
+    """Return the corners' positions (m, `base_link`) by contact number; constant on the base."""
     points = {}
     for k in polygon:
         contact = mechanics.robot.contacts[k]
@@ -128,7 +130,7 @@ def _points(
 
 
 def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
-    """Return angle (rad), moment (N m a kg), energy (J a kg) and ZMP distance (m) of one edge."""
+    """Return angle (rad), moment (N m/kg), energy (J/kg) and ZMP distance (m) of one edge."""
     edge = subtract(end, start)
     along = scale(edge, 1.0 / sqrt(dot(edge, edge)))
     to_start = subtract(start, cog)
@@ -145,7 +147,7 @@ def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
 
 
 def side_of(x: Values, y: Values) -> Values:
-    """Return the number in SIDES towards which a normal points most: floats or arrays."""
+    """Return the number in SIDES of the side a normal (x, y) points towards: floats or arrays."""
     if isinstance(x, float) and isinstance(y, float):
         if abs(x) >= abs(y):
             return int(1.0 - math.copysign(1.0, x))

@@ -1,13 +1,13 @@
-"""Scalars and small vectors that are numbers or symbols, on which formulas are written.
+"""Symbolic scalars, and the vector functions in which the formulas of the model are written.
 
 A formula is an ordinary function of scalars (`x * y + sin(z)`). Run with floats it gives floats;
-run with symbols it records itself, and `kernels.compile_kernel` turns the record into code. On the
-way what is constant is folded and signs are drawn out of products, so that axis-aligned joints,
-fixed links and missing velocities cost nothing.
+run with symbols it records its operations, and `kernels.compile_kernel` turns the record into code.
+Constants are folded and signs moved out of products meanwhile, so that axis-aligned joints, fixed
+links and missing velocities cost nothing.
 
-Folding drops `0 * x` and `x - x`, so a NaN in a joint that cannot matter does not spread; whoever
-calls must judge the inputs themselves. Constants of one product are multiplied first: the last
-digit may differ from that of the formula run with floats.
+Folding drops `0 * x` and `x - x`, so a NaN in a joint that cannot matter does not spread: callers
+must check their inputs themselves. Constants of one product are multiplied first, so the last digit
+may differ from that of the formula run with floats.
 """
 
 import math
@@ -100,7 +100,7 @@ def _is(x: Scalar, value: float) -> bool:
 
 
 def _node(op: str, *args: Scalar) -> Expr:
-    """Return the one node of this operation, so that what is written twice is computed once."""
+    """Return the node of an operation, the same one each time: a repeated term is computed once."""
     if op in '+*' and _order(args[1]) < _order(args[0]):
         args = (args[1], args[0])
     known = next(a.known for a in args if isinstance(a, Expr))
@@ -153,12 +153,12 @@ def minimum(x: Scalar, y: Scalar) -> Scalar:
 
 
 def dot(a: Vec, b: Vec) -> Scalar:
-    """Return the scalar product."""
+    """Return the scalar product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vec, b: Vec) -> Vec:
-    """Return the vector product."""
+    """Return the vector product a x b."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -196,6 +196,6 @@ def transpose(r: Mat) -> Mat:
 
 
 def matmul(a: Mat, b: Mat) -> Mat:
-    """Return the matrix product."""
+    """Return the matrix product a b."""
     t = transpose(b)
     return (rotate(t, a[0]), rotate(t, a[1]), rotate(t, a[2]))

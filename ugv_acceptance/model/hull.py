@@ -1,7 +1,7 @@
 """Convex hulls of a few points, in the plane and in space.
 
-Samples of a recording are many, the ways in which their points form hulls few: what is found for
-one sample is taken by all others it fits.
+A recording has many samples but few different hulls: the hull found for one sample is tried on all
+the others, which is cheaper than computing each one's own.
 """
 
 import math
@@ -20,20 +20,20 @@ from ugv_acceptance.model.row_selection import ALL, Rows, Values, inner, pick
 Point = tuple[float, float, float]
 Cycle = tuple[int, ...]
 
-# A polygon thinner than this (m) has no inside that could be stood on.
+# A polygon thinner than this (m) counts as a line: nothing can stand on it.
 THIN = 1e-6
-# A triple at least as wide (m) tells the plane of its face as well as any other.
+# Three points at least this far (m) from a line define the plane of their face accurately.
 WIDE = 1e-2
-# Slack (m2) within which three points lie in one line.
+# Three points count as being in one line if twice the area of their triangle is below this (m2).
 _SLACK = 1e-12
-# A place outside the hull is drawn to it, and this part of the way further, to be inside.
+# A place outside the hull is moved to its border, and by this share of the way further inside.
 _INWARD = 1e-9
-# So many hulls are tried on all samples, before samples beside a limit are taken one by one.
+# Number of hulls tried on all samples; those still without one are then treated one by one.
 _TRIES = 50
 
 
 def pairs(cycle: Cycle) -> Iterator[tuple[int, int]]:
-    """Return the edges of a polygon, counter-clockwise."""
+    """Return the edges of a polygon as pairs of contact numbers, counter-clockwise."""
     return pairwise((*cycle, *cycle[:1]))
 
 
@@ -44,7 +44,11 @@ def _turn(a: Sequence[Any], b: Sequence[Any], c: Sequence[Any]) -> Values:
 
 @lru_cache(maxsize=256)
 def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
-    """Return the hull of the points (Andrew's monotone chain); () where it is degenerate."""
+    """Return the convex hull seen from above, as a cycle of `numbers`; () if it is degenerate.
+
+    Andrew's monotone chain. `numbers[k]` is the contact number of `points[k]` (m); the cycle runs
+    counter-clockwise from its smallest number.
+    """
     order = sorted(range(len(points)), key=lambda k: points[k][:2])
     hull: list[int] = []
     for run in (order, order[::-1]):
@@ -64,7 +68,10 @@ def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
 
 
 def _is_thin(points: Sequence[Any], largest: Callable[[list[Any]], Any]) -> Values:
-    """Return whether no triangle of the points is wider than THIN across their longest distance."""
+    """Return whether the points are within THIN of one line, seen from above.
+
+    `largest` is the maximum of a list: of floats for one sample, of arrays for many.
+    """
     thickest = largest([abs(_turn(*three)) for three in combinations(points, 3)])
     square = largest([(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)])
     return thickest * thickest <= THIN * THIN * square
@@ -75,9 +82,10 @@ def _largest(values: list[Any]) -> Values:
 
 
 def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cycle, Rows]]:
-    """Return the hulls of the active points of `count` samples, each with its rows.
+    """Yield each hull of the active points that occurs in `count` samples, with its rows.
 
-    The hull of the first sample is taken by all samples it fits; so on until none is left.
+    The hull of the first sample is assigned to all samples it fits; then that of the first sample
+    left over, and so on.
     """
     if not any(isinstance(x, np.ndarray) for k in active for x in points[k]):
         yield hull(tuple(points[k] for k in active), active), ALL
@@ -100,14 +108,14 @@ def hulls(points: Sequence[Any], active: Cycle, count: int) -> Iterator[tuple[Cy
 
 
 def sample(values: Values, row: int) -> Values:
-    """Return one sample of nested tuples of floats and arrays: floats all."""
+    """Return one row of nested tuples of floats and arrays, as nested tuples of floats."""
     if isinstance(values, tuple):
         return tuple([sample(part, row) for part in values])
     return float(values[row]) if isinstance(values, np.ndarray) else values
 
 
 def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
-    """Return where `cycle` is the hull of the active points, by the rules of `hull`."""
+    """Return for which samples `cycle` is the hull of the active points, as `hull` finds it."""
     if len(active) < 3:
         return True
     if not cycle:
@@ -123,7 +131,10 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
 
 @lru_cache(maxsize=16)
 def _turns_kernel(count: int) -> Kernel:
-    """Return the turns of all pairs of `count` points about a place, from x and y of all."""
+    """Return a kernel of `_turn(a, b, place)` for every pair of `count` points.
+
+    Inputs: x and y of each point, then of the place.
+    """
 
     def formula(*inputs: Scalar) -> list[Scalar]:
         *points, place = [(inputs[2 * k], inputs[2 * k + 1]) for k in range(count + 1)]
@@ -145,7 +156,10 @@ def triples(count: int) -> tuple[tuple[int, int, int], ...]:
 
 
 def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, int, int] | None:
-    """Return the triple that is lowest under (or over) a place; None where none contains it."""
+    """Return the three points whose triangle is lowest at a place (x, y); None if none covers it.
+
+    Above or below the place: only the height (m) of the triangle there counts.
+    """
     turn, lowest, best = _turns(points, place), math.inf, None
     for i, j, k in triples(len(points)):
         a, b, c = turn[j, k], turn[i, k], turn[i, j]
@@ -159,7 +173,7 @@ def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, 
 
 
 def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64]:
-    """Return the number of each sample's lowest triple, as `triple_under`; -1: there is none."""
+    """Return `triple_under` of each sample, as a number in `triples`, shape (count,); -1: none."""
     best, lowest = np.full(count, -1), np.full(count, np.inf)
     turn = _turns(points, place)
     left = {pair: np.asarray(t) >= 0.0 for pair, t in turn.items()}
@@ -183,7 +197,7 @@ def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64
 
 
 def carries(points: Values, place: Values, triple: tuple[int, int, int]) -> Values:
-    """Return where a triple that is nowhere near one line contains a place, seen from above."""
+    """Return for which samples a triangle (not nearly a line) covers a place, seen from above."""
     i, j, k = (points[n] for n in triple)
     a, b, c = _turn(j, k, place), _turn(k, i, place), _turn(i, j, place)
     sides = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) | (a <= 0.0) & (b <= 0.0) & (c <= 0.0)
@@ -191,7 +205,7 @@ def carries(points: Values, place: Values, triple: tuple[int, int, int]) -> Valu
 
 
 def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
-    """Return where the line from the points' middle to a place outside their hull leaves it."""
+    """Return x, y (m) where the line from the points' mean to an outside place exits the hull."""
     middle = [sum(p[k] for p in points) / len(points) for k in range(2)]
     way = [place[k] - middle[k] for k in range(2)]
     furthest: Any = 0.0
@@ -208,7 +222,7 @@ def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
 
 
 def heights_above(points: Sequence[Any], i: int, j: int, k: int) -> list[Any]:
-    """Return how far (m) every point lies above the plane of three, along base z."""
+    """Return how far (m) every point lies above the plane of points i, j and k, along base z."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = points[i], points[j], points[k]
     nx = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
     ny = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)

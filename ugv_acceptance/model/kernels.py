@@ -1,10 +1,9 @@
-"""Compiles formulas for one robot: the same code for floats and for arrays.
+"""Compiles a formula into Python code for one robot, for floats as well as for arrays.
 
-`compile_kernel` runs a formula once with symbols, shares what is computed twice and emits
-straight-line code. It runs on Python floats for a live sample and on cache-sized blocks of arrays
-for a map or a recording, so there is one formula and no scalar twin. Both follow IEEE 754: a
-division by zero is infinite or NaN, never an exception. See
-docs/decisions/0002-formulas-compiled-per-robot.md.
+`compile_kernel` runs a formula once with symbols, removes repeated terms and emits straight-line
+code. It runs on Python floats for a live sample and on cache-sized blocks of arrays for a map or a
+recording, so each formula is written once. Both follow IEEE 754: a division by zero is infinite or
+NaN, never an exception. See docs/decisions/0002-formulas-compiled-per-robot.md.
 """
 
 import math
@@ -27,8 +26,8 @@ Outputs = Sequence[Any]
 class Kernel:
     """A compiled formula: `one` takes floats, `many` takes arrays (or floats) that broadcast.
 
-    Both return what the formula returns, tuples nested in the same way; an output that is constant
-    for this robot is a float in either.
+    Both return tuples nested as the formula's; an output that is constant for this robot is a
+    float in either. `source` is the generated code.
     """
 
     source: str
@@ -36,7 +35,7 @@ class Kernel:
     many: Callable[..., tuple[Any, ...]]
 
     def run(self, *inputs: Number) -> tuple[Any, ...]:
-        """Run on floats or on arrays, whatever comes."""
+        """Call `many` if any input is an array, else `one`."""
         if np.ndarray not in map(type, inputs):
             return self.one(*inputs)
         with np.errstate(all='ignore'):
@@ -44,7 +43,7 @@ class Kernel:
 
 
 def compile_kernel(formula: Callable[..., Outputs], inputs: Sequence[str]) -> Kernel:
-    """Return `formula` (a function of len(inputs) scalars) as a Kernel."""
+    """Compile `formula`, a function of len(inputs) scalars, into a Kernel."""
     known: dict[Any, Expr] = {}
     symbols = [Expr('input', (), known) for _ in inputs]
     outputs = formula(*symbols)
@@ -67,7 +66,7 @@ def compile_kernel(formula: Callable[..., Outputs], inputs: Sequence[str]) -> Ke
 def _float_function(
     arguments: str, lines: Sequence[str], many: Callable[..., tuple[Any, ...]]
 ) -> Callable[..., tuple[float, ...]]:
-    """Return the code on floats; where Python raises instead of IEEE 754, numpy's answer."""
+    """Return the compiled function of floats; where Python would raise, it asks numpy instead."""
 
     def ieee(*values: float) -> tuple[Any, ...]:
         with np.errstate(all='ignore'):
@@ -89,7 +88,7 @@ def _flat(outputs: Outputs) -> Iterator[Scalar]:
 
 
 def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], Counter[int]]:
-    """Return the operations the outputs need, arguments first, and how often each is used."""
+    """Return the operations the outputs depend on, arguments first, and how often each is used."""
     order: list[Expr] = []
     uses = Counter(map(id, outputs))
     seen: set[int] = set()
@@ -110,7 +109,7 @@ def _reachable(outputs: Sequence[Scalar]) -> tuple[list[Expr], Counter[int]]:
 
 @dataclass(slots=True)
 class _Emitter:
-    """Writes straight-line code; a name is used again as soon as its last value is dead."""
+    """Writes straight-line code; reuses a variable's name once its value is not needed any more."""
 
     uses: Counter[int]
     lines: list[str] = field(default_factory=list)
@@ -143,7 +142,7 @@ class _Emitter:
         self.lines.append(f'{self.name(x)} = {code}')
 
     def assign_both(self, x: Expr) -> None:
-        """Write sine and cosine of one angle together, where the first of them is met."""
+        """Compute sine and cosine of one angle in one line, at the first use of either."""
         if id(x) in self.names:
             return
         (angle,) = x.args
@@ -160,7 +159,10 @@ class _Emitter:
 
 
 def _sincos(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return sine and cosine to 4e-16: numpy has a vectorised tangent but no such sine."""
+    """Return sine and cosine, exact to 4e-16, by the half-angle tangent.
+
+    numpy's tangent is vectorised, its sine and cosine of doubles are not.
+    """
     t = np.tan(0.5 * x)
     d = 2.0 / (1.0 + t * t)
     return t * d, d - 1.0
@@ -186,7 +188,7 @@ _ARRAY = {
 
 
 def _function(source: str, functions: dict[str, Any]) -> Callable[..., tuple[Any, ...]]:
-    """Return the compiled function; the source holds only our own names and numbers."""
+    """Compile the source of a function; it contains only our own names and numbers."""
     scope: dict[str, Any] = {'inf': math.inf, 'nan': math.nan, **functions}
     exec(compile(source, '<kernel>', 'exec'), scope)  # noqa: S102 - nothing foreign in the source
     function: Callable[..., tuple[Any, ...]] = scope['kernel']

@@ -1,7 +1,7 @@
-"""One robot's compiled formulas: what a posture determines, and the joint forces.
+"""One robot's compiled formulas: torque gradients, centre of gravity, contacts, joint forces.
 
-Static torque is linear in gravity, so a posture holds each joint's lever: a sample that only brings
-a new attitude costs three products a joint.
+Static torque is linear in gravity, so a posture keeps each joint's gravity torque gradient: a
+sample that only brings a new attitude costs three products a joint.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,11 +22,12 @@ Triple = tuple[Number, Number, Number]
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """What a posture and its payload determine; each number is a float or an array of samples.
+    """All that joint positions and payload determine, before gravity is known.
 
-    `levers[j]` is d torque / d gravity of joint j (N m per m/s2; N per m/s2 where prismatic),
-    `mass` kg, `cog` the centre of gravity of the whole robot (m, `base_link`), `contacts` the
-    contact points (m, `base_link`).
+    Each number is a float (one sample) or an array (many). `torque_gradients[j]` is the derivative
+    of joint j's static torque by gravity (N m per m/s2; N per m/s2 if prismatic), `mass` (kg) and
+    `cog` (m, `base_link`) are of the whole robot with its payload, `contacts` are the contact
+    points (m, `base_link`).
     """
 
     torque_gradients: tuple[Triple, ...]
@@ -40,8 +41,9 @@ class Mechanics:
     """The compiled kernels of one robot (compared by identity: hashing a robot takes long).
 
     `posture` takes joint positions, payload mass and centre of gravity (3), and returns the fields
-    of Posture. `holding` takes gravity (3) besides and returns static torques in the levers' place.
-    `forces` takes positions, rates, accelerations, gravity (3), payload mass and centre (3).
+    of Posture. `holding` takes gravity (3) as well and returns static torques in place of the
+    torque gradients. `forces` takes positions, rates, accelerations, gravity (3), payload mass and
+    centre of gravity (3), and returns the dynamic joint torques.
     """
 
     robot: Robot
@@ -53,9 +55,9 @@ class Mechanics:
 
 @lru_cache(maxsize=16)
 def mechanics_of(robot: Robot) -> Mechanics:
-    """Return the compiled mechanics of `robot`.
+    """Return the compiled mechanics of `robot`, cached.
 
-    Raises BadConfig where its joints are not a tree or nothing of it has a mass.
+    Raises BadConfig if its joints are not a tree or none of its links has a mass.
     """
     tree = tree_of(robot)
     if not sum(body.mass for body in tree.bodies) > 0.0:
@@ -138,16 +140,16 @@ def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
 
 
 def posture_of(mechanics: Mechanics, q: Sequence[Number], mass: Number, cog: Triple) -> Posture:
-    """Return the posture for joint positions `q` and a payload: floats in, floats out."""
+    """Return the posture for joint positions `q` (j) and a payload, of floats or of arrays."""
     return Posture(*mechanics.posture.run(*q, mass, *cog))
 
 
 def posture_once(
     robot: Robot, q: Sequence[float], mass: float, cog: tuple[float, float, float]
 ) -> Posture:
-    """Return the posture of a robot that is asked for once, such as one with a moved mass.
+    """Return the posture of a robot that is used only once, such as one with a changed mass.
 
-    The same formula run with floats: nothing is compiled, which takes longer than one run.
+    Runs the same formula with floats, because compiling takes longer than one run.
     """
     formula = _posture_formula(robot, tree_of(robot))
     return Posture(*formula(*q, mass, *cog))

@@ -60,7 +60,7 @@ class Payload:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """The physical model; the root link's frame is `base_link`.
+    """The physical model of a robot; the root link's frame is `base_link`.
 
     `joint_names` are the joints whose positions are given, in the order of every `q[..., j]`;
     movable joints that are not among them are held at the value `held` pairs with their name, else
@@ -89,13 +89,13 @@ class Robot:
 
     @property
     def mass(self) -> float:
-        """What the robot weighs (kg), without a payload."""
+        """Mass of all links (kg), without a payload."""
         return sum(link.mass for link in self.links)
 
     def joint(self, name: str) -> Joint:
-        """Return the joint of that name."""
+        """Return the joint of that name; StopIteration if there is none."""
         return next(joint for joint in self.joints if joint.name == name)
 
     def link(self, name: str) -> Link:
-        """Return the link of that name."""
+        """Return the link of that name; StopIteration if there is none."""
         return next(link for link in self.links if link.name == name)

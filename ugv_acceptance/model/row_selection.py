@@ -1,4 +1,4 @@
-"""Picks rows of columns that go together, works on them and puts them back."""
+"""Selects and groups rows of nested tuples of arrays, such as the samples that share a polygon."""
 
 from collections.abc import Iterator
 from typing import Any, TypeAlias
@@ -10,16 +10,16 @@ Rows: TypeAlias = slice | NDArray[np.intp]
 # Floats, arrays of samples, or tuples of them.
 Values: TypeAlias = Any
 
-# All rows: nothing is picked, nothing copied.
+# All rows; selecting them copies nothing.
 ALL = slice(None)
-# Codes that spread no wider are counted, which is faster than sorting.
+# Codes within a range this small are counted by bincount, which is faster than sorting.
 _FEW = 4096
 
 
 def pick(values: Values, rows: Rows) -> Values:
-    """Return the rows of nested tuples of floats and arrays; floats stay floats.
+    """Return the given rows of nested tuples of floats and arrays; floats stay floats.
 
-    What comes twice is picked once and stays one object.
+    An array that occurs twice is indexed once and stays one object.
     """
     if isinstance(rows, slice):
         return values
@@ -38,7 +38,7 @@ def pick(values: Values, rows: Rows) -> Values:
 
 
 def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
-    """Return each value of `codes` with its rows and their number."""
+    """Yield each distinct value of `codes` with its rows and their count."""
     if not codes.size:
         return
     low, high = int(codes.min()), int(codes.max())
@@ -55,7 +55,7 @@ def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
 
 
 def inner(rows: Rows, part: Rows) -> Rows:
-    """Return the rows that are `part` of `rows`."""
+    """Return rows[part]: a selection within a selection, as rows of the whole."""
     if isinstance(part, slice):
         return rows
     return part if isinstance(rows, slice) else rows[part]

@@ -1,4 +1,4 @@
-"""How much steeper the ground may get until the tracks slide, and whether they do so first."""
+"""How much steeper the ground may get until the tracks slide, and if that is before tipping."""
 
 from collections.abc import Sequence
 
@@ -9,10 +9,10 @@ from ugv_acceptance.type_aliases import Floats
 
 
 def slide_left(gravity: Sequence[ArrayLike], friction: float) -> Floats:
-    """Return the slope (...) in rad that is left until the tracks slide; infinite where unknown.
+    """Return how much slope (rad), shape (...), is left until the tracks slide: atan(mu) - slope.
 
-    `gravity` is x, y, z (...) in `base_link`, of a robot on its tracks; `friction` that of the
-    tracks, infinite: not known.
+    `gravity` is x, y, z (...) in `base_link`, of a robot on its tracks. `friction` is mu of the
+    tracks; infinite means not known, and then so is the result.
     """
     x, y, z = (np.asarray(axis, dtype=np.float64) for axis in gravity)
     slope = np.arctan2(np.hypot(x, y), -z)
@@ -21,9 +21,10 @@ def slide_left(gravity: Sequence[ArrayLike], friction: float) -> Floats:
 
 
 def slides_first(gravity: Sequence[ArrayLike], least: ArrayLike, friction: float) -> Floats:
-    """Return minus the slope (...) left where the tracks slide before the robot tips, else -inf.
+    """Return by how much the robot slides before it would tip, as the value of an alert rule.
 
-    `least` (...) is the smallest tilt left (rad).
+    Shape (...): minus the slope (rad) left until the tracks slide where that is less than `least`
+    (...), the smallest tilt left (rad); else -inf. So it grows as sliding comes nearer.
     """
     left = slide_left(gravity, friction)
     worse: Floats = np.where(left < np.asarray(least), -left, -np.inf)

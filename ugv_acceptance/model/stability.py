@@ -1,8 +1,8 @@
 """Tip-over margins of a robot that stands on its support polygon: one sample or many.
 
 A stance is what joints and payload determine; gravity then gives the margins about its edges
-(edges.py). All hold for any effective gravity (m/s2, `base_link`): minus the specific force where
-the accelerometer takes gravity's place.
+(edges.py). All hold for any effective gravity (m/s2, `base_link`); with an accelerometer in place
+of gravity it is minus the specific force.
 """
 
 import math
@@ -34,18 +34,19 @@ __all__ = ['SIDES', 'STATES', 'Margins', 'Stability', 'Stance']
 STANDING, RAISED, INVERTED, NO_CONTACT, DEGENERATE, FREE_FALL, UNKNOWN = range(7)
 STATES = ('standing', 'raised', 'inverted', 'no_contact', 'degenerate', 'free_fall', 'unknown')
 State = int | NDArray[np.int8]
-# Below this effective gravity (m/s2) nothing presses the robot on the ground: nothing can be said.
+# Below this effective gravity (m/s2) the robot hardly presses on the ground: margins are unknown.
 WEIGHTLESS = 1.0
 _NONE = (math.nan,) * len(SIDES)
 
 
 @dataclass(frozen=True, slots=True)
 class Stance:
-    """How a posture stands, whatever the attitude: samples that share one polygon and its sides.
+    """How a posture stands at any attitude: support polygon, centre of gravity and mass.
 
-    `sides` is the side of each edge, a number in SIDES; `terms` the coordinates (m, `base_link`) of
-    the centre of gravity and of the polygon's corners that move; `mass` in kg. `edges` holds the
-    compiled margins, None where `state` says that there are none.
+    One sample, or samples that share a polygon and the sides of its edges. `sides` is the side of
+    each edge, a number in SIDES; `terms` the coordinates (m, `base_link`) of the centre of gravity
+    and of the polygon's corners that move; `mass` in kg. `edges` holds the compiled margins; None
+    if there are none, and then `state` says why.
     """
 
     support: Support
@@ -58,11 +59,11 @@ class Stance:
 
 @dataclass(frozen=True, slots=True)
 class Stability:
-    """Margins to each of SIDES: positive is stable, infinite where no edge lies on that side.
+    """Tip-over margins to each of SIDES: positive is stable, infinite on a side without an edge.
 
-    `angle` (rad) is the force-angle, `moment` (N m) holds the robot down, `energy` (J) lifts it
-    over the edge; `zmp` (m) is the distance of the zero-moment point inside the polygon, along the
-    tracks' plane, NaN for an inverted robot. All are NaN where `state` says that there is none.
+    `angle` (rad) is the force-angle, `moment` (N m) holds the robot down, `energy` (J) would lift
+    it over the edge; `zmp` (m) is how far inside the polygon the zero-moment point lies, along the
+    tracks' plane, NaN for an inverted robot. All are NaN for states from NO_CONTACT on.
     """
 
     angle: tuple[Number, ...]
@@ -74,10 +75,10 @@ class Stability:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Margins:
-    """What acceptance asks of every sample.
+    """Static torques and tip angles of samples: what every sample of a recording is judged by.
 
-    `torque` (..., j) is static, N m (N where prismatic); `angle` (..., 4) in rad to each of SIDES
-    and `state` (...) are those of Stability.
+    `torque` (..., j) is static, N m (N if prismatic); `angle` (..., 4) in rad to each of SIDES and
+    `state` (...) are those of Stability.
     """
 
     torque: Floats
@@ -103,7 +104,7 @@ def stance_of(mechanics: Mechanics, posture: Posture) -> Stance:
 
 
 def stances_of(mechanics: Mechanics, posture: Posture, count: int) -> list[tuple[Rows, Stance]]:
-    """Return the stances of `count` samples (a posture of arrays), each with its rows."""
+    """Return the distinct stances of `count` samples (a posture of arrays), each with its rows."""
     found = supports_of(mechanics.robot, posture.contacts, posture.cog, count)
     return [part for rows, support in found for part in _stances(mechanics, posture, rows, support)]
 
@@ -111,7 +112,7 @@ def stances_of(mechanics: Mechanics, posture: Posture, count: int) -> list[tuple
 def _stances(
     mechanics: Mechanics, posture: Posture, rows: Rows, support: Support
 ) -> Iterator[tuple[Rows, Stance]]:
-    """Return the stances of the rows that share a support, by the sides of its edges."""
+    """Yield the stances of rows that share a support polygon, one for each set of edge sides."""
     state = _standing(support)
     mass = pick(posture.mass, rows)
     if state >= NO_CONTACT:
@@ -133,7 +134,7 @@ def _stances(
 
 
 def take_stance(stance: Stance, rows: Rows) -> Stance:
-    """Return rows (also repeated ones) of a stance of arrays."""
+    """Return a stance of the given rows of a stance of arrays; rows may repeat."""
     terms, mass = pick((stance.terms, stance.mass), rows)
     return Stance(stance.support, stance.sides, terms, mass, stance.state, stance.edges)
 
@@ -147,7 +148,7 @@ def _standing(support: Support) -> int:
 
 
 def stability_of(stance: Stance, gravity: Triple) -> Stability:
-    """Return the margins of a stance under the effective `gravity` (m/s2): floats or arrays."""
+    """Return all margins of a stance under the effective `gravity` (m/s2): floats or arrays."""
     state = _state(stance.state, gravity)
     if stance.edges is None or (isinstance(state, int) and state >= FREE_FALL):
         return Stability(_NONE, _NONE, _NONE, math.nan, state)
@@ -164,7 +165,7 @@ def stability_of(stance: Stance, gravity: Triple) -> Stability:
 
 
 def tip_angles_of(stance: Stance, gravity: Triple) -> tuple[tuple[Number, ...], State]:
-    """Return only the tip angles (rad) to each of SIDES, and the state, as `stability_of` does."""
+    """Return tip angle (rad) to each of SIDES and state: the part of `stability_of` needed live."""
     state = _state(stance.state, gravity)
     if stance.edges is None or (isinstance(state, int) and state >= FREE_FALL):
         return _NONE, state
@@ -204,7 +205,10 @@ def stability(
     payload: Payload | None = None,
     workers: int = 1,
 ) -> Stability:
-    """Return the margins for postures `q` (..., j) under gravity (..., 3), each of shape (...)."""
+    """Return all tip-over margins for postures `q` (..., j) under gravity (..., 3).
+
+    Each array has shape (...); a payload left out is the robot's own; `workers` is threads.
+    """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
 
@@ -228,7 +232,10 @@ def margins(
     payload: Payload | None = None,
     workers: int = 1,
 ) -> Margins:
-    """Return torques and tip angles for postures `q` (..., j) under gravity (..., 3) in one go."""
+    """Return static torques and tip angles for postures `q` (..., j) under gravity (..., 3).
+
+    A payload left out is the robot's own; `workers` is threads.
+    """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
 
@@ -254,7 +261,7 @@ def _table(
     values: Callable[[Stance, Any], Sequence[Number | State]],
     width: int,
 ) -> list[Floats]:
-    """Return the values of every sample's stance, one array a value."""
+    """Return `values(stance, gravity)` of every sample: `width` arrays of one number a sample."""
     gx, *_ = gravity
     table = np.empty((width, len(gx)))
     for rows, stance in stances_of(mechanics, posture, len(gx)):

@@ -1,7 +1,7 @@
-"""Static and dynamic joint torques, their margins, and the payload that is left: arrays in and out.
+"""Static and dynamic joint torques, their margins, and payload capacity: arrays in and out.
 
 Joint order is `robot.joint_names`; gravity is the vector (m/s2) in `base_link`, (0, 0, -g) on level
-ground; with the accelerometer in gravity's place it is minus the specific force. A payload left out
+ground; with an accelerometer in place of gravity it is minus the specific force. A payload left out
 is the robot's own `payload`.
 """
 
@@ -28,9 +28,9 @@ def static_torque(
     payload: Payload | None = None,
     workers: int = 1,
 ) -> Floats:
-    """Return the torque that holds posture `q` (..., j) at rest on a base under `gravity` (..., 3).
+    """Return the torque that holds posture `q` (..., j) at rest under `gravity` (..., 3).
 
-    Shape (..., j), N m (N where prismatic): the paper's equations (1) and (2) for any tree.
+    Shape (..., j), N m (N if prismatic): the paper's equations (1) and (2) for any tree.
     """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
@@ -53,8 +53,8 @@ def inverse_dynamics(
 ) -> Floats:
     """Return the torque (..., j) that moves the joints with rates `qd` and accelerations `qdd`.
 
-    Rigid bodies on a base at rest, payload as a point mass; rad, rad/s, rad/s2 (m, m/s, m/s2 where
-    prismatic). With qd = qdd = 0 it is `static_torque`.
+    N m (N if prismatic). Rigid bodies on a base at rest, payload as a point mass; rad, rad/s,
+    rad/s2 (m, m/s, m/s2 if prismatic). With qd = qdd = 0 it is `static_torque`.
     """
     mechanics, load = mechanics_of(robot), payload or robot.payload
 
@@ -75,7 +75,7 @@ def centre_of_gravity(robot: Robot, q: ArrayLike, payload: Payload | None = None
 
 
 def torque_margin(torque: ArrayLike, limit: ArrayLike) -> Floats:
-    """Return limit - |torque| (..., j): what is left of each joint, negative where it saturates."""
+    """Return limit - |torque| (..., j): the torque (N m) left to each joint, negative past it."""
     margin: Floats = np.asarray(limit, dtype=np.float64) - np.abs(torque)
     return margin
 
@@ -85,14 +85,14 @@ def utilisation(torque: ArrayLike, limit: ArrayLike) -> Floats:
     return np.abs(np.asarray(torque, dtype=np.float64)) / np.asarray(limit, dtype=np.float64)
 
 
-# A shorter lever (m) is rounding, such as that of an arm turned upright: it asks for nothing.
+# A lever arm shorter than this (m) is rounding, as of an arm turned upright: it counts as none.
 LEAST_LEVER = 1e-9
 
 
 def payload_capacity(
     robot: Robot, q: ArrayLike, gravity: ArrayLike, limit: ArrayLike, workers: int = 1
 ) -> Floats:
-    """Return the largest payload mass (kg), shape (...), that no joint's `limit` (j,) forbids.
+    """Return the largest payload mass (kg), shape (...), with every |torque| within `limit` (j,).
 
     Exact: torque is linear in the payload's mass. The payload's centre of gravity is that of
     `robot.payload`. Minus infinity where a joint saturates without any payload, so that none is
@@ -112,7 +112,7 @@ def payload_capacity(
 
 
 def gripper_point(robot: Robot, q: ArrayLike) -> Floats:
-    """Return where the payload's centre of gravity is (m, `base_link`), shape (..., 3)."""
+    """Return the position of the payload's centre of gravity (m, `base_link`), shape (..., 3)."""
     cog = robot.payload.cog
     whole = sum(body.mass for body in mechanics_of(robot).tree.bodies)
     # The robot with a load as heavy as itself: its centre of gravity lies half way to the load.

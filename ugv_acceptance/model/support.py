@@ -1,8 +1,9 @@
 """The support polygon: which contact points stand on the ground, and the edges between them.
 
-On a rigid flat ground the robot stands on the points that reach the tracks' ground plane; when a
-point (a flipper's tip) reaches below that plane, it stands on the face of the points' lower hull
-under the centre of gravity. A polygon is a cycle of contact numbers, counter-clockwise from above.
+On rigid flat ground the robot stands on the points that reach the tracks' ground plane; when a
+point (a flipper's tip) reaches below that plane, it stands on the face of the points' lower convex
+hull that lies under the centre of gravity. A polygon is a cycle of contact numbers,
+counter-clockwise as seen from above.
 """
 
 import math
@@ -37,12 +38,11 @@ __all__ = ['ALL', 'Cycle', 'Point', 'Rows', 'Support', 'pairs', 'support_of', 's
 
 @dataclass(frozen=True, slots=True)
 class Support:
-    """How a sample stands on the ground.
+    """Which contact points a robot stands on.
 
-    `polygon` is the cycle of contacts it stands on: empty where fewer than three points stand or
-    all in one line. `standing` is the number of contact points on the ground; `raised` says that
-    the robot stands on points below the tracks' plane. Nothing is `known` where a coordinate is
-    not a finite number.
+    `polygon` is the cycle of contact numbers: empty if fewer than three points stand, or all in one
+    line. `standing` is the number of contact points on the ground; `raised` means that the robot
+    stands on points below the tracks' plane. `known` is False if a coordinate is not finite.
     """
 
     polygon: Cycle
@@ -51,9 +51,9 @@ class Support:
     known: bool = True
 
 
-# A plane is the lower hull's where no point lies further (m) below it.
+# A plane belongs to the lower hull if no point lies further below it than this (m).
 _LEVEL = 1e-12
-# So many triples are tried on all samples before each is searched for its own.
+# Number of triples tried on all samples; those still without a face are then searched one by one.
 _TRIES = 4
 _UNKNOWN = Support((), 0, raised=False, known=False)
 
@@ -77,9 +77,9 @@ def support_of(robot: Robot, points: Sequence[Point], cog: Point) -> Support:
 def supports_of(
     robot: Robot, contacts: Sequence[Any], cog: Values, count: int
 ) -> list[tuple[Rows, Support]]:
-    """Return the supports of `count` samples, each with the rows that share it.
+    """Return the distinct supports of `count` samples, each with the rows that share it.
 
-    Each coordinate is a float or an array of `count`; every row appears once.
+    Each coordinate (m) is a float or an array (count,); every row appears once.
     """
     points, centre, tolerance = tuple(map(tuple, contacts)), tuple(cog), robot.contact_tolerance
     finite = np.isfinite(sum(_distinct([*chain.from_iterable(points), *centre])))
@@ -106,19 +106,19 @@ def supports_of(
 
 
 def _distinct(values: Sequence[Any]) -> list[Any]:
-    """Return each object once: points of one link often share a coordinate's array."""
+    """Return the values without repeated objects: points of one link often share an array."""
     return list({id(x): x for x in values}.values())
 
 
 def _pattern(heights: Sequence[Any], tolerance: float) -> Values:
-    """Return the points that are no higher than `tolerance` as the bits of a number."""
+    """Return which points are no higher than `tolerance` (m): bit k of the number is point k."""
     return sum(((h <= tolerance) * (1 << k) for k, h in enumerate(heights)), 0)
 
 
 def _faces(tolerance: float, points: Values, cog: Values, count: int) -> NDArray[np.int64]:
     """Return each sample's points on the face of the lower hull under (or nearest to) the cog.
 
-    As bits; -1 where the points have no such face.
+    As bits (see `_pattern`), shape (count,); -1 if the points have no such face.
     """
     patterns = _faces_under(tolerance, points, cog, count)
     outside = np.flatnonzero(patterns < 0)
@@ -130,10 +130,10 @@ def _faces(tolerance: float, points: Values, cog: Values, count: int) -> NDArray
 
 
 def _faces_under(tolerance: float, points: Values, place: Values, count: int) -> NDArray[np.int64]:
-    """Return each sample's points on the face under a place inside their hull; -1: it is outside.
+    """Return `_faces` for a place inside the hull, shape (count,); -1 where it lies outside.
 
-    The triple under one sample is tried on all: the hull is convex, so where no point lies below
-    the triple's plane none other is lower. Samples that fit none are searched for theirs.
+    The triple found for one sample is tried on all: the hull is convex, so where no point lies
+    below the triple's plane no other triple is lower. Samples that fit none are searched in full.
     """
     patterns, left = np.full(count, -1), np.arange(count)
     for _ in range(_TRIES):
@@ -161,7 +161,7 @@ def _faces_under(tolerance: float, points: Values, place: Values, count: int) ->
 def _lying(
     points: Values, patterns: NDArray[np.int64], *, raised: bool
 ) -> Iterator[tuple[Support, Rows]]:
-    """Return the supports on the points whose bits are set, with their rows."""
+    """Yield the supports on the points whose bits are set in `patterns`, with their rows."""
     for pattern, rows, size in groups(patterns):
         if pattern < 0:
             yield Support((), len(points), raised), rows

@@ -1,9 +1,9 @@
-"""Gravity torque gradients of the joints in a posture, and the mass moment of the robot.
+"""Gravity torque gradients of the joints in a posture, and the robot's centre of gravity.
 
-The torque that holds a joint is linear in gravity: torque = lever . g, where the lever is the mass
+The torque that holds a joint is linear in gravity: torque = gradient . g. The gradient is the mass
 moment S (kg m, sum of mass times position from the joint) of all that the joint carries, crossed
-with its axis: -axis . (S x g) = (S x axis) . g. One walk from the tips to the base gives all levers
-and the centre of gravity, each in the axes of the body reached so far.
+with its axis: -axis . (S x g) = (S x axis) . g. One walk from the tips to the base gives all
+gradients and the centre of gravity, each in the axes of the body reached so far.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ class PointLoad:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """From a body's axes and origin to its parent's: p_parent = shift + turn p."""
+    """The transform from a body's frame to its parent's: p_parent = shift + turn p (m)."""
 
     turn: Mat
     shift: Vec
@@ -33,7 +33,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """Levers of the moving bodies (m kg; kg where prismatic), total mass and moment: base axes."""
+    """Torque gradient of each joint (kg m; kg if prismatic), total mass (kg) and its moment (kg m).
+
+    In base axes; the moment is the sum of mass times position from the origin of `base_link`.
+    """
 
     torque_gradients: list[Vec]
     mass: Scalar
@@ -41,7 +44,7 @@ class Carried:
 
 
 def steps_of(tree: Tree, q: Sequence[Scalar]) -> list[Step]:
-    """Return every body's step to its parent; the base's leads nowhere."""
+    """Return each body's transform to its parent at joint positions `q`; the base's is identity."""
     moving = zip(tree.bodies[1:], q, strict=True)
     return [Step(IDENTITY, ZERO), *(_step(body, x) for body, x in moving)]
 
@@ -53,7 +56,7 @@ def _step(body: Body, position: Scalar) -> Step:
 
 
 def in_base(tree: Tree, steps: Sequence[Step], body: int, point: Vec) -> Vec:
-    """Return a point (m) given in a body's axes in `base_link`."""
+    """Transform a point (m) from a body's axes to `base_link`."""
     while body:
         point = add(steps[body].shift, rotate(steps[body].turn, point))
         body = tree.bodies[body].parent
@@ -61,7 +64,7 @@ def in_base(tree: Tree, steps: Sequence[Step], body: int, point: Vec) -> Vec:
 
 
 def carried_by(tree: Tree, steps: Sequence[Step], loads: Sequence[PointLoad]) -> Carried:
-    """Return the levers, the total mass and its moment about `base_link`'s origin."""
+    """Return torque gradients, total mass and its moment, with the point `loads` included."""
     masses: list[Scalar] = [body.mass for body in tree.bodies]
     moments: list[Vec] = [scale(body.cog, body.mass) for body in tree.bodies]
     for load in loads:

@@ -1,8 +1,7 @@
-"""The moving bodies of a robot: their poses, motions and joint forces by one recursion.
+"""The moving bodies of a robot as a kinematic tree, and their poses.
 
-Fixed and held joints are lumped. Every body's axes are parallel to `base_link` when all joints are
-at zero, so a constant rotation between joints never appears. Forces come from the recursive
-Newton-Euler algorithm (Luh, Walker and Paul 1980); the static torque is the same recursion at rest.
+Links joined by fixed or held joints are lumped into one body. Every body's axes are parallel to
+`base_link` when all joints are at zero, so no constant rotation between joints is needed.
 """
 
 import math
@@ -29,7 +28,7 @@ from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Matrix
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Everything that moves with one joint, lumped; vectors in base axes at the zero posture.
+    """All links that move rigidly with one joint; vectors in base axes at the zero posture.
 
     `offset` (m) is from the parent body's origin to this one's (on the joint axis), `cog` from
     this origin; `inertia` (kg m2) is about the centre of gravity.
@@ -47,9 +46,9 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Tree:
-    """The bodies, parents first; body 0 is the base, its own parent.
+    """The kinematic tree: bodies, parents first; body 0 is the base, its own parent.
 
-    `frames` places each link in its body.
+    `frames` gives for each link its body's number, and the link's rotation and origin (m) in it.
     """
 
     bodies: tuple[Body, ...]
@@ -88,7 +87,7 @@ def rotation_about(axis: Vec, angle: Scalar) -> Mat:
 
 @lru_cache(maxsize=256)  # a run's uncertainty asks for a hundred robots, each off by a little
 def tree_of(robot: Robot) -> Tree:
-    """Return the moving bodies of `robot`. Raises BadConfig where the joints are not a tree."""
+    """Return the kinematic tree of `robot`; BadConfig if its joints do not form a tree."""
     frames, moving = _place_links(robot)
     members: list[list[tuple[float, Vector, Matrix]]] = [[] for _ in moving]
     for link in robot.links:
@@ -107,9 +106,9 @@ def tree_of(robot: Robot) -> Tree:
 
 
 def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Frame]]]:
-    """Return each link's frame and the moving joints with their parents' frames, parents first.
+    """Return each link's frame, and the moving joints with their parents' frames, parents first.
 
-    The first is the base's, which moves nothing: one joint for each body.
+    Entry 0 of the joints is a dummy for the base, so that the list has one entry a body.
     """
     children: dict[str, list[Joint]] = {}
     for joint in robot.joints:
