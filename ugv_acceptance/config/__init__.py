@@ -1,7 +1,10 @@
-"""A robot's YAML file and URDF to checked settings: the one place with defaults and validation.
+"""From a robot's YAML file and URDF to validated settings: the one place with defaults and checks.
 
-`load` finds, reads and checks; `Config` is what it returns. docs/robot_configuration.md explains
-every key of the file.
+In: the path of a YAML file (or the name of one that ships), which names a URDF. Out: `Config`, with
+the `Settings` of an evaluation, the topics, and a hash of both files; criteria.py does the same for
+acceptance criteria. Every error is a BadConfig with file, line and field. Read loading.py first
+(`load`), then schema.py (the keys of the file) and build.py (how file and URDF are combined).
+docs/robot_configuration.md explains every key of the file.
 """
 
 from ugv_acceptance.config.loading import Config, load

@@ -1,4 +1,4 @@
-"""Turns a checked YAML file and a URDF into the settings of an evaluation."""
+"""Combines a validated YAML file and a URDF into the settings of an evaluation."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -18,13 +18,13 @@ from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Lim
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 
 T = TypeVar('T')
-# Lighter robots are mistakes of unit.
+# A robot lighter than this (kg) is a mistake of unit.
 LEAST_MASS = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """What a file is compared with, and the warnings collected on the way."""
+    """The YAML file and the URDF being combined, and the warnings collected meanwhile."""
 
     document: Document
     file: File
@@ -32,16 +32,16 @@ class Build:
     warnings: list[str]
 
     def refuse(self, path: Path, text: str) -> BadConfig:
-        """Return the error for a field of the YAML file."""
+        """Return the BadConfig for a field of the YAML file, with file and line."""
         return BadConfig(f'{self.document.where(path)}: {text}')
 
     def warn(self, path: Path, text: str) -> None:
-        """Note a doubt about a field of the YAML file."""
+        """Add a warning about a field of the YAML file, with file and line."""
         self.warnings.append(f'{self.document.where(path)}: {text}')
 
 
 def file_from(document: Document) -> File:
-    """Return the checked file. Raises BadConfig with file, line and field of its first error."""
+    """Return the validated file; BadConfig with file, line and field of its first error."""
     try:
         return File.model_validate(document.data)
     except ValidationError as error:
@@ -49,7 +49,7 @@ def file_from(document: Document) -> File:
 
 
 def sentence_of(document: Document, error: ValidationError) -> str:
-    """Return the first error as file, line, field, what was expected and what came."""
+    """Return the first validation error as one sentence: file, line, field, expected and given."""
     first, more = error.errors()[0], error.error_count() - 1
     return _sentence(document, dict(first)) + (f' (and {more} more)' if more else '')
 
@@ -69,7 +69,7 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
 
 
 def settings_from(build: Build) -> Settings:
-    """Return the settings. Raises BadConfig where file and URDF do not fit each other."""
+    """Return the settings of an evaluation; BadConfig if file and URDF do not fit each other."""
     measured = _measured(build)
     robot = _robot(build, tuple(measured))
     joints = {name: robot.joint(name) for name in measured}
@@ -86,7 +86,7 @@ def settings_from(build: Build) -> Settings:
 
 
 def _check_ranges(build: Build, settings: Settings) -> None:
-    """Refuse a limit that would disarm a rule; with a reason, warn of it."""
+    """Refuse values outside their permitted range, or warn of them if the file gives a reason."""
     wrong = refused(settings)
     if wrong is not None:
         raise build.refuse(wrong.path, wrong.refusal)
@@ -95,7 +95,7 @@ def _check_ranges(build: Build, settings: Settings) -> None:
 
 
 def _measured(build: Build) -> dict[str, JointSection]:
-    """Return the joints whose positions are told by messages, in the file's order."""
+    """Return the joints whose positions come in messages, in the file's order."""
     movable = [joint.name for joint in build.urdf.joints if joint.kind != 'fixed']
     named = build.file.joints
     if named is None:
@@ -155,7 +155,7 @@ def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
 
 
 def _links(build: Build, names: list[str]) -> Iterable[Link]:
-    """Return the URDF's links with the masses and centres of gravity the file replaces."""
+    """Yield the URDF's links, with masses and centres of gravity replaced where the file says."""
     for name in build.file.links:
         _known(build, ('links', name), name, names, 'link')
     for link in build.urdf.links:
@@ -166,7 +166,7 @@ def _links(build: Build, names: list[str]) -> Iterable[Link]:
 
 
 def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]]:
-    """Pair every movable joint without messages with the position at which it is held."""
+    """Yield every movable joint without messages with the position at which it is held."""
     held, mimics, silent = build.file.held, dict(build.urdf.mimics), []
     movable = {joint.name: joint for joint in build.urdf.joints if joint.kind != 'fixed'}
     for name in held:
@@ -190,7 +190,7 @@ def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]
 def _of_joint(
     build: Build, path: Path, joint: Joint, given: Given, turning: str, sliding: str
 ) -> float:
-    """Return a number of a joint in SI; refuse metres for a turning joint and the like."""
+    """Return a number of a joint in SI; BadConfig for metres of a rotary joint and the like."""
     kind = sliding if joint.kind == 'prismatic' else turning
     if given.kind not in (None, kind):
         raise build.refuse(
@@ -250,7 +250,7 @@ def _limit(build: Build, joint: Joint, section: JointSection) -> float:
 
 
 def _speed(build: Build, joint: Joint, section: JointSection) -> float:
-    """Return the rate to which the static model holds (rad/s or m/s); infinite: not judged."""
+    """Return the rate up to which the static model is valid (rad/s or m/s); infinite: unjudged."""
     if section.static_speed is None:
         return math.inf
     path = ('joints', joint.name, 'static_speed')

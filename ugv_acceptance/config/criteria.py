@@ -1,4 +1,4 @@
-"""Acceptance criteria from a YAML file: every key checked, with file and line; docs/criteria.md."""
+"""Reads acceptance criteria from a YAML file and validates every key; see docs/criteria.md."""
 
 import hashlib
 import math
@@ -40,7 +40,7 @@ Time = Annotated[NotNegative, _number('time')]
 
 
 def _limit(value: object) -> Given:
-    """Take a limit of any kind: the criterion's signal says which one fits."""
+    """Return a limit of any quantity; `_limit_of` checks it against the criterion's signal."""
     return parse(value, tuple(EXAMPLES))
 
 
@@ -86,7 +86,7 @@ class CriterionSection(Section):
 
 
 class CriteriaFile(Section):
-    """A whole file of criteria."""
+    """The keys of a criteria file."""
 
     version: Literal[1]
     name: Name
@@ -95,7 +95,7 @@ class CriteriaFile(Section):
     criteria: dict[str, CriterionSection]
 
 
-# Which keys belong to which kind of criterion, beside those of all.
+# The keys of each kind of criterion, besides those of every kind.
 _KEYS = {
     'value': {
         'of',
@@ -115,18 +115,18 @@ _TIMELESS = ('data',)
 
 
 class _Reading:
-    """One criterion being read: where its errors are."""
+    """The criterion that is being read, for errors with its file, line and key."""
 
     def __init__(self, document: Document, name: str, settings: Settings) -> None:
         self.document, self.name, self.settings = document, name, settings
 
     def refuse(self, key: str, text: str) -> BadConfig:
-        """Return the error for a key of the criterion."""
+        """Return the BadConfig for a key of the criterion, with file and line."""
         path = ('criteria', self.name, key) if key else ('criteria', self.name)
         return BadConfig(f'{self.document.where(path)}: {text}')
 
     def known(self, key: str, name: str, names: tuple[str, ...]) -> str:
-        """Return the name if it is one of `names`."""
+        """Return `name` if it is one of `names`; else BadConfig with a suggestion."""
         if name in names:
             return name
         near = get_close_matches(name, names, 1, 0.5)
@@ -137,7 +137,7 @@ class _Reading:
 def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
     """Return the criteria of a file, for the robot of `settings`.
 
-    Raises BadConfig with file, line and field where something is missing, wrong or does not fit.
+    Raises BadConfig with file, line and field if something is missing, wrong or does not fit.
     """
     try:
         content = path.read_bytes()
@@ -209,7 +209,7 @@ def _value(reading: _Reading, section: CriterionSection) -> Demand:
 
 
 def _check_judged(reading: _Reading, signal: str, of: str) -> None:
-    """Refuse a share of a torque limit that the configuration does not give."""
+    """Raise BadConfig for a share of a torque limit that the configuration does not give."""
     limits = dict(
         zip(reading.settings.robot.joint_names, reading.settings.limits.torque, strict=True)
     )
@@ -218,7 +218,7 @@ def _check_judged(reading: _Reading, signal: str, of: str) -> None:
 
 
 def _limit_of(reading: _Reading, side: str, given: Given, signal: str, of: str) -> float:
-    """Return a limit in SI; refuse degrees for a torque and the like."""
+    """Return a limit in SI; BadConfig for degrees of a torque and the like."""
     kinds = SIGNALS[signal].kinds
     kind = kinds[0]
     if len(kinds) > 1 and of != ANY:
@@ -253,7 +253,7 @@ def _data(reading: _Reading, section: CriterionSection) -> Demand:
 
 
 def _check_shares(reading: _Reading, section: CriterionSection) -> None:
-    """Refuse 90 for 90 %: nothing would ever meet it."""
+    """Raise BadConfig for a share outside 0 to 1, such as 90 for 90 %: no run could meet it."""
     for key, value in (('at_least', section.at_least), ('at_most', section.at_most)):
         if value is not None and not 0.0 <= value <= 1.0:
             raise reading.refuse(key, f'expected a share from 0 to 1, got {value:g}')

@@ -1,4 +1,4 @@
-"""Reads YAML with the line of every key, so that an error names file and line."""
+"""Parses YAML and remembers the line of every key, so that errors can name file and line."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import yaml
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.units import KEY_ENDINGS
 
-# What PyYAML raises on text it cannot build (a date of month 13, an unknown tag, deep nesting).
+# What PyYAML raises for text it cannot construct: a date of month 13, an unknown tag, deep nesting.
 _PARSE_ERRORS = (
     yaml.YAMLError,
     ArithmeticError,
@@ -33,7 +33,7 @@ class Document:
     lines: dict[Path, int]
 
     def where(self, path: Sequence[str | int]) -> str:
-        """Return 'file:line: a.b.c' for a path, with the line of the nearest key there is."""
+        """Return 'file:line: a.b.c' for a path, with the line of the nearest key that exists."""
         known: Path = ()
         for part in path:
             here = self._key(known, part)
@@ -52,7 +52,7 @@ class Document:
 
 
 def read_document(text: str, source: str) -> Document:
-    """Return a parsed YAML text. Raises BadConfig where it is no YAML or holds a key twice."""
+    """Parse a YAML text; BadConfig if it is not YAML or holds a key twice."""
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
@@ -68,9 +68,9 @@ def read_document(text: str, source: str) -> Document:
 
 
 def _walk(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> None:
-    """Note the line of every key below a node."""
+    """Record the line of every key below a node in `lines`."""
     lines.setdefault(path, node.start_mark.line + 1)
-    # Also what an alias to its own parent, and aliases of aliases, come to.
+    # This also ends on an alias to its own parent, and on aliases of aliases.
     if len(path) > _DEEPEST or len(lines) > _MOST:
         raise BadConfig(
             f'{source}:{node.start_mark.line + 1}: expected at most {_MOST} values,'
@@ -90,7 +90,7 @@ def _walk(node: yaml.Node, path: Path, lines: dict[Path, int], source: str) -> N
 
 
 def _dotted(path: Path) -> str:
-    """Return 'a.b.c', on one line whatever the keys are."""
+    """Return a path as 'a.b.c'; unprintable keys are escaped, so that it stays on one line."""
     words = (str(part) for part in path)
     return '.'.join(word if word.isprintable() else repr(word) for word in words)
 

@@ -1,4 +1,4 @@
-"""Who and what was tested, entered by a person: KEY=VALUE,... or a YAML file."""
+"""Reads who and what was tested, as a person enters it: KEY=VALUE,... or a YAML file."""
 
 from difflib import get_close_matches
 from pathlib import Path
@@ -7,7 +7,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.units import shown
 
-# What a report asks for; a part that nobody entered is marked as missing.
+# Entries that a report shows; one that nobody entered is marked as missing.
 PARTS = {
     'robot_serial': 'robot serial number',
     'payload': 'payload',
@@ -26,9 +26,9 @@ LONGEST = 2000
 
 
 def identity_from(text: str | None) -> dict[str, str]:
-    """Return what was entered as KEY=VALUE,KEY=VALUE or in the YAML file of that path.
+    """Return the identity entered as KEY=VALUE,KEY=VALUE or in the YAML file of that path.
 
-    Raises BadConfig for a key that is not one of PARTS or a value that is no text or number.
+    Raises BadConfig for a key that is not one of PARTS, or a value that is not a text or number.
     """
     if text is None:
         return {}
@@ -51,7 +51,7 @@ def identity_from(text: str | None) -> dict[str, str]:
 
 
 def file_of(text: str | None) -> Path | None:
-    """Return the file that a text names, if it does not say KEY=VALUE itself."""
+    """Return the path that a text names; None if it is KEY=VALUE itself, or None."""
     return None if text is None or '=' in text else Path(text)
 
 

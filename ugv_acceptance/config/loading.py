@@ -1,4 +1,4 @@
-"""Find, read and check a robot's YAML file and its URDF."""
+"""Finds, reads and validates a robot's YAML file and its URDF."""
 
 import hashlib
 import math
@@ -17,16 +17,16 @@ from ugv_acceptance.model.robot import Payload
 
 PACKAGE = 'ugv_acceptance'
 DEFAULT = Path('packbot')
-# Larger files are no robot descriptions.
+# A larger file (bytes) is not a robot description.
 LARGEST_FILE = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """A robot as its files describe it. `sha256` is that of the YAML's bytes and the URDF's.
+    """A robot's configuration as read from its YAML file and URDF.
 
-    `uncertainty` pairs the names of numbers with their +/- as written in the file. `warnings` are
-    doubts that do not stop an evaluation, each with file and field.
+    `sha256` is that of both files' bytes. `uncertainty` pairs the names of numbers with their +/-
+    as written in the file. `warnings` do not stop an evaluation; each names file and field.
     """
 
     name: str
@@ -41,14 +41,15 @@ class Config:
 
 
 def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> Config:
-    """Return the configuration in a YAML file; `urdf` replaces the URDF that the file names.
+    """Load a robot's configuration from a YAML file; `urdf` replaces the URDF that it names.
 
-    A name without folder and ending, such as packbot (the default), is one that ships.
+    A name without folder and ending, such as packbot (the default), is a configuration that ships
+    with this package.
 
     Raises
     ------
     BadConfig
-        With file, line and field where something is missing, wrong or does not fit.
+        With file, line and field if something is missing, wrong or does not fit.
 
     Examples
     --------
@@ -84,7 +85,7 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
 
 
 def find(path: Path) -> Path:
-    """Return the file a user means: a path, or the name of a configuration that ships."""
+    """Return the file of a path, or of the name of a configuration that ships; else BadConfig."""
     if path.parent != Path() or path.exists():
         return path
     name = path if path.suffix in ('.yaml', '.yml') else Path(f'{path}.yaml')
@@ -100,13 +101,13 @@ def find(path: Path) -> Path:
 
 
 def _shares() -> list[Path]:
-    """Return where our data may be: the checkout the code runs from, else the installed share."""
+    """Return the folders our data may be in: the checkout, and the installed share folders."""
     checkout, ros = Path(__file__).resolve().parents[2], _share_of(PACKAGE)
     return [checkout, *([ros] if ros else []), Path(sys.prefix) / 'share' / PACKAGE]
 
 
 def _share_of(package: str) -> Path | None:
-    """Return the share folder of a ROS package; None without ROS or such a package."""
+    """Return the share folder of a ROS package; None without ROS or without that package."""
     try:
         from ament_index_python.packages import (  # noqa: PLC0415 - ROS may be absent
             get_package_share_directory,
@@ -149,7 +150,7 @@ def _text(content: bytes, path: Path) -> str:
 
 
 def _check_strength(build: Build, settings: Settings) -> None:
-    """Warn of a limit that cannot even hold the arm's own weight."""
+    """Warn of torque limits that are too small to hold the arm's own weight in every posture."""
     names = settings.robot.joint_names
     for worst in worst_torques(settings.robot, Payload()):
         limit = settings.limits.torque[names.index(worst.joint)]

@@ -1,6 +1,6 @@
 """The keys of a robot's YAML file, their units, defaults and ranges, as pydantic models.
 
-Values come out in SI and radians. A default that is not here is that of evaluation/settings.py.
+Values are converted to SI and radians. Defaults not given here are those of evaluation/settings.py.
 """
 
 from difflib import get_close_matches
@@ -54,7 +54,7 @@ Mass = Annotated[NotNegative, _number('mass')]
 Position = Annotated[tuple[float, float, float], _vector('length')]
 Angles = Annotated[tuple[float, float, float], _vector('angle')]
 Sign = Annotated[float, BeforeValidator(_sign)]
-# Of a joint: the kind has to fit revolute or prismatic, which the URDF says.
+# Quantities of a joint: build.py checks the unit, since only the URDF says if it is prismatic.
 Place = Annotated[Given, _given('angle', 'length')]
 Effort = Annotated[Given | None, _given('torque', 'force')]
 Rate = Annotated[Given | None, _given('angular rate', 'rate')]
@@ -63,7 +63,7 @@ Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
 
 
 class Section(BaseModel):
-    """A mapping of the file: unknown keys are refused, a key may end in its value's unit."""
+    """Base of all sections of the file: refuses unknown keys; a key may end in its value's unit."""
 
     model_config = ConfigDict(extra='forbid', frozen=True)
 
@@ -110,7 +110,7 @@ def _key_error(key: object, text: str) -> PydanticCustomError:
 
 
 class QosSection(Section):
-    """Quality of service of a subscription."""
+    """Quality of service (QoS) of a topic's subscription."""
 
     reliability: Literal['best_effort', 'reliable'] = 'best_effort'
     durability: Literal['volatile', 'transient_local'] = 'volatile'
@@ -118,7 +118,7 @@ class QosSection(Section):
 
 
 class TopicSection(Section):
-    """A topic; what is not given is as in topics.py."""
+    """A topic's name, type, QoS and frame; defaults for missing keys are in topics.py."""
 
     name: Annotated[str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')]
     type: str | None = None
@@ -127,7 +127,7 @@ class TopicSection(Section):
 
 
 class TopicsSection(Section):
-    """The inputs."""
+    """The topics of the inputs: joint states, IMU, payload."""
 
     joint_states: TopicSection = TopicSection(name='joint_states')
     imu: TopicSection = TopicSection(name='imu/data')
@@ -147,14 +147,14 @@ class JointSection(Section):
 
 
 class LinkSection(Section):
-    """What replaces the URDF's mass (kg) and centre of gravity (m, link axes) of a link."""
+    """Mass (kg) and centre of gravity (m, link axes) of a link, instead of the URDF's."""
 
     mass: Mass | None = None
     cog: Position | None = None
 
 
 class ImuSection(Section):
-    """Mounting, position and use of the IMU."""
+    """Mounting, position and use of the IMU, as in evaluation.settings.ImuInput."""
 
     mounting_rpy: Angles = (0.0, 0.0, 0.0)
     position: Position = _IMU.position
@@ -168,21 +168,21 @@ class ImuSection(Section):
 
 
 class ContactSection(Section):
-    """A point the robot can stand on."""
+    """A contact point with which the robot can stand on the ground (m, link axes)."""
 
     link: Name
     position: Position
 
 
 class GroundSection(Section):
-    """Height of the tracks' ground plane in base_link, and how near to it a point stands."""
+    """Height of the tracks' ground plane in base_link, and the tolerance of contact with it."""
 
     height: Annotated[float, _number('length')] = _ROBOT.ground
     tolerance: Annotated[Positive, _number('length')] = _ROBOT.contact_tolerance
 
 
 class PayloadSection(Section):
-    """The load carried until the payload topic says otherwise."""
+    """The payload carried until a message on the payload topic declares another."""
 
     link: Name
     mass: Mass = 0.0
@@ -190,7 +190,7 @@ class PayloadSection(Section):
 
 
 class LimitsSection(Section):
-    """Where margins turn into levels."""
+    """The limits that turn margins into levels, as in evaluation.settings.Limits."""
 
     torque_warn: Annotated[Positive, _number()] = _LIMITS.torque_warn
     torque_error: Annotated[Positive, _number()] = _LIMITS.torque_error
@@ -202,7 +202,7 @@ class LimitsSection(Section):
 
 
 class DelaysSection(Section):
-    """Times of the alert policy."""
+    """Delays of alerts and timeouts of inputs, as in evaluation.settings.Delays."""
 
     tip_on: Time = _DELAYS.tip_on
     torque_on: Time = _DELAYS.torque_on
@@ -215,14 +215,14 @@ class DelaysSection(Section):
 
 
 class RobotSection(Section):
-    """Which robot it is."""
+    """Name and serial number of the robot."""
 
     name: Name
     serial: Annotated[str, Field(strict=True)] | None = None
 
 
 class File(Section):
-    """A whole YAML file."""
+    """The keys of a robot's YAML file."""
 
     robot: RobotSection
     urdf: Name | None = None

@@ -1,6 +1,6 @@
-"""The worst posture of each joint, in which its limit has to hold the arm's own weight.
+"""Finds the posture in which each joint needs the largest torque to hold the arm.
 
-A search, so the torque found is a lower bound on the worst one; for an arm whose pitch axes are
+A search, so the torque found is a lower bound of the true maximum; for an arm whose pitch axes are
 parallel it is exact, because all right angles are among the postures tried.
 """
 
@@ -14,13 +14,13 @@ from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 
 POSTURES = 1500
-# Compiling the formulas of longer trees takes longer than the question is worth.
+# Robots with more joints are not checked: compiling their formulas would take too long.
 MOST_JOINTS = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Worst:
-    """The largest |torque| found of a joint (N m; N where prismatic) and its posture (rad, m)."""
+    """The largest |torque| found of a joint (N m; N if prismatic) and its posture (rad, m)."""
 
     joint: str
     torque: float
@@ -29,7 +29,7 @@ class Worst:
 
 
 def worst_torques(robot: Robot, payload: Payload) -> tuple[Worst, ...]:
-    """Return the worst posture of every measured joint on level ground; () for very long trees."""
+    """Return the worst posture of every measured joint on level ground; () above MOST_JOINTS."""
     if not robot.joint_names or len(robot.joint_names) > MOST_JOINTS:
         return ()
     q = postures(robot)
@@ -46,7 +46,7 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def postures(robot: Robot) -> NDArray[np.float64]:
-    """Return the postures to try, shape (n, j): right angles, ends of travel, and any between."""
+    """Return the postures to try, shape (n, j): right angles, joint limits, and random ones."""
     random = np.random.default_rng(0)
     columns = []
     for name in robot.joint_names:

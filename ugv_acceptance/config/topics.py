@@ -1,4 +1,4 @@
-"""The topics a robot's messages come on: names, types, quality of service and frames."""
+"""The topics of a robot's messages: names, types, quality of service and frames."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,10 @@ _QOS = {
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """One input. `frame_id` is the frame its messages should name; None: any.
+    """The topic of one input, with its type and quality of service (QoS).
 
-    `reliability` is best_effort or reliable, `durability` volatile or transient_local.
+    `reliability` is best_effort or reliable, `durability` volatile or transient_local, `depth` the
+    length of the queue. `frame_id` is the frame its messages should name; None: any.
     """
 
     name: str
@@ -34,7 +35,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The inputs of the monitor."""
+    """The topics of all inputs of an evaluation."""
 
     joint_states: Topic
     imu: Topic
@@ -47,7 +48,7 @@ class Topics:
 
 
 def topics_from(build: Build) -> Topics:
-    """Return the topics. Raises BadConfig where two share a name or a type is not the known one."""
+    """Return the topics; BadConfig if two share a name or a type is not the supported one."""
     given = build.file.topics
     sections = {'joint_states': given.joint_states, 'imu': given.imu, 'payload': given.payload}
     names = [section.name for section in sections.values()]

@@ -1,4 +1,4 @@
-"""Reads the section `uncertainty:` of a robot file: which number is off by how much."""
+"""Reads the section `uncertainty:` of a robot file: the +/- of masses, lengths, limits, angles."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -10,7 +10,7 @@ from ugv_acceptance.evaluation.criteria.uncertainty import CONTACTS, IMU, PAYLOA
 from ugv_acceptance.model.robot import Robot
 
 _AXES = ('x', 'y', 'z')
-# What of a subject, as its key starts -> (what, axis), and the kinds its unit may be of.
+# First part of a key -> (what is uncertain, axis); _UNITS: what -> quantities its unit may be of.
 _VECTOR = {f'cog_{name}': ('cog', axis) for axis, name in enumerate(_AXES)}
 _PLACE = {name: ('place', axis) for axis, name in enumerate(_AXES)}
 _LINK = {'mass': ('mass', 0), **_VECTOR}
@@ -28,7 +28,7 @@ _UNITS = {
 
 
 def sources_from(config: Config) -> tuple[Source, ...]:
-    """Return what a configuration says is uncertain. Raises BadConfig where a key fits nothing."""
+    """Return a configuration's sources of uncertainty; BadConfig for a key that fits nothing."""
     robot = config.settings.robot
     return tuple(_source(config, robot, name, value) for name, value in config.uncertainty)
 
@@ -53,7 +53,7 @@ def _source(config: Config, robot: Robot, name: str, value: float) -> Source:
 
 
 def _known(robot: Robot, subject: str) -> dict[str, tuple[str, int]]:
-    """Return what can be uncertain of a subject; nothing where there is none of that name."""
+    """Return what can be uncertain of a subject; {} if nothing has that name."""
     if subject == PAYLOAD:
         return _LINK
     if subject == CONTACTS:

@@ -1,4 +1,4 @@
-"""Reads quantities with units, such as "30 deg" or a key that ends in _kg, into SI."""
+"""Converts quantities with units, such as "30 deg" or a key that ends in _kg, to SI."""
 
 import math
 import re
@@ -46,7 +46,7 @@ KEY_ENDINGS = {
     'mps': 'm/s',
     'mps2': 'm/s2',
 }
-# What examples of each kind look like in an error.
+# Kind of quantity -> an example of it, for errors.
 EXAMPLES = {
     'angle': 'an angle such as 0.5 (rad) or "30 deg"',
     'length': 'a length such as 0.25 (m) or "25 cm"',
@@ -58,15 +58,15 @@ EXAMPLES = {
     'rate': 'a speed such as 0.1 (m/s)',
     'acceleration': 'an acceleration such as 9.81 (m/s2)',
 }
-# What a command line asks for, where a bare number of a kind is read in one unit by one person and
-# in another by the next: its name, the unit people think in, the SI unit.
+# Kinds for which the command line requires a unit, because a bare number would be misunderstood:
+# name, the unit people think in, the SI unit.
 SPELLINGS = {
     'angle': ('an angle', 'deg', 'rad'),
     'angular rate': ('an angular rate', 'deg/s', 'rad/s'),
     'length': ('a length', 'mm', 'm'),
     'rate': ('a speed', 'mm/s', 'm/s'),
 }
-# Larger magnitudes are mistakes, and their products would overflow.
+# Larger magnitudes are mistakes, and products of them would overflow.
 LARGEST = 1e9
 
 _TEXT = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*', re.DOTALL)
@@ -74,7 +74,7 @@ _TEXT = re.compile(r'\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*',
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A value as written, with the unit its key ends in (a key of UNITS)."""
+    """A value as written in a file, with the unit that its key ends in (a key of UNITS)."""
 
     value: object
     unit: str
@@ -82,7 +82,7 @@ class Measure:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A number in SI and the kind of the unit it was written with; None: a bare number."""
+    """A number in SI, and the kind of the unit it was written with; None if without a unit."""
 
     value: float
     kind: str | None = None
@@ -98,8 +98,8 @@ def split_key(key: str) -> tuple[str, str | None]:
 def parse(value: object, kinds: tuple[str, ...]) -> Given:
     """Return a number in SI from a number, a text with a unit, or a Measure.
 
-    Raises ValueError where it is no finite number or its unit is none of `kinds`; no kind: a bare
-    number is asked for.
+    Raises ValueError if it is not a finite number or its unit is not of one of `kinds`; without
+    kinds a bare number is required.
     """
     if isinstance(value, Measure):
         kind, factor = UNITS[value.unit]
@@ -118,10 +118,10 @@ def parse(value: object, kinds: tuple[str, ...]) -> Given:
 
 
 def quantity(text: str, kind: str, what: str) -> float:
-    """Return the number in SI that a user wrote on a command line; `what` names it in the error.
+    """Return in SI a quantity that a user wrote on the command line; `what` names it in errors.
 
-    A kind in SPELLINGS needs its unit, unless it is 0; a bare number of another is in SI. Raises
-    BadConfig where it is not of `kind` (a key of EXAMPLES).
+    A kind in SPELLINGS requires a unit, unless it is 0; a bare number of another kind is in SI.
+    Raises BadConfig if it is not of `kind` (a key of EXAMPLES).
     """
     try:
         given = parse(text, (kind,))
@@ -135,24 +135,24 @@ def quantity(text: str, kind: str, what: str) -> float:
 
 
 def _spelled(kind: str, number: str = '30') -> str:
-    """Return how a number of a kind in SPELLINGS is written in the usual unit and in SI."""
+    """Return how a number of a kind in SPELLINGS is to be written, in the usual unit and in SI."""
     name, usual, si = SPELLINGS[kind]
     in_si = float(number) * UNITS[usual][1]
     return f'{name} with its unit, such as "{cut(number)}{usual}" or "{in_si:.4g}{si}"'
 
 
 def expected(kinds: tuple[str, ...]) -> str:
-    """Return what a quantity of these kinds looks like."""
+    """Return examples of quantities of these kinds, for an error."""
     return ' or '.join(EXAMPLES[kind] for kind in kinds) or 'a number'
 
 
 def shown(value: object) -> str:
-    """Return a value as an error shows it: short, on one line."""
+    """Return a value as text for an error: short, on one line, strings in quotes."""
     return cut(f'"{value}"' if isinstance(value, str) else str(value))
 
 
 def cut(text: str) -> str:
-    """Return a text short and on one line."""
+    """Return a text on one line, cut to 60 characters."""
     text = ' '.join(text.split())
     return text if len(text) <= 60 else f'{text[:57]}...'
 

@@ -1,6 +1,6 @@
 """Reads a URDF: links, masses, joints and limits of any tree; visuals are ignored.
 
-Read over defusedxml: no entities, no external files.
+Parsed by defusedxml, which refuses entities and external files.
 """
 
 import math
@@ -31,9 +31,9 @@ class Urdf:
 
 
 def read_urdf(text: bytes, source: str) -> Urdf:
-    """Return what a URDF says of the robot's mechanics; `source` names the file in errors.
+    """Parse the links, joints and limits of a URDF; `source` names the file in errors.
 
-    Raises BadConfig where it is no URDF, a number is not usable, or the joints are not one tree.
+    Raises BadConfig if it is not a URDF, a number is unusable, or the joints are not one tree.
     """
     root = _parse(text, source)
     warnings: list[str] = []
@@ -91,7 +91,7 @@ def _inertia(element: Element | None, where: str) -> Matrix:
 
 
 def _is_physical(inertia: Matrix) -> bool:
-    """Say whether principal moments are positive and none exceeds the sum of the other two."""
+    """Return whether principal moments are positive and none exceeds the sum of the other two."""
     moments = np.linalg.eigvalsh(np.array(inertia))
     # 0.1 %: files are written with few digits.
     return bool(moments[0] > 0.0 and moments[2] <= (moments[0] + moments[1]) * 1.001)
@@ -138,7 +138,7 @@ def _range(
 
 
 def _limit(limit: Element | None, key: str, where: str) -> float:
-    """Return an effort or velocity limit; infinite where it is missing or 0."""
+    """Return an effort or velocity limit; infinite if it is missing or 0."""
     if limit is None:
         return math.inf
     value = _number(limit, key, where, 0.0)
@@ -171,7 +171,7 @@ def _origin(element: Element, where: str) -> tuple[Vector, Matrix]:
 
 
 def rotation_from_rpy(rpy: Vector) -> Matrix:
-    """Return the rotation of roll, pitch and yaw (rad) about fixed axes, as URDF means them."""
+    """Return the rotation matrix of roll, pitch and yaw (rad) about fixed axes, as in a URDF."""
     if rpy == ZERO:
         return IDENTITY  # without negative zeros
     (sr, sp, sy), (cr, cp, cy) = map(math.sin, rpy), map(math.cos, rpy)
@@ -231,7 +231,7 @@ def _check_unique(what: str, names: list[str], source: str) -> None:
 
 
 def _check_tree(links: tuple[Link, ...], joints: tuple[Joint, ...], source: str) -> None:
-    """Refuse missing links, links with two parents, cycles and several roots."""
+    """Raise BadConfig for missing links, links with two parents, cycles and several roots."""
     names = {link.name for link in links}
     parent_of: dict[str, str] = {}
     for joint in joints:
