@@ -1,6 +1,6 @@
-"""Works out advice and predictions beside the messages, for the next verdict.
+"""Computes advice and predictions for the operator while messages are being processed.
 
-Advice takes some hundredths of a second, so a thread works it out while messages are taken.
+Advice takes some hundredths of a second, so that it is computed in a thread of its own.
 """
 
 import math
@@ -17,17 +17,21 @@ from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.faults import what_to_do
 from ugv_acceptance.monitoring.trends import Ahead, Trends
 
-# How old (ns) computed advice may be.
+# Age (ns) at which computed advice is renewed.
 FRESH = 250_000_000
-# Times in a row (once a second) that efforts must tell of another load before it is told.
+# Consecutive estimates (one a second) of another payload before it is reported.
 PERSISTENT = 3
-# Seconds to a limit below which the operator is told at once, and ns before it is told again.
+# Time to a limit (s) below which the operator is told at once; time (ns) until the next telling.
 URGENT, AGAIN = 2.0, 1_000_000_000
 
 
 @dataclass(slots=True)
 class Advisory:
-    """The advice of one session; `advice` is the newest, best first; `on_problem` for the log."""
+    """Keeps the advice of one session up to date; `advice` is the newest, best first.
+
+    `estimate` is the payload that the motors' efforts suggest, if it differs from the declared one;
+    `on_problem(text)` writes to the log.
+    """
 
     evaluator: LiveEvaluator
     trends: Trends
@@ -43,7 +47,7 @@ class Advisory:
     _asked: 'Future[tuple[Advice, ...]] | None' = None
 
     def renew(self, now: int, active: list[Alert]) -> None:
-        """Have the advice worked out anew where it is asked for and old."""
+        """Start computing new advice if an active alert needs it and the last is too old."""
         margins, evaluator = self.evaluator.margins, self.evaluator
         if margins is None or not any(alert.rule.code in COMPUTED for alert in active):
             self.advice = ()
@@ -52,7 +56,7 @@ class Advisory:
             self._asked, self._made = self._pool.submit(advise, *case), now
 
     def arrived(self) -> bool:
-        """Take advice that was worked out; return whether it says another thing than before."""
+        """Collect advice whose computation has finished; return whether its subjects changed."""
         if self._asked is None or not self._asked.done():
             return False
         asked, self._asked, before = self._asked, None, self.advice
@@ -63,11 +67,11 @@ class Advisory:
         return [a.subject for a in self.advice] != [b.subject for b in before]
 
     def close(self) -> None:
-        """Give no more advice."""
+        """Stop: end the thread that computes advice."""
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def feel(self) -> None:
-        """Look at the efforts; to be called once a second."""
+        """Estimate the payload from the measured efforts; to be called once a second."""
         margins, evaluator = self.evaluator.margins, self.evaluator
         found = None
         if margins is not None:
@@ -78,7 +82,7 @@ class Advisory:
         self.felt(found)
 
     def felt(self, found: PayloadEstimate | None) -> None:
-        """Take what the efforts tell of the load; None, such as in motion, changes nothing."""
+        """Take an estimate of the payload; None (such as in motion) changes nothing."""
         if found is None:
             return
         self._felt = self._felt + 1 if found.differs else 0
@@ -86,20 +90,20 @@ class Advisory:
             self.estimate = found if self._felt else None
 
     def do(self, alert: Alert) -> str:
-        """Return what to do about an alert: computed for its margin if it is, else in general."""
+        """Return what to do about an alert: the computed advice for its margin, else general."""
         rule = alert.rule
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
         return what_to_do(alert.rule.code)
 
     def ahead(self, now: int) -> tuple[Ahead, ...]:
-        """Return the margins that are used up soon."""
+        """Return the margins that will be used up soon, the soonest first."""
         return self.trends.ahead(now) if self.evaluator.margins is not None else ()
 
     def urgent(self, now: int) -> bool:
-        """Return whether a margin is used up so soon that it must be said before the next second.
+        """Return whether a margin is used up so soon that a verdict must be published at once.
 
-        Does not cost more than a look at a few numbers most of the time.
+        Cheap: most of the time it compares a few numbers.
         """
         if now - self._told < AGAIN:
             return False
@@ -110,7 +114,7 @@ class Advisory:
         return False
 
     def values(self, now: int) -> dict[str, object]:
-        """Return the numbers of the verdict: time left, near misses, sliding, load."""
+        """Return values for the verdict: time to a limit, near misses, slope, payload, advice."""
         values: dict[str, object] = {}
         for ahead in reversed(self.ahead(now)):
             kind = 'tip' if ahead.subject in SIDES else 'saturation'
@@ -130,14 +134,14 @@ class Advisory:
         return values
 
     def slide(self) -> float:
-        """Return the slope (rad) left until the tracks slide; infinite where it is not known."""
+        """Return the slope (rad) left until the tracks slide; infinite if it is not known."""
         margins, settings = self.evaluator.margins, self.evaluator.settings
         if margins is None:
             return math.inf
         return float(slide_left(margins.gravity, settings.limits.friction))
 
     def hints(self, now: int) -> list[str]:
-        """Return what the operator should know beside the alerts, in plain words."""
+        """Return sentences for the operator in addition to alerts: margins that shrink."""
         hints = []
         soon = self.ahead(now)
         if soon and soon[0].seconds > 0.0:

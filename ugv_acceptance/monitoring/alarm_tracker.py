@@ -1,4 +1,4 @@
-"""Changes of alerts since the last poll: raised, cleared, acknowledged."""
+"""Follows the log of alerts and turns it into alarms and their changes."""
 
 from dataclasses import dataclass, field
 
@@ -6,15 +6,16 @@ from ugv_acceptance.evaluation.alerts.alarms import Alarm, Alarms, Change, State
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 
-# Cleared alerts that are kept.
+# Number of cleared alerts that are kept.
 KEPT = 1000
 
 
 @dataclass(slots=True)
 class AlarmTracker:
-    """Reads a log that grows at its end and whose alerts are closed in place; keeps it short.
+    """Reads the log of alerts, which grows at its end and whose alerts get their end in place.
 
-    `open` are the alerts seen and not closed yet, `alarms` what people have seen of them.
+    `open` are the alerts that are still active, `alarms` their alarms with acknowledgements. Old
+    cleared alerts are removed from the log.
     """
 
     log: list[Alert]
@@ -29,9 +30,9 @@ class AlarmTracker:
         return any(alert.end is not None for alert in self.open)
 
     def take(self) -> list[Change]:
-        """Return what changed, in order of time."""
+        """Return the alarm changes since the last call, in order of time."""
         fresh = self.log[self._seen :]
-        # Of the same moment: an end comes before a beginning, but no alert's end before its own.
+        # At equal times ends come before beginnings, except the end of an alert just begun.
         events = [(alert.start, 1, alert) for alert in fresh]
         events += [
             (alert.end, 0 if alert.end > alert.start else 2, alert)
@@ -52,7 +53,7 @@ class AlarmTracker:
 
     @property
     def waiting(self) -> list[Alarm]:
-        """The failures of the robot that are over and wait for a person, the newest last."""
+        """Failures of the robot that are over but not acknowledged or reset, the newest last."""
         found = [a for a in self.alarms.table.values() if _is_failure(a) and not a.state.active]
         over = [a for a in found if a.state is not State.NORMAL]
         return sorted(over, key=lambda alarm: alarm.alert.start)

@@ -1,4 +1,4 @@
-"""Verdict and diagnostics of the monitor as plain values, ready to be published."""
+"""The monitor's verdict, alert messages and diagnostics as plain values, ready to be published."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ from ugv_acceptance.monitoring.session import Session
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One line of a diagnosis: `level` as in DiagnosticStatus, what is the case, and numbers."""
+    """One diagnostic status: `level` as in DiagnosticStatus, name, a sentence, and values."""
 
     level: int
     name: str
@@ -28,21 +28,21 @@ class Status:
 
 
 def worst_joint(margins: Margins, settings: Settings) -> tuple[str, float]:
-    """Return the joint that uses most of its limit, and its share; '' where none has a limit."""
+    """Return the joint with the largest utilisation (share of its limit); '' if none has one."""
     joints = zip(settings.robot.joint_names, margins.torque, settings.limits.torque, strict=True)
     uses = [(name, abs(tau) / limit) for name, tau, limit in joints if math.isfinite(limit)]
     return max(uses, key=lambda use: use[1], default=('', 0.0))
 
 
 def least_tilt(margins: Margins) -> tuple[str, float]:
-    """Return the side to which least tilt is left, and how much (rad); NaN where none is known."""
+    """Return the side with the least tilt left and how much (rad); '' and NaN if none is known."""
     angles = map(float, margins.stability.angle)
     known = [(s, a) for s, a in zip(SIDES, angles, strict=True) if not math.isnan(a)]
     return min(known, key=lambda side: side[1], default=('', math.nan))
 
 
 def what_is_left(margins: Margins, settings: Settings) -> str:
-    """Return the margins in a few words."""
+    """Return the smallest margins in words: tilt left, and the most loaded joint."""
     side, angle = least_tilt(margins)
     joint, use = worst_joint(margins, settings)
     tilt = f'{math.degrees(angle):.1f} deg of tilt left ({side})' if side else 'no tilt margin'
@@ -50,7 +50,7 @@ def what_is_left(margins: Margins, settings: Settings) -> str:
 
 
 def verdict_of(session: Session) -> Status:
-    """Return the one line an operator reads: the most severe cause, what is left, what to do."""
+    """Return the verdict line for the operator: most severe cause, what is left, what to do."""
     alarm_tracker, now = session.alarm_tracker, session.clock.now()
     margins, active = session.evaluator.margins, session.active
     session.advisory.renew(now, active)
@@ -77,7 +77,7 @@ def verdict_of(session: Session) -> Status:
 def _worst(
     session: Session, active: Sequence[Alert], left: str, values: dict[str, object]
 ) -> Status:
-    """Return the verdict while alerts are active: the most severe one speaks."""
+    """Return the verdict while alerts are active: that of the most severe one."""
     alarm_tracker, advisory = session.alarm_tracker, session.advisory
     first = max(active, key=lambda a: (*_severity(a), not alarm_tracker.acknowledged(a)))
     words = relaxed_words(session.settings)
@@ -95,7 +95,7 @@ def _worst(
 
 
 def _limits(session: Session) -> dict[str, object]:
-    """Return by what limits is judged, and which of them are wider than permitted, and why."""
+    """Return the hash of the limits in force, and which are wider than permitted, and why."""
     values: dict[str, object] = {'limits_hash': session.limits_hash}
     found = relaxed(session.settings)
     if found:
@@ -105,7 +105,7 @@ def _limits(session: Session) -> dict[str, object]:
 
 
 def _now(alert: Alert, session: Session) -> Alert:
-    """Return an alert with the margin of now in place of its worst."""
+    """Return an alert with its present value instead of its worst."""
     code, subject = alert.rule.code, alert.rule.subject
     margins, names = session.evaluator.margins, session.settings.robot.joint_names
     peak = math.nan
@@ -117,7 +117,7 @@ def _now(alert: Alert, session: Session) -> Alert:
 
 
 def _over(session: Session, alarm: Alarm, left: str, values: dict[str, object]) -> Status:
-    """Return the verdict while a failure that is over waits to be acknowledged or reset."""
+    """Return the verdict while a failure that is over must still be acknowledged or reset."""
     latched = alarm.state is State.LATCHED
     text = (
         f'over now, {"latched until reset" if latched else "not acknowledged"}: '
@@ -133,12 +133,12 @@ def _named(alert: Alert) -> dict[str, object]:
 
 
 def _severity(alert: Alert) -> tuple[int, bool]:
-    """At the same level a robot that tips over comes before a motor that gives way."""
+    """Return the sort key of an alert: its level, and at equal level tip-over before others."""
     return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
 
 
 def alert_status(change: Change, session: Session) -> Status:
-    """Return a change of an alert, ready to be published."""
+    """Return a change of an alarm as a status, ready to be published."""
     alert, rule = change.alert, change.alert.rule
     shelved = session.alarm_tracker.alarms.shelved(key_of(rule))
     values: dict[str, object] = {
@@ -165,7 +165,7 @@ def alert_status(change: Change, session: Session) -> Status:
 
 
 def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
-    """Yield what an operator may do about an alert now."""
+    """Yield the commands an operator may give for an alarm now: acknowledge, shelve, reset, ..."""
     if change.state.unseen:
         yield 'acknowledge'
     if change.state.active and change.alert.rule.level == WARN:
@@ -177,7 +177,7 @@ def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
 def margin_statuses(
     settings: Settings, margins: Margins | None, active: Sequence[Alert]
 ) -> Iterator[Status]:
-    """Yield the state of every judged joint and of the tip-over margins."""
+    """Yield a status for every judged joint, and one for the tip-over margins."""
     for j, name in enumerate(settings.robot.joint_names):
         limit = settings.limits.torque[j]
         if math.isfinite(limit):
@@ -222,29 +222,29 @@ def _level(active: Sequence[Alert], code: str, subject: str | None, margins: Mar
 
 
 def unavailable(problem: str) -> Status:
-    """Return the verdict of a monitor that is not active."""
+    """Return the verdict (STALE) of a monitor that is not active, with the `problem` if any."""
     text = f'the monitor is not active: {problem}' if problem else 'the monitor is not active'
     return Status(STALE, '', text, {'do': problem or 'configure and activate it'})
 
 
 class Subscribed(Protocol):
-    """What is told of a subscription."""
+    """What diagnostics need to know of a subscription."""
 
     @property
     def topic_name(self) -> str:
-        """The name of its topic, remaps and namespace applied."""
+        """The name of its topic, with remappings and namespace applied."""
 
 
 class Publishing(Protocol):
-    """What is told of the publishers of an input."""
+    """What diagnostics need to know of the publishers of an input."""
 
     @property
     def restarted(self) -> Sequence[str]:
-        """Drivers that were started again."""
+        """Names of the drivers that were restarted."""
 
 
 class InputSources(Protocol):
-    """What diagnostics tell of the inputs' subscriptions; nodes/monitor/subscriptions.py has it."""
+    """What diagnostics need of the inputs' subscriptions; see nodes/monitor/subscriptions.py."""
 
     @property
     def publishers(self) -> Mapping[str, Sequence[str]]:
@@ -256,7 +256,7 @@ class InputSources(Protocol):
 
     @property
     def voices(self) -> Mapping[str, Publishing]:
-        """Who really publishes each input."""
+        """The live publishers of each input, see publisher_identity.py."""
 
 
 def diagnostics_of(
@@ -321,16 +321,16 @@ def _input(
 
 
 class Watcher(Protocol):
-    """What `guarded` needs of a monitor."""
+    """What `guarded` needs of a monitor node."""
 
     session: Session | None
 
     def get_logger(self) -> Any:  # noqa: ANN401 - rclpy's logger
-        """Return its logger."""
+        """Return the node's logger."""
 
 
 def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
-    """Return a timer's work that outlives a fault of ours: the watch goes on, and says so."""
+    """Wrap a timer's work so that an exception in it is reported and the monitor goes on."""
 
     def run() -> None:
         try:

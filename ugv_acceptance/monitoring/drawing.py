@@ -1,4 +1,4 @@
-"""The robot as points and shapes to draw: limbs, support polygon, centre of gravity."""
+"""Shapes of the robot for viewers: limbs, support polygon, centre of gravity, plumb line."""
 
 import math
 from collections.abc import Sequence
@@ -15,15 +15,15 @@ from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.support import support_of
 from ugv_acceptance.model.tree import Tree, point_of, pose_of
 
-# Points of one body closer than this (m) are drawn as one.
+# Points of one body closer together than this (m) are drawn as one.
 _SAME = 0.02
-# A point further away (m) is none of the robot's.
+# A point further away than this (m) is not drawn.
 _FAR = 1e3
 
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """A straight part that moves with `joint`: from it to the next one, or to its end (m)."""
+    """A straight line to draw that moves with `joint`: from it to a next joint or end (m)."""
 
     joint: str
     start: Vector
@@ -32,9 +32,10 @@ class Limb:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Figure:
-    """A robot's drawing: `joints` of its limbs, `ends` gives them for a posture, the box (m).
+    """The compiled drawing of a robot, made once: its limbs, and a box for its body (m).
 
-    `ends(*q, *cog)` are (start, end) of each limb and, where loads are carried, the load's centre.
+    `joints` are the joints of the limbs. `ends(*q, *cog)` returns (start, end) of each limb and, if
+    the robot can carry a payload, the payload's centre of gravity.
     """
 
     mechanics: Mechanics
@@ -45,11 +46,12 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Points in `base_link` (m). `polygon` is counter-clockwise from above; empty: there is none.
+    """The points of a robot in one posture, in `base_link` (m).
 
-    `body` are the lower and the upper corner of a box that stands for the body. `plumb` is where
-    the line through the centre of gravity along gravity meets the plane of the polygon: the robot
-    stands while it is inside. None where gravity or the polygon are not known.
+    `polygon` is the support polygon, counter-clockwise from above; empty if there is none. `body`
+    are the lower and the upper corner of a box that stands for the body. `plumb` is where the line
+    through the centre of gravity along gravity meets the plane of the polygon: the robot stands
+    while it is inside. None if gravity or the polygon are not known.
     """
 
     limbs: tuple[Limb, ...]
@@ -62,7 +64,7 @@ class Skeleton:
 
 
 def figure_of(robot: Robot) -> Figure:
-    """Return the drawing of a robot, to be made once."""
+    """Compile the drawing of a robot; do it once."""
     mechanics = mechanics_of(robot)
     tree = mechanics.tree
     tips = _tips(robot, tree)
@@ -87,7 +89,7 @@ def figure_of(robot: Robot) -> Figure:
 def skeleton_of(
     figure: Figure, q: Sequence[float], gravity: Vector, payload: Payload
 ) -> Skeleton | None:
-    """Return the points of a posture; None where a position is not known."""
+    """Return the points of a posture `q` (j,); None if a position is not known."""
     mechanics, robot = figure.mechanics, figure.mechanics.robot
     if len(q) != len(robot.joint_names) or not all(map(math.isfinite, q)):
         return None
@@ -104,7 +106,7 @@ def skeleton_of(
 
 
 def _tips(robot: Robot, tree: Tree) -> tuple[tuple[int, Vector], ...]:
-    """Return (body, end in its axes) of every limb: to child joints, links and contacts."""
+    """Return (body, end in body axes) of every limb: to child joints, links and contacts."""
     found: list[tuple[int, Any]] = []
     for body in range(1, len(tree.bodies)):
         ends: list[Any] = [b.offset for b in tree.bodies if b.parent == body]
@@ -122,7 +124,7 @@ def _tips(robot: Robot, tree: Tree) -> tuple[tuple[int, Vector], ...]:
 
 
 def _box(robot: Robot, tree: Tree) -> tuple[Vector, Vector]:
-    """Return a box about the base's contact points, as high as the joints that hang on it."""
+    """Return a box around the base's contact points, up to the joints attached to the base."""
     roots = [b.offset for b in tree.bodies[1:] if b.parent == 0]
     points: list[Any] = [*roots]
     for contact in robot.contacts:
@@ -137,7 +139,7 @@ def _box(robot: Robot, tree: Tree) -> tuple[Vector, Vector]:
 
 
 def plumb_of(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector | None:
-    """Return where the line through `cog` along gravity meets the polygon's plane, if it does."""
+    """Return where the line through `cog` along gravity meets the polygon's plane, else None."""
     if len(polygon) < 3 or not all(map(math.isfinite, gravity)):
         return None
     a, b, c = polygon[:3]
@@ -148,18 +150,18 @@ def plumb_of(cog: Vector, gravity: Vector, polygon: Sequence[Vector]) -> Vector 
         return None
     way: Any = dot(normal, subtract(a, cog)) / down
     point = _numbers(add(cog, scale(gravity, way)))
-    # Gravity all but along the ground meets it nowhere that could be drawn.
+    # With gravity almost along the ground the point would be too far away to draw.
     return point if max(map(abs, point)) < _FAR else None
 
 
 def _numbers(v: Sequence[Any]) -> Vector:
-    """Return a vector of numbers: with numbers in, the model's formulas give numbers."""
+    """Return a vector as floats; given floats, the model's formulas return floats."""
     x, y, z = v
     return float(x), float(y), float(z)
 
 
 FRAME = 'base_link'
-# Seconds between drawings; what a dead monitor drew vanishes after LIFETIME.
+# Seconds between drawings; markers vanish after LIFETIME (s) when the monitor has died.
 PERIOD, LIFETIME = 0.1, 0.5
 NAMES = ('support', 'worst_edge', 'cog', 'plumb', 'limbs', 'words')
 # Kinds as visualization_msgs/Marker numbers them.
@@ -172,7 +174,7 @@ _OUTWARD = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
 
 def shapes_of(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple[Shape, ...]:
-    """Return the shapes of one posture, one a name of NAMES."""
+    """Return the shapes of one posture, one for each of NAMES."""
     angles = [float(a) for a in margins.stability.angle]
     colour = _tip_colour(min(angles), settings)
     outline = (*skeleton.polygon, *skeleton.polygon[:1])
@@ -207,7 +209,7 @@ def _edge_towards(polygon: Sequence[Vector], angles: Sequence[float]) -> tuple[V
 
 def _tip_colour(least: float, settings: Settings) -> Colour:
     limits = settings.limits
-    # NaN is no margin.
+    # Written so that NaN (no margin) is red.
     if not least > limits.tip_error:
         return RED
     return AMBER if least <= limits.tip_warn else GREEN

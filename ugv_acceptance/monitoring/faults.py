@@ -1,4 +1,4 @@
-"""Faults only a live node sees: foreign publishers, QoS, messages that cannot be decoded.
+"""Faults that only a live node can see: foreign publishers, QoS mismatch, undecodable messages.
 
 They are alerts like those of the evaluation and are written to the same log.
 """
@@ -9,10 +9,10 @@ from ugv_acceptance.evaluation.alerts.messages import FIRST_SUSPECT, FailureSour
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.settings import Settings
 
-# Nanoseconds a fault must be gone before its alert is cleared.
+# Time (ns) a fault must be gone before its alert is cleared.
 OFF_DELAY = 2_000_000_000
 
-# Code -> (level, what happened, what to do). {detail} says who or why.
+# Code -> (level, what happened, what to do). {detail} is the publisher or the reason.
 WORDS = {
     'SECOND_PUBLISHER': (
         WARN,
@@ -77,14 +77,14 @@ SUSPECTS = {
 
 @dataclass(slots=True)
 class Faults:
-    """One signal a code and subject, made when it is first needed; `log` is the evaluation's."""
+    """The alerts of faults, one signal for each code and subject; `log` is the evaluation's."""
 
     log: list[Alert]
     _signals: dict[tuple[str, str], Signal] = field(default_factory=dict)
     _details: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def set(self, now: int, code: str, subject: str, count: float, detail: str = '') -> None:
-        """Say that a fault is there at `now` (ns)."""
+        """Report that a fault is present at `now` (ns); `count` is its size, such as messages."""
         key = (code, subject)
         self._details[key] = detail
         if key not in self._signals:
@@ -93,23 +93,23 @@ class Faults:
         self._signals[key].step(now, count)
 
     def clear(self, now: int, code: str, subject: str) -> None:
-        """Say that a fault is not there at `now`."""
+        """Report that a fault is absent at `now` (ns)."""
         signal = self._signals.get((code, subject))
         if signal is not None:
             signal.step(now, 0.0)
 
     def advance(self, now: int) -> None:
-        """Let time pass."""
+        """Let time pass to `now` (ns): clear alerts whose fault has been gone long enough."""
         for signal in self._signals.values():
             signal.advance(now)
 
     @property
     def active(self) -> list[Alert]:
-        """Return the alerts that are active now."""
+        """Alerts of faults that are active now."""
         return [s.alert for s in self._signals.values() if s.alert is not None]
 
     def sentence(self, alert: Alert, settings: Settings) -> str:
-        """Return any alert, of the evaluation or of this node, as one sentence."""
+        """Return the sentence of any alert, of the evaluation or of these faults."""
         rule = alert.rule
         if rule.code not in WORDS:
             return describe(alert, settings)
@@ -124,5 +124,5 @@ def suspect_of(code: str) -> str:
 
 
 def what_to_do(code: str) -> str:
-    """Return what to do about any alert."""
+    """Return what to do in general about an alert of the evaluation or of these faults."""
     return WORDS[code][2] if code in WORDS else advice(code)

@@ -1,4 +1,4 @@
-"""A running robot evaluated from Python: messages in as numbers, margins and alerts out, no ROS."""
+"""Evaluates a running robot from Python, without ROS: numbers in, margins and alerts out."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
 class LiveMargins:
     """The margins of one moment, `time_ns` (since the epoch), by joint and by side.
 
-    `static_torque` and `torque_margin` in N m (N where prismatic), `tip_angle` the tilt left in
-    rad to each of front, left, rear, right: negative past tipping, infinite where it cannot tip.
+    `static_torque` and `torque_margin` in N m (N if prismatic), `tip_angle` the tilt left in rad
+    to each of front, left, rear, right: negative past tipping, infinite where it cannot tip.
     """
 
     time_ns: int
@@ -33,8 +33,8 @@ class LiveMargins:
 class LiveEvaluator:
     """Takes the messages of a running robot one by one; holds the newest margins and alerts.
 
-    Times are ns since the epoch; without them the steady clock of this machine counts. Call `tick`
-    where no message comes: silence is a fault that only time shows.
+    Times are ns since the epoch; without them this machine's steady clock is used. Call `tick`
+    regularly when no messages come: only then is a silent input noticed.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class LiveEvaluator:
     Raises
     ------
     BadConfig
-        Where the configuration cannot be used.
+        If the configuration cannot be used.
 
     Examples
     --------
@@ -68,7 +68,7 @@ class LiveEvaluator:
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """The names under which the robot's joints are looked for in messages."""
+        """The names that the robot's joints have in messages."""
         return tuple(joint.topic_name for joint in self.config.settings.joints)
 
     @property
@@ -78,12 +78,12 @@ class LiveEvaluator:
 
     @property
     def level(self) -> str:
-        """OK, WARN, ERROR, or STALE where the margins are unknown."""
+        """The most severe level now: OK, WARN, ERROR, or STALE if margins are unknown."""
         return LEVELS[self._evaluator.level]
 
     @property
     def alerts(self) -> tuple[AlertRecord, ...]:
-        """Every alert since the start; those that are active have no `end_s`."""
+        """Every alert since the start; active ones have no `end_s`."""
         settings, began = self.config.settings, self._began or 0
         return tuple(alert_record(a, settings, began) for a in self._evaluator.watch.log)
 
@@ -99,8 +99,8 @@ class LiveEvaluator:
     ) -> LiveMargins | None:
         """Take a sensor_msgs/JointState (rad, rad/s, N m; m, m/s, N); return the newest margins.
 
-        `stamp_ns` is that of the header, by default the time of receipt. Raises BadSample where the
-        lengths do not fit; then nothing is taken.
+        `stamp_ns` is that of the header, by default the time of receipt. Raises BadSample if the
+        lengths do not match; the message is then ignored.
         """
         for what, values in (('position', position), ('velocity', velocity), ('effort', effort)):
             if len(values) not in ((len(names),) if what == 'position' else (0, len(names))):
@@ -122,7 +122,7 @@ class LiveEvaluator:
     ) -> LiveMargins | None:
         """Take a sensor_msgs/Imu: m/s2 (+g up at rest), quaternion x y z w or None, rad/s.
 
-        Returns the newest margins. Raises BadSample where the lengths do not fit.
+        Returns the newest margins. Raises BadSample if the lengths are wrong.
         """
         quaternion = (0.0, 0.0, 0.0, 0.0) if orientation is None else orientation
         given = (linear_acceleration, 3), (quaternion, 4), (angular_velocity, 3)
@@ -145,14 +145,14 @@ class LiveEvaluator:
         frame_id: str = '',
         time_ns: int | None = None,
     ) -> None:
-        """Take what is carried: kg and m in the payload link; it counts from the next joint state.
+        """Declare the payload (kg; m in the payload link), in force from the next joint state on.
 
-        What cannot be believed raises the alert PAYLOAD_INVALID, and the load stays as it was.
+        An implausible one raises the alert PAYLOAD_INVALID, and the payload stays as it was.
         """
         self._evaluator.carry(self._now(time_ns), mass, center_of_mass, frame_id)
 
     def take(self, sample: Sample) -> LiveMargins | None:
-        """Take a message of a recording at the time it was logged; return the newest margins."""
+        """Take a message of a recording at its log time; return the newest margins."""
         now, message = sample.time_ns, sample.message
         self._now(now)
         if isinstance(message, JointStateSample):
@@ -173,7 +173,7 @@ class LiveEvaluator:
         return self.margins
 
     def tick(self, time_ns: int | None = None) -> None:
-        """Let time pass without a message: silence and delays are judged."""
+        """Let time pass to `time_ns` without a message, so that silence and delays are judged."""
         self._due = 0
         self._now(time_ns)
 

@@ -1,29 +1,30 @@
-"""Tells a driver that was restarted from two drivers under one name.
+"""Distinguishes a driver that was restarted from two drivers with the same name.
 
-DDS keeps a process that was killed, with its publishers, for 20 s, so a driver that was started
-again is known twice. Each publisher numbers its messages: a voice that speaks again after another
-has spoken is alive, and so are both.
+DDS lists a killed process and its publishers for another 20 s, so that a restarted driver appears
+twice. Each publisher numbers its messages: if messages of one numbering come after messages of
+another (a *voice* each), both publishers are alive.
 """
 
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-# A publisher that is known this long (ns) beside a later one of its name is no dead one.
+# A publisher listed this long (ns) together with a later one of its name is not a dead one.
 OUTLIVED = 25_000_000_000
-# Times an earlier voice must be heard again: lost messages can make one voice look like that once.
+# Times an earlier voice must return: lost messages can look like one return.
 _RETURNS = 2
-# Voices told apart at a time.
+# Number of voices that are tracked.
 _KEPT = 8
-# Bytes of a publisher's identity that are its process's.
+# Leading bytes of a publisher's DDS identity (GID) that identify its process.
 _PROCESS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Publisher:
-    """A publisher as ROS knows it: the full name of its node, and its DDS identity.
+    """A publisher as ROS lists it: the full name of its node, and its DDS identity (GID).
 
-    While it is not `named`, its node is some word that says so: a name can come seconds later.
+    If not `named`, ROS does not know the node's name yet (it can come seconds later) and `node` is
+    a placeholder.
     """
 
     node: str
@@ -33,7 +34,7 @@ class Publisher:
 
 @dataclass(slots=True)
 class Voices:
-    """The publishers of one input. `restarted` names nodes known twice of which one speaks."""
+    """The live publishers of one input; `restarted` are nodes listed twice of which one is dead."""
 
     restarted: list[str] = field(default_factory=list)
     _heads: list[int] = field(default_factory=list)
@@ -42,7 +43,7 @@ class Voices:
     _since: dict[bytes, int] = field(default_factory=dict)
 
     def hear(self, number: int | None) -> None:
-        """Take the number its publisher gave a message; None: this middleware gives none."""
+        """Take a message's publisher sequence number; None if the middleware has none."""
         heads = self._heads
         if number is None:
             self._numbered = False
@@ -52,7 +53,7 @@ class Voices:
             self._other(number)
 
     def _other(self, number: int) -> None:
-        """Take a number that does not follow the last one: messages were lost, or another voice."""
+        """Take a number that does not follow the last: lost messages, or another voice."""
         heads = self._heads
         mine = max((k for k in range(len(heads)) if heads[k] < number), key=self._last, default=-1)
         if mine >= 0:
@@ -62,11 +63,11 @@ class Voices:
         del heads[_KEPT:]
 
     def _last(self, voice: int) -> tuple[int, int]:
-        """Return the last number of a voice; of equal ones the voice heard last is larger."""
+        """Return the sort key of a voice: its last number, then how recently it was heard."""
         return self._heads[voice], -voice
 
     def present(self, now: int, publishers: Sequence[Publisher]) -> list[str]:
-        """Return the nodes that publish at `now` (ns), sorted: one that came back counts once."""
+        """Return the nodes that publish at `now` (ns), sorted; a restarted one counts once."""
         seen = {p.gid: self._since.get(p.gid, now) for p in publishers}
         self._since = seen
         groups, nodes, self.restarted = _by_name(publishers), list[str](), []
@@ -82,7 +83,7 @@ class Voices:
         return sorted(nodes)
 
     def _together(self, now: int, gids: Sequence[bytes]) -> bool:
-        """Return whether publishers of one name are there at the same time."""
+        """Return whether publishers of one name are alive at the same time."""
         if not self._numbered or self._returns >= _RETURNS:
             return True
         if len({gid[:_PROCESS] for gid in gids}) < len(gids):
@@ -91,7 +92,7 @@ class Voices:
 
 
 def _by_name(publishers: Sequence[Publisher]) -> dict[str, list[Publisher]]:
-    """Return publishers by node; one without a name yet may be the only node there is, again."""
+    """Return publishers by node; one without a name counts as the only named node, if just one."""
     names = {p.node for p in publishers if p.named}
     only = names.pop() if len(names) == 1 else ''
     groups = defaultdict[str, list[Publisher]](list)

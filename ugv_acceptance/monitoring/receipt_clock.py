@@ -1,14 +1,14 @@
-"""The monotonic clock that dates the receipt of messages; setting the time moves it not.
+"""The clock that dates the receipt of messages: steady, unaffected when the time is set.
 
-The steady clock is set by the wall clock once, at activation (and on reset). A wall clock that is
-set later, a `/clock` that freezes or runs at another speed: none of them ages an input. Header
-stamps are compared with this clock, in simulation after a shift into the time of `/clock`.
+The steady clock is set by the wall clock once, at activation (and on reset). Neither setting the
+wall clock later nor a `/clock` that freezes or runs at another speed makes an input stale. Header
+stamps are compared with this clock, in simulation after a shift from the time of `/clock`.
 """
 
 import time
 from dataclasses import dataclass, field
 
-# Simulated time may run away from real time this far (ns) before stamps are shifted anew.
+# Simulated time may drift this far (ns) from real time before the shift is renewed.
 RESHIFT = 250_000_000
 
 
@@ -18,9 +18,10 @@ def _offset() -> int:
 
 @dataclass(slots=True)
 class ReceiptClock:
-    """Nanoseconds since the epoch by the steady clock; `shift` (ns) turns stamps into this time.
+    """A steady clock in ns since the epoch; `shift` (ns) converts header stamps to its time.
 
-    With `simulated` the shift follows `/clock`; until that came, the first stamp is taken for now.
+    With `simulated` the shift follows `/clock`; before its first message, it is such that the first
+    header stamp equals the present.
     """
 
     simulated: bool = False
@@ -29,17 +30,17 @@ class ReceiptClock:
     shifted: bool = False
 
     def now(self) -> int:
-        """Return the time of receipt of what is in hand now (ns)."""
+        """Return the present time (ns since the epoch)."""
         return time.monotonic_ns() + self.offset
 
     def stamp(self, now: int, stamp: int) -> int:
-        """Return a header stamp (ns) in receipt time."""
+        """Return a header stamp (ns) converted to the time of this clock."""
         if self.simulated and not self.shifted:
             self.shift, self.shifted = now - stamp, True
         return stamp + self.shift
 
     def follow(self, now: int, simulated_now: int) -> None:
-        """Compare with `/clock` (ns, 0: none yet)."""
+        """Renew the shift if `/clock` (`simulated_now`, ns; 0: none yet) has drifted from it."""
         shift = now - simulated_now
         if self.simulated and simulated_now and abs(shift - self.shift) > RESHIFT:
             self.shift, self.shifted = shift, True

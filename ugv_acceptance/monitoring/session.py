@@ -1,7 +1,7 @@
 """One monitoring session: serialised messages in, margins and alerts out, no ROS.
 
 The three `take_*` are the hot path. Bytes are decoded by the decoder that reads bags, so no message
-object is made; whatever they hold, the worst that happens is that they are counted as malformed.
+object is made; whatever they hold, the worst that can happen is that they count as malformed.
 """
 
 import time
@@ -23,7 +23,7 @@ from ugv_acceptance.monitoring.faults import Faults
 from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
 from ugv_acceptance.monitoring.trends import Trends
 
-# What the evaluator takes of a sample behind its time and stamp.
+# Fields of a sample that the evaluator takes after time and stamp.
 JOINT_FIELDS = attrgetter('names', 'position', 'velocity', 'effort')
 IMU_FIELDS = attrgetter(
     'orientation',
@@ -33,13 +33,16 @@ IMU_FIELDS = attrgetter(
     'frame_id',
 )
 INPUTS = ('joint_states', 'imu', 'payload')
-# Measurements, one a second, over which a rate is taken: what comes in bursts is even over them.
+# Measurements, one a second, over which a rate is averaged, so that bursts are evened out.
 _MEASUREMENTS = 4
 
 
 @dataclass(slots=True)
 class InputCount:
-    """Messages of one input so far: all of them, those not decoded, and when the newest came."""
+    """Counts of one input's messages: `taken`, `malformed`, `lost`; `last` is the newest's (ns).
+
+    `reason` says why the last malformed message could not be decoded.
+    """
 
     taken: int = 0
     malformed: int = 0
@@ -50,10 +53,10 @@ class InputCount:
     _past: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=_MEASUREMENTS))
 
     def rate(self, now: int, known: float | None) -> float | None:
-        """Return the rate (Hz) now (ns), from the one `known` a second before; None: not known.
+        """Return the rate (Hz) at `now` (ns), given the rate `known` before; None if not known.
 
-        It is that between messages: one a second is 1 Hz, also where a second has none or two. What
-        is silent for two periods has 0 Hz, and is measured anew when it comes again.
+        To be called once a second. Measured between messages, so that one message a second is 1 Hz
+        even if a second has none or two. 0 Hz after two periods of silence.
         """
         came, self._before = self.taken - self._before, self.taken
         if came:
@@ -68,10 +71,11 @@ class InputCount:
 
 @dataclass(slots=True)
 class Session:
-    """The evaluation of a running robot.
+    """One session of monitoring a running robot: decodes, evaluates, counts and tracks alarms.
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
     stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log.
+    `take_joint_state`, `take_imu` and `take_payload` take a serialised message and never raise.
     """
 
     settings: Settings
@@ -110,23 +114,23 @@ class Session:
 
     @property
     def active(self) -> list[Alert]:
-        """The alerts that are active now, of the robot, its inputs and this node."""
+        """Alerts that are active now, of the robot, its inputs and the monitor itself."""
         return [*self.evaluator.watch.active, *self.faults.active]
 
     @property
     def level(self) -> int:
-        """The most severe level now."""
+        """The most severe level now, as a number of state_machine.LEVELS."""
         return max([self.evaluator.level, *(a.rule.level for a in self.faults.active)])
 
     def tick(self) -> None:
-        """Let time pass: silence, delays and faults that are over."""
+        """Let time pass: judge silence and delays, and clear faults that are over."""
         now = self.clock.now()
         self.evaluator.tick(now)
         self.faults.advance(now)
         self._look()
 
     def feel(self) -> None:
-        """Look whether the motors feel the declared load; to be called once a second."""
+        """Check the declared payload against the measured efforts; to be called once a second."""
         self.advisory.feel()
         now, found = self.clock.now(), self.advisory.estimate
         if found is None:
@@ -136,13 +140,13 @@ class Session:
             self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
 
     def measure_rates(self) -> None:
-        """Set `rates` (Hz) of the inputs; to be called once a second."""
+        """Measure the `rates` (Hz) of the inputs; to be called once a second."""
         now = self.clock.now()
         rates = {name: c.rate(now, self.rates.get(name)) for name, c in self.counts.items()}
         self.rates = {name: rate for name, rate in rates.items() if rate is not None}
 
     def adopt(self, settings: Settings) -> None:
-        """Judge by other limits and delays from now on; what was learnt and is active stays."""
+        """Judge by other limits and delays from now on; learnt periods and active alerts stay."""
         self.settings = self.trends.settings = settings
         self.limits_hash = limits_hash(settings)
         self.evaluator.adopt(settings)
@@ -161,7 +165,7 @@ class Session:
         fields: Callable[[Any], tuple[Any, ...]],
         evaluate: Callable[..., Margins | None],
     ) -> Callable[[bytes], None]:
-        """Return the way of a message: decoded, and these fields of the sample evaluated."""
+        """Return a function that decodes a message of input `name` and evaluates its `fields`."""
         clock, count, alarm_tracker = self.clock, self.counts[name], self.alarm_tracker
         see = self.trends.see
 
@@ -195,7 +199,7 @@ class Session:
         return take
 
     def _guard(self, name: str, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
-        """Return `take` such that no content of a message can end the node."""
+        """Wrap `take` so that no message can raise: errors are counted and reported."""
 
         def guarded(data: bytes) -> None:
             try:
@@ -208,7 +212,7 @@ class Session:
         return guarded
 
     def fail(self, where: str, error: Exception) -> None:
-        """Say that our own code failed: the margins are not known then, and never OK."""
+        """Report that our own code failed: margins become unknown, so the level is never OK."""
         self.evaluator.margins = None
         self.faults.set(self.clock.now(), 'MONITOR_FAULT', where, 1.0, repr(error))
         self.on_problem(f'{where}: fault of the monitor: {error!r}')

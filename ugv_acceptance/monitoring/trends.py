@@ -1,6 +1,6 @@
-"""Least margins since the start, and the time left until a limit.
+"""The smallest margins since the start, and the time until a shrinking margin is used up.
 
-Fed with every sample at the cost of a few comparisons; what it knows is worked out when asked.
+Every sample costs a few comparisons; rates are computed only when asked for.
 """
 
 import math
@@ -14,16 +14,16 @@ from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
-# Samples of this spacing and span (ns) give the rates; fewer than so many give none.
+# Rates come from samples of this spacing over this span (ns); at least this many are needed.
 SPACING, SPAN, LEAST = 50_000_000, 1_000_000_000, 8
-# A margin is told to shrink from these rates on (rad/s; share of the limit a second), and its time
-# left up to this long (s).
+# Slowest rates that count as shrinking (rad/s; share of the limit per second), and the longest time
+# left that is reported (s).
 TILT_RATE, LOAD_RATE, SOON = math.radians(1.0), 0.03, 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class NearMiss:
-    """The smallest margin of a kind since the start: when (ns), which, and how much.
+    """The smallest margin of a kind since the start: time (ns), side or joint, and amount.
 
     `left` is in rad of tilt, or N m (N) of torque.
     """
@@ -35,7 +35,7 @@ class NearMiss:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """A margin that shrinks: `rate` (rad/s; N m/s or N/s), and `seconds` until nothing is left."""
+    """A shrinking margin: its `rate` (rad/s; N m/s or N/s), and `seconds` until it is used up."""
 
     subject: str
     rate: float
@@ -44,7 +44,10 @@ class Ahead:
 
 @dataclass(slots=True)
 class Trends:
-    """Takes the margins of a running robot."""
+    """Follows the margins of a running robot: their minima and their rates of change.
+
+    `tilt` and `load` hold (smallest margin, its time in ns) of each of SIDES and of each joint.
+    """
 
     settings: Settings
     tilt: list[tuple[float, int]] = field(init=False)
@@ -57,7 +60,7 @@ class Trends:
         self.load = [(math.inf, 0)] * len(self.settings.robot.joint_names)
 
     def see(self, margins: Margins) -> None:
-        """Take a sample."""
+        """Take the margins of one message."""
         for k, angle in enumerate(margins.stability.angle):
             if angle < self.tilt[k][0]:
                 self.tilt[k] = (float(angle), margins.time)
@@ -72,7 +75,7 @@ class Trends:
             self._recent.append(margins)
 
     def near_misses(self) -> tuple[NearMiss, ...]:
-        """Return the smallest tilt and the smallest torque margin (as share of its limit)."""
+        """Return the smallest tilt left and the smallest torque margin (by share of its limit)."""
         names, limits = self.settings.robot.joint_names, self.settings.limits.torque
         tilts = [(left, at, side) for (left, at), side in zip(self.tilt, SIDES, strict=True)]
         shares = [
@@ -90,9 +93,9 @@ class Trends:
         return tuple(found)
 
     def ahead(self, now: int) -> tuple[Ahead, ...]:
-        """Return the margins that are used up within SOON at their present rates, soonest first.
+        """Return the margins used up within SOON at their present rates, the soonest first.
 
-        Nothing where the samples of the last second (before `now`, ns) are too few to tell.
+        Empty if there are too few samples in the last second before `now` (ns).
         """
         recent = [m for m in self._recent if m.time > now - SPAN]
         if len(recent) < LEAST:
@@ -113,7 +116,7 @@ class Trends:
 
 
 def _line(time: 'np.ndarray', values: 'np.ndarray') -> tuple[float, float]:
-    """Return value at time 0 and rate of a line through the values; NaN where one is not finite."""
+    """Return value at time 0 and slope of a fitted line; NaN if a value is not finite."""
     if not np.isfinite(values).all():
         return math.nan, math.nan
     away = time - time.mean()
