@@ -1,4 +1,4 @@
-"""Who acknowledged which alert, and when, from the monitor's alerts in the recording."""
+"""Adds to a result who acknowledged which alert and when, if the monitor's alerts were recorded."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +12,7 @@ from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.type_aliases import Json
 
 TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
-# The monitor dates an alert by its own clock: starts that differ by less (ns) are one alert's.
+# The monitor dates alerts by its own clock: starts that differ by less (ns) belong to one alert.
 SAME = 500_000_000
 
 
@@ -41,9 +41,9 @@ def _is_of(values: dict[str, str], alert: Json, start: int) -> bool:
 
 
 def _acknowledged(path: Path, topics: list[str]) -> Iterator[dict[str, str]]:
-    """Yield the values of every status that says an alert was acknowledged.
+    """Yield the values of every recorded status that says an alert was acknowledged.
 
-    What cannot be read is left out: the verdict does not depend on it.
+    Unreadable messages are skipped: the verdict does not depend on them.
     """
     store = get_typestore(Stores.ROS2_JAZZY)
     try:

@@ -1,7 +1,7 @@
-"""The monitor's messages for a recording, as it would have published them.
+"""Makes the messages that the live monitor would have published for a recording.
 
-Margins are those of the evaluation, alerts those of its judgement; verdict and words come from the
-live monitor's own functions, which are given the recording's moments one after another.
+Margins and alerts are those of the offline evaluation; verdict and sentences come from the live
+monitor's own functions, which are called for the recording's moments one after another.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,7 +36,7 @@ from ugv_acceptance.offline.replayed_session import ReplayedSession, moment_of
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 _ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
-# What the monitor publishes, by the last word of its topic.
+# Type of each topic that the monitor publishes, by the last word of the topic's name.
 TYPES = {
     'static_torque': _JOINT_STATE,
     'torque_margin': _JOINT_STATE,
@@ -51,7 +51,7 @@ SECOND, DRAWING = 1_000_000_000, round(PERIOD * 1e9)
 
 
 def topic_names(bag: Bag) -> dict[str, str]:
-    """Return the topic of each of TYPES: the monitor's, or another where it was recorded too."""
+    """Return a topic name for each of TYPES: the monitor's, or another if that was recorded."""
     usual = {word: f'/{MONITOR}/{word}' for word in TYPES} | {'diagnostics': '/diagnostics'}
     return {
         word: f'/{OTHER}/{word}' if topic in bag.topics else topic for word, topic in usual.items()
@@ -60,7 +60,7 @@ def topic_names(bag: Bag) -> dict[str, str]:
 
 @dataclass(slots=True)
 class Annotation:
-    """Retells one evaluated recording."""
+    """Generates the monitor's messages for one evaluated recording."""
 
     evaluation: Evaluation
     names: dict[str, str] = field(init=False)
@@ -82,7 +82,7 @@ class Annotation:
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
-        # Of the same moment an end comes before a beginning, but no alert's end before its own.
+        # At equal times ends come before beginnings, except the end of an alert just begun.
         events = [(a.start, 1, a) for a in log]
         events += [(a.end, 0 if a.end > a.start else 2, a) for a in log if a.end is not None]
         self._events = sorted(events, key=lambda event: event[:2], reverse=True)
@@ -95,7 +95,7 @@ class Annotation:
 
     @property
     def settings(self) -> Settings:
-        """What the recording was judged by."""
+        """The settings that the recording was judged by."""
         return self._judgement.settings
 
     @property
@@ -104,11 +104,11 @@ class Annotation:
 
     @property
     def types(self) -> dict[str, str]:
-        """Return the types of the topics that are said."""
+        """The type of each topic that messages are generated for."""
         return {self.names[word]: kind for word, kind in TYPES.items()}
 
     def said(self) -> Iterator[Said]:
-        """Yield all that is said, in order of log time: the recording is read once more."""
+        """Yield all messages in order of log time; the recording is read once more."""
         for rows in margin_rows(self.bag, self._judgement.topics, self.settings, detail=True):
             yield from self._stretch(rows)
         yield from self._up_to(self.bag.end_ns + 1)
@@ -140,7 +140,7 @@ class Annotation:
             yield Said(now, self.names[word], data)
 
     def _up_to(self, end: int) -> Iterator[Said]:
-        """Yield what falls due before `end` (ns), from the margins that held then."""
+        """Yield the alerts, verdicts and drawings due before `end` (ns), at their margins."""
         while True:
             verdict, drawing = self._due
             event = self._events[-1][0] if self._events else end
@@ -161,7 +161,7 @@ class Annotation:
                 yield from self._draw(now)
 
     def _change(self, now: int, which: int, alert: Alert) -> Iterator[Said]:
-        """Yield an alert's beginning (which 1) or end, and the verdict since."""
+        """Yield the messages of an alert's beginning (`which` is 1) or end, and the new verdict."""
         session = self._session
         if which == 1:
             self._open[id(alert)] = replace(alert, end=None, peak=self._peak(alert))
@@ -176,7 +176,7 @@ class Annotation:
         yield from self._verdict(now)
 
     def _peak(self, alert: Alert) -> float:
-        """Return how bad it was when it was raised: what came later was not known then."""
+        """Return an alert's value when it was raised: its later peak was not known then."""
         margins, rule = self._session.evaluator.margins, alert.rule
         if margins is None or rule.code not in {'TIP_OVER', 'TORQUE_LIMIT'}:
             return alert.peak
@@ -217,7 +217,7 @@ class Annotation:
 
 
 def _margins(rows: MarginRows) -> Iterator[tuple[int, int, Margins | None]]:
-    """Yield time and header stamp (ns) of each row, and its margins, None where not known."""
+    """Yield time and header stamp (ns) of each row, and its margins, None if not known."""
     lists = [np.asarray(x).tolist() for x in (rows.q, rows.gravity, rows.torque)]
     stable = (rows.angle, rows.moment, rows.energy, rows.zmp, rows.state)
     lists += [np.asarray(x).tolist() for x in stable]

@@ -1,4 +1,7 @@
-"""Evaluates a recording: read once into margins, alerts and a verdict, for everybody."""
+"""Evaluates a recording: reads it once into margins, alerts and a verdict.
+
+The command line, campaigns, maps, the console and Python programs all use `evaluate`.
+"""
 
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -35,10 +38,10 @@ from ugv_acceptance.offline.acknowledgements import add_acknowledgements
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.type_aliases import Json
 
-# Version of the result's layout; changes where a reader of results must change.
+# Version of the result's layout; it changes when programs that read results must change.
 RESULT_VERSION = 1
 
-# Messages judged at a time: what a kernel works on then stays in the processor's cache.
+# Messages evaluated at a time, so that the arrays of a kernel stay in the processor's cache.
 STRETCH = 16384
 
 
@@ -47,12 +50,12 @@ Taker = Callable[[MarginRows], None]
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How a recording is read, and who else takes its margins.
+    """How a recording is read, and what else is done with its margins.
 
-    Each of `takers` gets every stretch of margins in order, with moments, energies and ZMP where
-    `detail` asks for them; `progress` gets the log time (ns) reached. With `compare_effort` the
-    result tells of measured efforts at rest. `readers` are the threads that read, by default two
-    where there is more than one core.
+    Each of `takers` is called with the margins of every part of the recording in order; they hold
+    moments, energies and ZMP if `detail` asks for them. `progress` is called with the log time (ns)
+    reached. With `compare_effort` the result compares measured efforts at rest. `readers` is the
+    number of threads that read, by default two if there is more than one core.
     """
 
     takers: tuple[Taker, ...] = ()
@@ -82,19 +85,19 @@ def evaluate(
         The robot: a configuration, its YAML file, or the name of one that ships (packbot, the
         default).
     criteria
-        What is demanded of the run: criteria or their YAML file; by default the limits of `config`.
+        The acceptance criteria or their YAML file; by default the limits of `config`.
     payload
-        What the robot carries until a message says otherwise: kg at the origin of the payload link,
+        The payload carried until a message declares another: kg at the origin of the payload link,
         or a Payload; by default that of `config`.
     identity
         What a person enters for the report: operator, robot_serial, place, ...
     options
-        How it is read, and who else takes its margins.
+        How the recording is read, and what else is done with its margins.
 
     Raises
     ------
     BadBag, BadConfig
-        Where the recording, the configuration or the criteria cannot be used.
+        If the recording, the configuration or the criteria cannot be used.
 
     Examples
     --------
@@ -127,7 +130,7 @@ def evaluate(
 
 
 def _carrying(config: Config, payload: Payload | float | None) -> Settings:
-    """Return the settings of a robot that carries `payload` (kg), None: what they say."""
+    """Return the settings with another payload (kg or Payload), unchanged if None."""
     settings = config.settings
     if payload is None:
         return settings
@@ -154,10 +157,10 @@ def judge(
     sources: tuple[Source, ...] = (),
     options: Options = Options(),
 ) -> tuple[Json, Judgement]:
-    """Read a recording once; return the part of its result that margins, alerts and data decide.
+    """Read a recording once; return its result for JSON and the objects it was made from.
 
-    `criteria` are what is demanded, None: the limits of `settings`; `sources` are uncertain
-    numbers. It comes ready for JSON, with what it was made from.
+    The result holds what follows from margins, alerts and data, without robot, software and
+    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
     """
     bag, topics = recording.bag, recording.chosen()
     span = bag.start_ns, bag.end_ns
@@ -199,7 +202,7 @@ def judge(
 def _circumstances(
     recording: Recording, config: Config, identity: Mapping[str, str] | None
 ) -> Json:
-    """Return with what, by whom and when: robot, software, identity, when it was recorded."""
+    """Return the part of a result about its origin: robot, software, identity, recording time."""
     start = recording.start_ns
     began = datetime.fromtimestamp(start // 10**9, timezone.utc)
     return {
@@ -222,14 +225,14 @@ def _circumstances(
 
 
 def _limits(settings: Settings) -> dict[str, Any]:
-    """Return by what limits was judged, and which of them are wider than permitted, and why."""
+    """Return the hash of the limits in force, and which are wider than permitted, and why."""
     found = [breach.words for breach in relaxed(settings)]
     told = {'reason': settings.unsafe, 'limits': found} if found else None
     return {'limits_hash': limits_hash(settings), 'limits_relaxed': told}
 
 
 def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:
-    """Yield batches put together until each has STRETCH messages: calls cost more than messages."""
+    """Yield batches merged to at least STRETCH messages each, to save calls."""
     held: list[Batch] = []
     count = 0
     for batch in batches:
@@ -261,7 +264,7 @@ def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
         'messages': {name: topic.count for name, topic in bag.topics.items()},
         'protected': bag.protected,
         'salvaged': bag.salvaged,
-        # Of those read here: a recording without its pictures has all that is judged.
+        # Only of the topics read here: losing a camera's messages does not affect the verdict.
         'lost_messages': sum(max(0, bag.promised.get(n, 0) - k) for n, k in held.items()),
         'findings': [*bag.findings, *facts.findings],
     }

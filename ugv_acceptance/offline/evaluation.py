@@ -32,11 +32,11 @@ Verdict = Literal['PASS', 'FAIL', 'INCONCLUSIVE']
 
 
 class Table(Protocol):
-    """What the tables of Arrow and of pandas have in common."""
+    """A table of margins: what Arrow tables and pandas DataFrames have in common."""
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """Numbers of rows and columns."""
 
     def __getitem__(self, name: str, /) -> object:
         """Return the column of that name."""
@@ -44,7 +44,7 @@ class Table(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class CriterionOutcome:
-    """One criterion judged: what was demanded in words, its verdict, why, and the evidence."""
+    """The outcome of one criterion: its demand in words, verdict, reason and evidence."""
 
     name: str
     demand: str
@@ -55,7 +55,7 @@ class CriterionOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What one reading of a recording left behind, for those who go on with it."""
+    """The objects an evaluation was made from, for further work on the same recording."""
 
     settings: Settings
     topics: Topics
@@ -66,10 +66,10 @@ class Judgement:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """An evaluated recording.
+    """The result of evaluating a recording: verdict, reasons, criteria, alerts and margins.
 
-    `coverage` is the share of the recording, 0 to 1, in which all margins were known. `margins`
-    are computed when they are first asked for: the recording is read once more.
+    `result` is the whole result as plain values. `margins` are computed when first asked for: the
+    recording is then read once more.
     """
 
     recording: Recording
@@ -85,7 +85,7 @@ class Evaluation:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why: sentences, the most important first."""
+        """The reasons for the verdict, as sentences, the most important first."""
         return tuple(self.result['reasons'])
 
     @property
@@ -95,7 +95,7 @@ class Evaluation:
 
     @property
     def criteria(self) -> tuple[CriterionOutcome, ...]:
-        """Every criterion and what came of it."""
+        """The outcome of every criterion, in the order of the criteria."""
         return tuple(
             CriterionOutcome(
                 c['name'], c['demand'], c['verdict'], c['reason'], tuple(c['evidence'])
@@ -105,7 +105,7 @@ class Evaluation:
 
     @property
     def alerts(self) -> tuple[AlertRecord, ...]:
-        """Every alert, in the order in which they were raised."""
+        """All alerts, in the order in which they were raised."""
         names = [f.name for f in fields(AlertRecord)]
         return tuple(AlertRecord(**{n: a[n] for n in names}) for a in self.result['alerts'])
 
@@ -126,8 +126,8 @@ class Evaluation:
     def table(self, library: Literal['arrow', 'pandas'] | None = None) -> Table:
         """Return the margins as a table with the columns of --csv and --parquet.
 
-        An Arrow table where PyArrow is installed, else a pandas DataFrame. Unknown margins are
-        nulls (NaN in pandas). Raises AcceptanceError where the library is not installed.
+        An Arrow table if PyArrow is installed, else a pandas DataFrame. Unknown margins are nulls
+        (NaN in pandas). Raises AcceptanceError if the library is not installed.
         """
         columns = self._columns()
         for name in [library] if library else _MAKERS:

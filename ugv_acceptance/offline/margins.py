@@ -17,17 +17,17 @@ from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.type_aliases import Floats, Times
 
 Column = Floats | Times | NDArray[np.str_]
-# Units of columns, of a joint that turns and of one that slides.
+# Units in column names, for a rotary and for a prismatic joint.
 POSITION, TORQUE = ('rad', 'm'), ('nm', 'n')
-# It is `time_s` with another zero.
+# Left out of the CSV, because it is `time_s` counted from the epoch.
 NOT_IN_CSV = frozenset({'log_time_ns'})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarginColumns:
-    """Margins of a recording, a row a message of joint states or IMU, in the order of receipt.
+    """Margins of a recording as columns, one row a message of joint states or IMU, as received.
 
-    `joints` names the columns of `position` (n, j) in rad (m where prismatic), `static_torque` and
+    `joints` names the columns of `position` (n, j) in rad (m if prismatic), `static_torque` and
     `torque_margin` (n, j) in N m (N); `sides` those of `tip_angle` (n, 4), the tilt left in rad,
     negative past tipping. `time_s` (n,) counts from the start of the recording, `log_time_ns` and
     `stamp_ns` (n,) from the epoch. `known` (n,) says which rows have margins; elsewhere they are
@@ -54,9 +54,9 @@ class MarginColumns:
 def margin_rows(
     bag: Bag, topics: Topics, settings: Settings, *, detail: bool = False
 ) -> Iterator[MarginRows]:
-    """Yield the margins of a recording stretch by stretch; it is read anew.
+    """Read a recording again and yield its margins part by part.
 
-    Moments, energies and ZMP distances come only with `detail`.
+    Moments, energies and ZMP distances are included only with `detail`.
     """
     evaluator = RecordedEvaluator(settings, detail=detail)
     evaluator.start(bag.start_ns)
@@ -65,7 +65,7 @@ def margin_rows(
 
 
 def margin_columns(bag: Bag, topics: Topics, settings: Settings) -> MarginColumns:
-    """Return the margins of a whole recording; it is read anew, and held in memory."""
+    """Read a recording again and return all its margins, held in memory."""
     robot, limits = settings.robot, np.array(settings.limits.torque)
     parts = list(margin_rows(bag, topics, settings)) or [_no_rows(settings)]
     torque = np.concatenate([rows.torque for rows in parts])
@@ -90,9 +90,9 @@ def _no_rows(settings: Settings) -> MarginRows:
 
 
 def named_columns(rows: MarginRows, settings: Settings, start: int) -> dict[str, Column]:
-    """Return the columns (n,) of a stretch by their names, which end in their units.
+    """Return the margins of a part of a recording as columns (n,) whose names end in their units.
 
-    `start` is the log time (ns) of the first message. Unknown margins are NaN.
+    `start` is the log time (ns) of the recording's first message. Unknown margins are NaN.
     """
     robot, limits = settings.robot, np.array(settings.limits.torque)
     margin = limits - np.abs(rows.torque)
@@ -112,13 +112,13 @@ def named_columns(rows: MarginRows, settings: Settings, start: int) -> dict[str,
 
 
 def csv_columns(settings: Settings) -> list[str]:
-    """Return the names of the columns of the CSV."""
+    """Return the names of the columns of a CSV file, in order."""
     rows = RecordedEvaluator(settings, detail=True).batch(Batch())
     return [name for name in named_columns(rows, settings, 0) if name not in NOT_IN_CSV]
 
 
 def arrow_table(pyarrow: Any, columns: Mapping[str, Column]) -> Any:  # noqa: ANN401 - an extra
-    """Return columns as an Arrow table: numbers that are NaN become nulls."""
+    """Return columns as an Arrow table; NaN becomes null."""
     return pyarrow.table(
         {
             name: pyarrow.array(column, mask=np.isnan(column))
@@ -130,7 +130,7 @@ def arrow_table(pyarrow: Any, columns: Mapping[str, Column]) -> Any:  # noqa: AN
 
 
 def joint_columns(robot: Robot, what: str, units: tuple[str, str]) -> list[str]:
-    """Return the name of a column for each joint, with the unit of one that turns or slides."""
+    """Return a column name for each joint; `units` are for rotary and for prismatic joints."""
     turns, slides = units
     return [
         f'{name}_{what}_{slides if robot.joint(name).kind == "prismatic" else turns}'

@@ -1,4 +1,4 @@
-"""The margins over time as files, part by part: CSV, and Parquet where PyArrow is installed."""
+"""Writes margins over time to files, part by part: CSV, and Parquet if PyArrow is installed."""
 
 import io
 from collections.abc import Callable
@@ -23,9 +23,10 @@ from ugv_acceptance.offline.margins import (
 
 
 class CsvSink:
-    """Takes margins and writes one line a message; without a path it does nothing.
+    """Writes margins to a CSV file, one line a message; without a path it does nothing.
 
-    Angles in degrees, all else in SI; unknown margins are empty fields.
+    Angles in degrees, all else in SI; unknown margins are empty fields. A context manager: the file
+    gets its name only if the block succeeds.
     """
 
     def __init__(self, path: Path | None, settings: Settings, start: int) -> None:
@@ -36,7 +37,7 @@ class CsvSink:
         self._stack = ExitStack()
 
     def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
-        """Open the file under a name that says it is not whole."""
+        """Open a temporary file beside the path and write the header line."""
         if self._path is not None:
             binary = self._stack.enter_context(whole(self._path))
             self._file = io.TextIOWrapper(binary, encoding='utf-8', newline='\n')
@@ -49,14 +50,14 @@ class CsvSink:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the file its name if it is whole."""
+        """Rename the temporary file to the path if the block succeeded, else delete it."""
         if self._file is not None and kind is None:
             self._stack.callback(self._told, self._file.flush)
         self._stack.__exit__(kind, error, trace)
 
     @property
     def sinks(self) -> list[Callable[[MarginRows], None]]:
-        """Return the sink, if there is a file to write."""
+        """The function that writes margins, as a list; empty without a file to write."""
         return [] if self._file is None else [self._write]
 
     def _write(self, rows: MarginRows) -> None:
@@ -73,7 +74,7 @@ class CsvSink:
             self._told(lambda: file.writelines(text))
 
     def _told(self, write: Callable[[], None]) -> None:
-        """Write; of a disk that is full say which file was to be written."""
+        """Call `write`; an OSError, as of a full disk, becomes an error that names the file."""
         try:
             write()
         except OSError as error:
@@ -85,10 +86,10 @@ def _cell(number: Any) -> str:  # noqa: ANN401 - a float
 
 
 class ParquetSink:
-    """Takes margins and writes one row a message; without a path it does nothing.
+    """Writes margins to a Parquet file, one row a message; without a path it does nothing.
 
-    The columns are those of the CSV and `log_time_ns`; unknown margins are nulls. Raises
-    AcceptanceError where PyArrow is absent.
+    The columns are those of the CSV and `log_time_ns`; unknown margins are nulls. A context manager
+    as CsvSink. Raises AcceptanceError if PyArrow is not installed.
     """
 
     def __init__(self, path: Path | None, settings: Settings, start: int) -> None:
@@ -106,7 +107,7 @@ class ParquetSink:
             self._arrow, self._parquet = __import__('pyarrow'), parquet
 
     def __enter__(self) -> 'ParquetSink':  # noqa: PYI034 - Self is Python 3.11
-        """Open nothing yet: the first stretch tells the columns."""
+        """Open nothing yet: the columns are known only with the first margins."""
         return self
 
     def __exit__(
@@ -115,18 +116,18 @@ class ParquetSink:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the file its name if it is whole."""
+        """Rename the temporary file to the path if the block succeeded, else delete it."""
         if self._writer is not None:
             self._stack.callback(self._told, self._writer.close)
         self._stack.__exit__(kind, error, trace)
 
     @property
     def sinks(self) -> list[Callable[[MarginRows], None]]:
-        """Return the sink, if there is a file to write."""
+        """The function that writes margins, as a list; empty without a file to write."""
         return [] if self._path is None else [self._write]
 
     def _write(self, rows: MarginRows) -> None:
-        # The first stretch, though it be empty, makes the file: no older one must stay.
+        # Even if it is empty the first part creates the file, so that no older one stays.
         if not len(rows.time) and self._writer is not None:
             return
         columns = named_columns(rows, self._settings, self._start)
@@ -137,7 +138,7 @@ class ParquetSink:
         self._told(lambda: self._writer.write_table(table))
 
     def _told(self, write: Callable[[], None]) -> None:
-        """Write; of a disk that is full say which file was to be written."""
+        """Call `write`; an OSError, as of a full disk, becomes an error that names the file."""
         try:
             write()
         except OSError as error:

@@ -1,6 +1,6 @@
-"""A monitoring session replayed from a recording's judgement, for the monitor's own words.
+"""A monitoring session fed from an evaluated recording, so that the monitor's functions apply.
 
-It holds what `verdict_of` and `alert_status` ask a running session for, at a moment of the past.
+It provides what `verdict_of` and `alert_status` need of a running session, at a moment of the past.
 """
 
 from collections.abc import Mapping
@@ -22,24 +22,28 @@ Measured = tuple[tuple[float, ...], tuple[float, ...]]
 
 @dataclass(slots=True)
 class PastClock(ReceiptClock):
-    """A clock that stands at a log time (ns)."""
+    """A receipt clock that stands at the log time `at` (ns)."""
 
     at: int = 0
 
     def now(self) -> int:
-        """Return the time it was set to."""
+        """Return the log time that the clock was set to."""
         return self.at
 
 
 @dataclass(slots=True)
 class PastAdvisory(Advisory):
-    """Advice worked out at once. `told` is that of an alert's moment; `measured` the newest."""
+    """Advice for a recording, computed at once and not in a thread.
+
+    `told` is the advice of the result, by `moment_of` an alert; `measured` are the newest rates and
+    efforts.
+    """
 
     told: Mapping[tuple[int, str, str, int], str] = field(default_factory=dict)
     measured: Measured = ((), ())
 
     def renew(self, now: int, active: list[Alert]) -> None:  # noqa: ARG002 - as its base
-        """Work the advice out where it is asked for."""
+        """Compute advice if an active alert needs it."""
         margins, evaluator = self.evaluator.margins, self.evaluator
         self.advice = ()
         if margins is not None and any(alert.rule.code in COMPUTED for alert in active):
@@ -47,7 +51,7 @@ class PastAdvisory(Advisory):
             self.advice = advise(*case)
 
     def feel(self) -> None:
-        """Look at the efforts; to be called once a second."""
+        """Estimate the payload from the measured efforts; to be called once a second."""
         margins, evaluator = self.evaluator.margins, self.evaluator
         found = None
         if margins is not None:
@@ -56,7 +60,7 @@ class PastAdvisory(Advisory):
         self.felt(found)
 
     def do(self, alert: Alert) -> str:
-        """Return what to do now; else what was to be done when the alert was raised."""
+        """Return the advice for an alert now, else that of the moment when it was raised."""
         rule = alert.rule
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
@@ -64,13 +68,13 @@ class PastAdvisory(Advisory):
 
 
 def moment_of(alert: Alert) -> tuple[int, str, str, int]:
-    """Return what tells the alerts of a run apart."""
+    """Return the key of an alert in a run: start (ns), code, subject and level."""
     return alert.start, alert.rule.code, alert.rule.subject, alert.rule.level
 
 
 @dataclass(slots=True)
 class ReplayedSession(Session):
-    """The session; `told` is what to do about each alert, by `moment_of`."""
+    """A Session at a moment of a recording; `told` is the result's advice, by `moment_of`."""
 
     told: Mapping[tuple[int, str, str, int], str] = field(default_factory=dict)
     past: PastClock = field(default_factory=PastClock)
@@ -82,16 +86,16 @@ class ReplayedSession(Session):
 
     @property
     def active(self) -> list[Alert]:
-        """The alerts that were active then, the most severe first."""
+        """Alerts that were active at that moment, the most severe first."""
         return sorted(self.alarm_tracker.open, key=lambda alert: -alert.rule.level)
 
     @property
     def level(self) -> int:
-        """The most severe level then."""
+        """The most severe level at that moment."""
         return max([OK if self.evaluator.margins else STALE, *(a.rule.level for a in self.active)])
 
     def take(self, margins: Margins | None, payload: Payload, measured: Measured) -> None:
-        """Take the margins of a message, None: they were not known."""
+        """Take the margins of a message (None if unknown), its payload, rates and efforts."""
         self.evaluator.margins, self.evaluator.payload = margins, payload
         if isinstance(self.advisory, PastAdvisory):
             self.advisory.measured = measured
@@ -99,6 +103,6 @@ class ReplayedSession(Session):
             self.trends.see(margins)
 
     def raise_alert(self, alert: Alert) -> list[Change]:
-        """Raise an alert, which is closed with `end` set on the same object."""
+        """Raise an alert and return the changes; to clear it later, set `end` on that object."""
         self.evaluator.watch.log.append(alert)
         return self.alarm_tracker.take()
