@@ -1,6 +1,6 @@
-"""Copies a recording message by message into one MCAP, with further topics beside them.
+"""Copies a recording message by message into one MCAP file and adds further topics.
 
-Messages of both are merged in order of log time, so what is held in memory is a chunk or two.
+Both are merged in order of log time, so that only a chunk or two is held in memory.
 """
 
 import heapq
@@ -26,15 +26,15 @@ from ugv_acceptance.bag.reading import Member, normal_type
 from ugv_acceptance.bag.writer import definition_of
 
 CHUNK = 1 << 20
-# Between two looks at the clock of the progress bar: so many messages.
+# Messages between two calls of `progress`.
 STRIDE = 4096
-# What the mcap package lets through of a broken file.
+# What the mcap package raises for a broken file.
 _BROKEN = (McapError, OSError, ValueError, KeyError, struct.error)
 
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """A message of a further topic: log time (ns), topic, content as CDR."""
+    """A message to add to a recording: log time (ns), topic, content as CDR."""
 
     log_time: int
     topic: str
@@ -48,11 +48,12 @@ def write_annotated(
     said: Iterable[Said],
     progress: Callable[[int], None] = lambda _: None,
 ) -> int:
-    """Write the recording and what is said beside it; return the number of recorded messages.
+    """Write a copy of a recording with the messages `said` added; return the number copied.
 
-    `types` gives the ROS 2 type of each further topic, `said` comes in order of log time, but for
-    what is written late by design; `progress` takes the log time reached (ns). Every chunk has a
-    checksum. The file has its name only when it is whole.
+    `types` gives the ROS 2 type of each added topic, `said` is in order of log time, except for
+    messages that are late on purpose; `progress` is called with the log time reached (ns). Every
+    chunk has a checksum. The file gets its name only when it is complete. Raises AcceptanceError if
+    it cannot be written.
     """
     try:
         with whole(path) as file:
@@ -102,20 +103,20 @@ class _Copy:
 
 
 def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[_Copy]:
-    """Return one file's messages, its channels made now: they stand at the file's beginning."""
+    """Return one file's messages; its channels are created now, at the new file's beginning."""
     channels = _channels(writer, member)
     messages = _readable(messages_of(member, set(bag.topics)))
     return (_Copy(m.log_time, m, channels[m.channel]) for m in messages if m.channel in channels)
 
 
 def _readable(messages: Iterator[Logged]) -> Iterator[Logged]:
-    """Yield messages up to where their file breaks off, as the reader has said that it does."""
+    """Yield messages up to where their file breaks off, which the reader has reported already."""
     with suppress(BadBag):
         yield from messages
 
 
 def _channels(writer: McapWriter, member: Member) -> dict[int, int]:
-    """Return the new id of each channel of a file that is copied."""
+    """Return the new channel id for each channel of a file that is copied."""
     if member.storage == 'mcap':
         schemas, channels = _definitions(member)
         return {k: writer.copy(c, schemas.get(c.schema_id)) for k, c in channels.items()}
@@ -123,7 +124,7 @@ def _channels(writer: McapWriter, member: Member) -> dict[int, int]:
 
 
 def _new(writer: McapWriter, topic: str, kind: str) -> int:
-    """Return the id of a new channel; a type that Jazzy does not have goes without its text."""
+    """Return the id of a new channel; a type unknown to Jazzy is written without its definition."""
     kind = normal_type(kind)
     try:
         text, type_hash = definition_of(kind)
@@ -135,7 +136,7 @@ def _new(writer: McapWriter, topic: str, kind: str) -> int:
 def _definitions(
     member: Member,
 ) -> tuple[dict[int, records.Schema], dict[int, records.Channel]]:
-    """Return the schemas and channels of an MCAP: from its summary, else all that a scan finds."""
+    """Return the schemas and channels of an MCAP file, from its summary or else by scanning it."""
     with member.content.open('rb') as file:
         try:
             summary = make_reader(file).get_summary()
@@ -146,7 +147,7 @@ def _definitions(
         file.seek(0)
         schemas: dict[int, records.Schema] = {}
         channels: dict[int, records.Channel] = {}
-        with suppress(*_BROKEN):  # the reader has said where the file breaks off
+        with suppress(*_BROKEN):  # the reader has reported where the file breaks off
             for record in StreamReader(file).records:
                 if isinstance(record, records.Schema):
                     schemas[record.id] = record

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, under a name of their own until they are."""
+"""Writes files completely or not at all, by way of a temporary file that is renamed."""
 
 import json
 import os
@@ -17,22 +17,22 @@ _OPEN = re.compile(r'/dev/(?:(stdout)|(stderr)|fd/(\d+))|/proc/self/fd/(\d+)')
 
 
 def write_json(path: Path, result: object) -> None:
-    """Write a result; a reader never meets half of it."""
+    """Write a result as JSON, completely or not at all; AcceptanceError if it cannot be written."""
     write_text(path, json_text(result))
 
 
 def json_text(result: object) -> str:
-    """Return a result as JSON for people and programs."""
+    """Return a result as indented JSON text; ValueError for NaN or infinity."""
     return json.dumps(result, indent=2, allow_nan=False, default=str) + '\n'
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text as UTF-8; names of a recording may hold what UTF-8 cannot."""
+    """Write a text as UTF-8, completely or not at all; unencodable characters become '?'."""
     write_bytes(path, text.encode('utf-8', 'replace'))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all."""
+    """Write a file, completely or not at all; AcceptanceError if it cannot be written."""
     try:
         with whole(path) as file:
             file.write(content)
@@ -42,17 +42,18 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write that has its name only once it is whole; an older one stays till then.
+    """Yield a temporary file that is renamed to `path` when the block ends without an error.
 
-    Links are followed. A device or a pipe (`is_stream`) is written as it is. AcceptanceError where
-    the file cannot be made or named; errors of the block are not changed.
+    Until then an older file stays as it is. Links are followed. A device or a pipe (`is_stream`) is
+    written directly. Raises AcceptanceError if the file cannot be created or renamed; errors of the
+    block pass unchanged.
     """
     part: Path | None = None
     try:
         if is_stream(path):
             file = _stream(path)
         else:
-            # A name of its own: whatever lies beside the file is somebody else's.
+            # A random name, so that no other file in the folder is overwritten.
             path = Path(os.path.realpath(path))
             part = path.with_name(f'.{secrets.token_hex(8)}.part')
             file = part.open('xb')
@@ -75,7 +76,7 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def is_stream(path: Path) -> bool:
-    """Return whether a path is a device, a pipe or a socket, or names one of our own open files."""
+    """Return whether a path is a device, pipe or socket, or names one of our own open files."""
     if _OPEN.fullmatch(str(path)):
         return True
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)  # noqa: PTH110, PTH112, PTH113 - these raise nothing
@@ -91,12 +92,12 @@ def _stream(path: Path) -> BinaryIO:
 
 
 def unwritable(path: Path, why: str | None) -> AcceptanceError:
-    """Return the error of a file that cannot be written."""
+    """Return the AcceptanceError for a file that cannot be written, and why."""
     return AcceptanceError(f'{path}: cannot be written: {why or "unknown reason"}')
 
 
 def check_writable(path: Path | None) -> None:
-    """Raise AcceptanceError where a result could not be written: better before than after."""
+    """Raise AcceptanceError if a file could not be written, to be called before long work."""
     if path is None or is_stream(path):
         return
     if os.path.isdir(path):  # noqa: PTH112 - it raises nothing

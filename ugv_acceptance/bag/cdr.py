@@ -1,9 +1,9 @@
-"""One serialised message to numbers: CDR (and ROS 1's packing) of the three types we read.
+"""Decodes single serialised messages (CDR or ROS 1) of JointState, Imu and InertiaStamped.
 
 A message's layout, that is every length and text in it, is learnt once by walking it. Later
-messages of the same layout are unpacked by one precompiled `struct.Struct`; all bytes that make
-the layout are compared on every message, so a message is never decoded by a layout that is not
-its own. No ROS installation is needed.
+messages of the same layout are unpacked by one precompiled `struct.Struct`; all bytes that define
+the layout are compared on every message, so a message is never decoded by a wrong layout. No ROS
+installation is needed.
 """
 
 import struct
@@ -29,9 +29,10 @@ _MAX_LAYOUTS = 256
 
 
 class JointStateSample(NamedTuple):
-    """A sensor_msgs/JointState; SI, radians; `names` is one object for all messages alike.
+    """A decoded sensor_msgs/JointState; SI, radians, `stamp` in ns.
 
-    Each of `position`, `velocity`, `effort` is empty or as long as `names`.
+    Each of `position`, `velocity`, `effort` is empty or as long as `names`. Messages with equal
+    names share one `names` object.
     """
 
     stamp: int
@@ -43,7 +44,10 @@ class JointStateSample(NamedTuple):
 
 
 class ImuSample(NamedTuple):
-    """A sensor_msgs/Imu; quaternion x, y, z, w; `*_covariance_0` is element 0 of the covariance."""
+    """A decoded sensor_msgs/Imu: quaternion x, y, z, w, rad/s, m/s2, `stamp` in ns.
+
+    `*_covariance_0` is element 0 of each covariance: -1 means "not measured" (REP-145).
+    """
 
     stamp: int
     frame_id: str
@@ -56,7 +60,7 @@ class ImuSample(NamedTuple):
 
 
 class PayloadSample(NamedTuple):
-    """A geometry_msgs/InertiaStamped: mass in kg, centre of gravity in m, in `frame_id`."""
+    """A decoded geometry_msgs/InertiaStamped: mass (kg), centre of gravity (m) in `frame_id`."""
 
     stamp: int
     frame_id: str
@@ -83,7 +87,10 @@ Sample = TypeVar('Sample', bound=JointStateSample | ImuSample | PayloadSample)
 
 @dataclass(frozen=True, slots=True)
 class Kind(Generic[Sample]):
-    """A message type: its ROS 2 name, how to walk what follows the header, how to hand it out."""
+    """A message type that can be decoded: its ROS 2 name, the walk over its body, its sample.
+
+    `body` walks what follows the header; `sample` makes the sample from layout, stamp and numbers.
+    """
 
     type: str
     body: Callable[[Cursor], tuple[Names, Blocks]]
@@ -96,7 +103,7 @@ PAYLOAD = Kind('geometry_msgs/msg/InertiaStamped', payload_body, _payload)
 
 
 class _Unpacker:
-    """A layout compiled to one `struct` call."""
+    """A layout compiled to one `struct` call, which also unpacks the constant bytes to compare."""
 
     __slots__ = ('blocks', 'expected', 'layout', 'pick', 'stamp', 'unpack')
 
@@ -122,10 +129,10 @@ class _Unpacker:
 
 
 class Decoder(Generic[Sample]):
-    """Decodes messages of one kind one at a time; remembers the layouts it has met.
+    """Decodes messages of one kind one at a time; remembers the layouts it has seen.
 
-    `one(data)` returns the sample or raises BadSample, never anything else. `names` and
-    `frame_id` of two samples are the same object where they are equal.
+    `one(data)` returns the sample or raises BadSample, never anything else. Equal `names` and
+    `frame_id` of two samples are the same object.
     """
 
     def __init__(self, kind: Kind[Sample], wire: Wire = 'cdr') -> None:
@@ -136,12 +143,12 @@ class Decoder(Generic[Sample]):
         self._layouts = 0
 
     def one(self, data: bytes) -> Sample:
-        """The sample in `data`; BadSample says what is wrong where."""
+        """Decode the message in `data`; BadSample says what is wrong with which field."""
         layout, stamp, blocks = self.raw(data)
         return self.kind.sample(layout, stamp, blocks)
 
     def raw(self, data: bytes) -> tuple[Layout, int, list[tuple[float, ...]]]:
-        """Layout, stamp in ns and the float64 blocks of the message in `data`."""
+        """Return layout, stamp in ns and the float64 blocks of the message in `data`."""
         for known in self._known.get(len(data), ()):
             values = known.unpack(data)
             if known.pick(values) == known.expected:
@@ -176,15 +183,15 @@ class Decoder(Generic[Sample]):
 
 
 def joint_state_decoder() -> Decoder[JointStateSample]:
-    """A decoder of sensor_msgs/JointState."""
+    """Return a new decoder of sensor_msgs/JointState in CDR."""
     return Decoder(JOINT_STATE)
 
 
 def imu_decoder() -> Decoder[ImuSample]:
-    """A decoder of sensor_msgs/Imu."""
+    """Return a new decoder of sensor_msgs/Imu in CDR."""
     return Decoder(IMU)
 
 
 def payload_decoder() -> Decoder[PayloadSample]:
-    """A decoder of geometry_msgs/InertiaStamped."""
+    """Return a new decoder of geometry_msgs/InertiaStamped in CDR."""
     return Decoder(PAYLOAD)

@@ -1,4 +1,4 @@
-"""Chunks of an MCAP: their header, decompression into a reused buffer, the walk over records."""
+"""Chunks of an MCAP file: parses their head, decompresses them, walks over their records."""
 
 import importlib
 import struct
@@ -30,17 +30,17 @@ def _optional(name: str) -> ModuleType | None:
         return None
 
 
-# Only saves time: zlib's CRC-32 costs a third of zstd's decompression, ISA-L's a thirtieth.
+# Optional, for speed: zlib's CRC-32 costs a third of zstd's decompression, ISA-L's a thirtieth.
 _isal = _optional('isal.isal_zlib')
 crc32: Callable[..., int] = _isal.crc32 if _isal else zlib.crc32
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkHead:
-    """Head of a Chunk record; `data` is where its records begin, counted from the chunk's start.
+    """The head of a Chunk record: its size in the file, times, compression and checksum.
 
-    `first`, `last` are log times in ns; `size` what the records' `packed` bytes unpack to; a `crc`
-    of 0 says there is none.
+    `length` is of the whole chunk (bytes); `first`, `last` are log times (ns); `data` is the offset
+    of its `packed` bytes of records, which unpack to `size` bytes; a `crc` of 0 means none.
     """
 
     length: int
@@ -54,7 +54,7 @@ class ChunkHead:
 
 
 def chunk_head(head: bytes) -> ChunkHead:
-    """Parse the first bytes of a Chunk record; BadBag where it is none."""
+    """Parse the first bytes of a Chunk record; BadBag if they are not the head of a chunk."""
     try:
         opcode, length, first, last, size, crc, text = _HEAD.unpack_from(head)
         compression = head[_HEAD.size : _HEAD.size + text].decode('ascii')
@@ -68,7 +68,7 @@ def chunk_head(head: bytes) -> ChunkHead:
 
 
 class Buffers:
-    """The two buffers of one reading thread, which grow to the largest chunk met."""
+    """The buffers and decompressors of one reading thread, which grow to the largest chunk."""
 
     def __init__(self) -> None:
         self._packed = np.zeros(1 << 16, np.uint8)
@@ -77,16 +77,16 @@ class Buffers:
         self._lz4 = Lz4()
 
     def packed(self, size: int) -> Bytes:
-        """Room for `size` bytes of the file, and SLACK behind them."""
+        """Return a buffer with room for `size` bytes of the file and SLACK bytes after them."""
         if self._packed.size < size + SLACK:
             self._packed = np.zeros(size + size // 4 + SLACK, np.uint8)
         return self._packed
 
     def records(self, head: ChunkHead, chunk: Bytes) -> Bytes:
-        """The chunk's records, `head.size` bytes from index LEAD on.
+        """Return a buffer with the chunk's unpacked records, `head.size` bytes from index LEAD on.
 
-        `chunk` holds the Chunk record, with SLACK bytes behind it. What is returned is overwritten
-        by the next call. BadBag where the chunk cannot be unpacked to what its head promises.
+        `chunk` holds the Chunk record and SLACK bytes after it. The next call overwrites the
+        buffer. Raises BadBag if the chunk does not unpack to what its head says.
         """
         stop = head.data + head.packed
         if head.compression == '':
@@ -106,7 +106,7 @@ class Buffers:
         return out
 
     def unpack(self, compression: str, source: memoryview, target: memoryview) -> None:
-        """Decompress `source` so that it fills `target`, else BadBag."""
+        """Decompress `source` into `target`; BadBag unless it fills it exactly."""
         if compression == 'zstd':
             got = self._unzstd(source, target)
         elif compression == 'lz4':
@@ -119,7 +119,7 @@ class Buffers:
     def _unzstd(self, source: memoryview, target: memoryview) -> int:
         got = 0
         try:
-            # Straight into the buffer, in one go where the frame says its size.
+            # Directly into the buffer, in one call if the frame holds its size.
             with self._zstd.stream_reader(source) as stream:
                 while part := stream.readinto(target[got:]):
                     got += part
@@ -129,7 +129,7 @@ class Buffers:
 
 
 def pack(compression: str, content: bytes, zstd: zstandard.ZstdCompressor) -> bytes:
-    """The records of a chunk compressed; '' leaves them as they are."""
+    """Compress the records of a chunk by 'zstd' or 'lz4'; '' leaves them as they are."""
     if compression == 'zstd':
         return zstd.compress(content)
     if compression == 'lz4':
@@ -139,10 +139,10 @@ def pack(compression: str, content: bytes, zstd: zstandard.ZstdCompressor) -> by
 
 @dataclass(frozen=True, slots=True)
 class Walked:
-    """What a walk over records found: message offsets a channel (increasing), other records.
+    """The result of a walk over records: offsets of messages by channel id, and other records.
 
-    `others` are (opcode, offset of content, length of content); `stop` is where the walk ended,
-    `whole` whether that is the end. All offsets count from the walk's start.
+    Offsets are in bytes from the walk's start, increasing. `others` are (opcode, offset of content,
+    length of content); `stop` is where the walk ended, `whole` whether that is the end of the data.
     """
 
     messages: dict[int, Offsets]
@@ -152,7 +152,7 @@ class Walked:
 
 
 def walk(data: memoryview, *, chunked: bool = True) -> Walked:
-    """Walk the records in `data`; ends at one that is cut off or, in a chunk, impossible.
+    """Walk over the records in `data`, up to one that is cut off or invalid.
 
     Outside chunks (`chunked` false) the walk also ends before a Chunk and after a Footer.
     """
@@ -178,7 +178,7 @@ def walk(data: memoryview, *, chunked: bool = True) -> Walked:
                 break
         pos += 9 + length
     else:
-        # What is left is too short for a message but may be an empty record of another kind.
+        # The rest is too short for a message but may be an empty record of another kind.
         if pos + 9 <= end and pos + 9 + record(data, pos)[1] <= end and data[pos] > MESSAGE:
             pos += 9 + record(data, pos)[1]
     arrays = {channel: np.array(offsets, np.int64) for channel, offsets in found.items()}
@@ -186,13 +186,13 @@ def walk(data: memoryview, *, chunked: bool = True) -> Walked:
 
 
 def log_times(data: Bytes, offsets: Offsets) -> Offsets:
-    """Log times in ns of the message records at `offsets` of `data`."""
+    """Return the log times (n,) in ns of the message records at `offsets` (n,) of `data`."""
     every = np.ndarray((data.size - 22,), '<i8', data, offset=15, strides=(1,))
     return every[offsets].astype(np.int64)
 
 
 def indexed(data: bytes | memoryview, channel: int) -> Offsets | None:
-    """Offsets in a MessageIndex record that must be of `channel`; None where it is not one."""
+    """Return the message offsets in a MessageIndex record; None if it is not one of `channel`."""
     if len(data) < 15:
         return None
     opcode, length, found = _MESSAGE.unpack_from(data)

@@ -1,8 +1,8 @@
-"""Decodes the messages of one channel into columns, many at once where their layout is alike.
+"""Decodes the messages of one channel into columns, many at once if they have the same layout.
 
 Every byte that must not vary is compared with the layout learnt from an earlier message; messages
-that differ are tried with the other layouts known and in the end decoded one by one. Either way
-gives the same numbers. The columns are views where that saves a copy, so not all are contiguous.
+that differ are tried with the other known layouts, and finally decoded one by one. Both ways give
+the same numbers. Some columns are views, to save a copy, so not all are contiguous.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -31,7 +31,7 @@ _MAX_MESSAGE = 1 << 24
 
 
 def batch(columns: Iterable[Columns]) -> Batch:
-    """One batch of these columns, of whatever types."""
+    """Return a Batch of columns of any types."""
     held = list(columns)
     return Batch(
         [c for c in held if isinstance(c, JointStateColumns)],
@@ -41,7 +41,7 @@ def batch(columns: Iterable[Columns]) -> Batch:
 
 
 def select(columns: AnyColumns, rows: NDArray[Any] | slice) -> AnyColumns:
-    """The given rows of `columns`."""
+    """Return the given rows of `columns`."""
     arrays = {
         f.name: value[rows]
         for f in fields(columns)
@@ -53,10 +53,10 @@ def select(columns: AnyColumns, rows: NDArray[Any] | slice) -> AnyColumns:
 
 @dataclass(frozen=True, slots=True)
 class Decoded:
-    """What came of some messages of one topic.
+    """The columns decoded from some messages of one topic, and the numbers of bad messages.
 
-    `malformed` could not be decoded, `reason` says why the first could not; `broken` are index
-    entries at which there is no message of this channel.
+    `count` messages were decoded, `malformed` could not be (`reason` says why the first could not);
+    `broken` index entries do not point to a message of this channel.
     """
 
     columns: list[Columns]
@@ -68,7 +68,10 @@ class Decoded:
 
 @dataclass(frozen=True, slots=True)
 class _Raw:
-    """Messages alike: `place` is their place among the messages of the call."""
+    """The times and float64 blocks of n messages of one layout.
+
+    `place` (n,) is their position among the messages of the call.
+    """
 
     place: NDArray[np.int64]
     log_time: Times
@@ -92,7 +95,7 @@ def _payload(key: Key, log_time: Times, stamp: Times, blocks: Sequence[Floats]) 
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """How a type's columns are made: the spans of its blocks (all if none) and the constructor."""
+    """How a type's columns are made: the spans of its blocks (() means all) and the constructor."""
 
     spans: tuple[Span, ...]
     columns: Callable[[Key, Times, Times, Sequence[Floats]], Columns]
@@ -107,14 +110,14 @@ _SHAPES = {
 
 
 def _key(kind: Kind[Any], layout: Layout) -> Key:
-    """What messages that share columns have in common."""
+    """Return what messages must have in common to share columns: names and widths, or frame."""
     return (layout.names, layout.widths) if kind is JOINT_STATE else (layout.frame_id,)
 
 
 class ColumnDecoder:
-    """Turns messages of one channel into columns; remembers the layouts it has met.
+    """Decodes messages of one channel into columns; remembers the layouts it has seen.
 
-    ROS 1's packing and compressed messages mean message by message. Safe to use from several
+    ROS 1 messages and singly compressed messages are decoded one by one. Safe to use from several
     threads.
     """
 
@@ -146,7 +149,7 @@ class ColumnDecoder:
         return self._rest(job)
 
     def _guess(self, job: '_Job') -> '_Plan | None':
-        """The layout of the first pending message, if it is one."""
+        """Learn and return the layout of the first pending message; None if it is not valid."""
         data = job.message(self.channel, int(job.pending[0])) if job.pending.size else None
         if data is None:
             return None
@@ -160,7 +163,7 @@ class ColumnDecoder:
         return plan
 
     def _rest(self, job: '_Job') -> Decoded:
-        """Decode what is pending one by one and put all together in the order it came."""
+        """Decode the pending messages one by one; return all decoded ones in their order."""
         messages: list[tuple[int, int, bytes]] = []
         for place in job.pending.tolist():
             data = job.message(self.channel, place)
@@ -171,7 +174,7 @@ class ColumnDecoder:
         return Decoded(columns, count, malformed, reason, len(job.pending) - len(messages))
 
     def messages(self, messages: Iterable[tuple[int, bytes]]) -> Decoded:
-        """Decode (log time in ns, bytes) one by one."""
+        """Decode messages, given as (log time in ns, bytes), one by one."""
         placed = ((place, log, data) for place, (log, data) in enumerate(messages))
         one, malformed, reason = self._one_by_one(placed)
         columns, count = self._assemble(one)
@@ -194,7 +197,7 @@ class ColumnDecoder:
         return [(key, _raw_of(rows)) for key, rows in groups.items()], malformed, reason
 
     def _assemble(self, found: list[tuple[Key, _Raw]]) -> tuple[list[Columns], int]:
-        """Columns, one a key in order of first appearance, each in the order its messages came."""
+        """Return one set of columns per key, by first appearance, and the number of messages."""
         groups: dict[Key, list[_Raw]] = {}
         for key, raw in sorted(found, key=lambda item: int(item[1].place[0])):
             groups.setdefault(key, []).append(raw)
@@ -207,7 +210,7 @@ class ColumnDecoder:
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """A layout met before: what its messages share, and how to gather them."""
+    """A layout seen before: the key of its columns, and its gather operation."""
 
     key: Key
     gather: Gather
@@ -215,7 +218,7 @@ class _Plan:
 
 @dataclass(slots=True)
 class _Job:
-    """Messages of a chunk on their way: places still `pending`, and what was found."""
+    """The decoding of a chunk's messages: positions still `pending`, and those `found`."""
 
     buffer: Bytes
     size: int
@@ -224,7 +227,7 @@ class _Job:
     found: list[tuple[Key, _Raw]] = field(default_factory=list)
 
     def attempt(self, plan: _Plan) -> None:
-        """Take the pending messages that have the plan's layout; the others stay pending."""
+        """Decode the pending messages that have the plan's layout; the others stay pending."""
         if not self.pending.size:
             return
         everything = self.pending.size == self.offsets.size
@@ -246,7 +249,7 @@ class _Job:
         self.pending = left
 
     def message(self, channel: int, place: int) -> bytes | None:
-        """A message's own bytes, or None where there is no message of this channel."""
+        """Return a message's content, None if there is no message of this channel."""
         start = LEAD + int(self.offsets[place])
         head = self.buffer[start : start + 11].tobytes()
         length = int.from_bytes(head[1:9], 'little')
@@ -257,13 +260,13 @@ class _Job:
         return self.buffer[start + HEAD : start + 9 + length].tobytes()
 
     def log_time(self, place: int) -> int:
-        """The message's log time in ns."""
+        """Return a message's log time in ns."""
         start = LEAD + int(self.offsets[place]) + 15
         return int(self.buffer[start : start + 8].view('<i8')[0])
 
 
 def plain(data: bytes) -> bytes:
-    """The message itself where rosbag2 compressed it (mode: message); BadSample if broken."""
+    """Decompress a message if rosbag2 compressed it (mode: message); BadSample if broken."""
     if data[:4] != zstandard.FRAME_HEADER:
         return data
     try:

@@ -1,4 +1,4 @@
-"""Encodes joint states, IMU and payload messages as CDR."""
+"""Encodes JointState, Imu and InertiaStamped messages as CDR, without ROS."""
 
 import struct
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def joint_state_cdr(
     velocity: Numbers = (),
     effort: Numbers = (),
 ) -> bytes:
-    """A sensor_msgs/JointState; SI units, radians; each array empty or as long as `names`."""
+    """Encode a sensor_msgs/JointState; SI, radians; each array is empty or as long as `names`."""
     out = message_head(stamp_ns, frame_id, tuple(names))
     for values in (position, velocity, effort):
         put_floats(out, values, counted=True)
@@ -30,9 +30,10 @@ def joint_state_cdr(
 
 
 class JointStateBytes:
-    """Serialised JointStates of fixed names with position and effort: only numbers are written.
+    """A template of a serialised JointState with fixed names, into which numbers are written.
 
-    rclpy takes the bytes as they are; filling a template costs a third of a message object.
+    It holds position and effort. rclpy publishes the bytes as they are; filling a template costs a
+    third of making a message object.
     """
 
     def __init__(self, names: Sequence[str], frame_id: str = '') -> None:
@@ -45,7 +46,7 @@ class JointStateBytes:
         self._position_at = self._effort_at - 8 - self._floats.size
 
     def fill(self, stamp: int, position: Sequence[float], effort: Sequence[float]) -> bytes:
-        """Return the message with header `stamp` (ns), `position` and `effort` (one a name)."""
+        """Return the message with header `stamp` (ns), `position` and `effort` (one per name)."""
         data = self._data
         self._stamp.pack_into(data, 4, stamp // _NS, stamp % _NS)
         self._floats.pack_into(data, self._position_at, *position)
@@ -61,10 +62,10 @@ def imu_cdr(
     linear_acceleration: Numbers,
     covariances: tuple[Numbers, Numbers, Numbers] | None = None,
 ) -> bytes:
-    """A sensor_msgs/Imu: quaternion x, y, z, w; rad/s; m/s2.
+    """Encode a sensor_msgs/Imu: quaternion x, y, z, w; rad/s; m/s2.
 
-    `covariances` of orientation, angular velocity, acceleration, 9 values each row by row; None
-    is all zero, which means "unknown" (REP-145).
+    `covariances` are of orientation, angular velocity and acceleration, 9 values each, row by row;
+    None is all zero, which means "unknown" (REP-145).
     """
     out = message_head(stamp_ns, frame_id, None)
     vectors = ((orientation, 4), (angular_velocity, 3), (linear_acceleration, 3))
@@ -81,7 +82,7 @@ def inertia_cdr(
     com: Numbers,
     moments: Numbers = (0.0,) * 6,
 ) -> bytes:
-    """A geometry_msgs/InertiaStamped: kg, m, and kg m2 (ixx, ixy, ixz, iyy, iyz, izz)."""
+    """Encode a geometry_msgs/InertiaStamped: kg, m, kg m2 (ixx, ixy, ixz, iyy, iyz, izz)."""
     out = message_head(stamp_ns, frame_id, None)
     put_floats(out, (mass,), 1)
     put_floats(out, com, 3)
@@ -90,7 +91,7 @@ def inertia_cdr(
 
 
 def message_head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None = None) -> bytearray:
-    """The beginning of a message: encapsulation, Header, and the names of a JointState."""
+    """Return the start of a message: encapsulation, Header, and the names of a JointState."""
     sec, nanosec = divmod(stamp_ns, _NS)
     out = bytearray(b'\x00\x01\x00\x00')
     out += _STAMP.pack(sec, nanosec)
@@ -100,7 +101,7 @@ def message_head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None = N
 
 @lru_cache(maxsize=256)
 def _texts(frame_id: str, names: tuple[str, ...] | None) -> bytes:
-    """frame_id and names; both start at a multiple of four and so do all lengths in them."""
+    """Return frame_id and names encoded; they begin, as all their lengths, at multiples of four."""
     out = bytearray()
     put_text(out, frame_id)
     if names is not None:
@@ -111,14 +112,14 @@ def _texts(frame_id: str, names: tuple[str, ...] | None) -> bytes:
 
 
 def put_text(out: bytearray, text: str) -> None:
-    """Append a string."""
+    """Append a CDR string: its length and its UTF-8 bytes with a final zero."""
     data = text.encode() + b'\0'
     put_count(out, len(data))
     out += data
 
 
 def put_count(out: bytearray, number: int) -> None:
-    """Append a length, or any other uint32."""
+    """Append a uint32, such as a length, aligned to four bytes."""
     out += bytes(-len(out) % 4)
     out += number.to_bytes(4, 'little')
 
@@ -126,7 +127,10 @@ def put_count(out: bytearray, number: int) -> None:
 def put_floats(
     out: bytearray, values: Numbers, size: int | None = None, *, counted: bool = False
 ) -> None:
-    """Append float64s: an array of `size`, or a sequence with its length."""
+    """Append float64s: a fixed array of `size`, or a sequence with its length (`counted`).
+
+    Raises ValueError if there are not `size` values.
+    """
     number = len(values)
     if size not in (None, number):
         msg = f'expected {size} values, got {number}'

@@ -1,4 +1,4 @@
-"""Encodes diagnostics and markers as CDR, for viewers; no ROS is needed."""
+"""Encodes diagnostics and markers for viewers as CDR, without ROS."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -19,11 +19,11 @@ _ADD, _DELETE = 0, 2
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One marker: `points` (m) in `colour`, or a `text` at `position` (m).
+    """A shape for a viewer, sent as one marker: `points` (m), or a `text` at `position` (m).
 
-    `kind` as visualization_msgs/Marker numbers them; `colours` is one a point, or empty; `size` (m)
-    is the width of lines, the diameter of spheres, the height of letters. Without points and text
-    it is nothing: what was drawn is taken away.
+    `kind` is the number in visualization_msgs/Marker; `colours` has one per point, or is empty;
+    `size` (m) is the width of lines, the diameter of spheres, the height of letters. Without points
+    and text the marker of this name is deleted.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Shape:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The fields of a diagnostic_msgs/DiagnosticStatus; `level` 0 to 3."""
+    """The fields of a diagnostic_msgs/DiagnosticStatus; `level` is 0 to 3 (OK to STALE)."""
 
     level: int
     name: str
@@ -48,14 +48,14 @@ class Diagnosis:
 
 
 def diagnosis_cdr(diagnosis: Diagnosis) -> bytes:
-    """A diagnostic_msgs/DiagnosticStatus."""
+    """Encode a diagnostic_msgs/DiagnosticStatus."""
     out = bytearray(_HEAD)
     _put_diagnosis(out, diagnosis)
     return bytes(out)
 
 
 def diagnoses_cdr(stamp_ns: int, diagnoses: Sequence[Diagnosis]) -> bytes:
-    """A diagnostic_msgs/DiagnosticArray."""
+    """Encode a diagnostic_msgs/DiagnosticArray."""
     out = message_head(stamp_ns, '')
     put_count(out, len(diagnoses))
     for diagnosis in diagnoses:
@@ -73,7 +73,7 @@ def _put_diagnosis(out: bytearray, diagnosis: Diagnosis) -> None:
 
 
 def markers_cdr(stamp_ns: int, frame_id: str, lifetime_s: float, shapes: Sequence[Shape]) -> bytes:
-    """A visualization_msgs/MarkerArray of shapes in one frame, which vanish after `lifetime_s`."""
+    """Encode a visualization_msgs/MarkerArray; its shapes vanish after `lifetime_s` seconds."""
     out = bytearray(_HEAD)
     put_count(out, len(shapes))
     stamp, lifetime = _time(stamp_ns), _time(round(lifetime_s * _NS))

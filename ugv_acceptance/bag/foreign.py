@@ -1,7 +1,7 @@
-"""Reads SQLite bags (rosbag2) and ROS 1 bags into the same columns, message by message.
+"""Reads SQLite bags (rosbag2) and ROS 1 bags, message by message, into the same columns as MCAP.
 
-SQLite is read with Python's own module, since it needs nothing but four columns of two tables and
-so works without metadata.yaml; ROS 1 bags are read by rosbags.
+SQLite is read with Python's sqlite3: four columns of two tables are enough, also without
+metadata.yaml. ROS 1 bags are read by rosbags.
 """
 
 import sqlite3
@@ -23,7 +23,10 @@ _Message = tuple[int, int, bytes]  # channel, log time in ns, content
 
 @dataclass(slots=True)
 class ForeignIndex:
-    """Channels of one file, messages a channel id, first and last log time in ns."""
+    """The index of an SQLite or ROS 1 file: channels, number of messages of each, time span.
+
+    `first` and `last` are log times in ns.
+    """
 
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
@@ -32,7 +35,7 @@ class ForeignIndex:
 
 
 def open_sqlite(path: Path, name: str) -> ForeignIndex:
-    """Index of an SQLite bag."""
+    """Read the index of an SQLite bag; BadBag if it is not readable. `name` is for errors."""
     with _sqlite_errors(name), closing(_connect(path)) as db:
         topics = db.execute('SELECT id, name, type, serialization_format FROM topics')
         channels = {int(i): Channel(int(i), str(n), str(t), str(s)) for i, n, t, s in topics}
@@ -43,12 +46,12 @@ def open_sqlite(path: Path, name: str) -> ForeignIndex:
 
 
 def _connect(path: Path) -> sqlite3.Connection:
-    # Immutable: a bag may lie where we cannot write, and a log left beside it is not ours to merge.
+    # Immutable: the folder may be read-only, and a leftover journal must not be merged.
     return sqlite3.connect(f'file:{quote(str(path))}?mode=ro&immutable=1', uri=True)
 
 
 class _sqlite_errors:  # noqa: N801 (used like a function)
-    """SQLite's own errors, and values of a type it should not hold, become BadBag."""
+    """Turns SQLite's errors, and values of an unexpected type, into BadBag."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -75,7 +78,7 @@ def _sqlite_messages(path: Path, wanted: Collection[int]) -> Iterator[_Message]:
 
 
 def open_ros1(path: Path, name: str) -> ForeignIndex:
-    """Index of a ROS 1 bag."""
+    """Read the index of a ROS 1 bag; BadBag if it is not readable. `name` is for errors."""
     try:
         with Ros1Reader(path) as reader:
             channels = {c.id: Channel(c.id, c.topic, c.msgtype, 'ros1') for c in reader.connections}
@@ -83,7 +86,7 @@ def open_ros1(path: Path, name: str) -> ForeignIndex:
             empty = not reader.message_count
             first, last = (0, 0) if empty else (reader.start_time, reader.end_time - 1)
             return ForeignIndex(channels, counts, first, last)
-    except Exception as error:  # rosbags lets whatever a broken file causes through
+    except Exception as error:  # rosbags raises anything for a broken file
         raise BadBag(f'{name}: not a readable ROS 1 bag ({error})') from error
 
 
@@ -100,14 +103,14 @@ _MESSAGES = {'sqlite3': _sqlite_messages, 'ros1': _ros1_messages}
 def foreign_messages(
     storage: str, path: Path, name: str, wanted: Collection[int]
 ) -> Iterator[_Message]:
-    """Messages of the channels wanted, in log time order; BadBag where reading breaks off."""
+    """Yield the messages of the wanted channels by log time; BadBag where reading breaks off."""
     messages = _MESSAGES[storage](path, wanted) if wanted else iter(())
     while True:
         try:
             message = next(messages)
         except StopIteration:
             return
-        except Exception as error:  # rosbags lets whatever a broken file causes through
+        except Exception as error:  # rosbags raises anything for a broken file
             raise BadBag(f'{name}: reading ended early ({error})') from error
         yield message
 
@@ -115,9 +118,9 @@ def foreign_messages(
 def foreign_blocks(
     storage: str, path: Path, name: str, wanted: Wanted
 ) -> Iterator[tuple[Piecework, int]]:
-    """Blocks of messages in log time order, each with the log time of its last message, ns.
+    """Yield decoded blocks of messages by log time, each with its last message's log time (ns).
 
-    What breaks while reading ends the file with a finding; what came before is kept.
+    If reading breaks off, the file ends there with a finding; what came before is kept.
     """
     block: list[_Message] = []
     broken = ''

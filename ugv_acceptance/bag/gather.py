@@ -1,8 +1,8 @@
-"""Gathers the messages of one layout from a chunk at once, every constant byte compared.
+"""Decodes all messages of one layout in a chunk at once, and compares every constant byte.
 
-A gather copies the same stretch of every record, one small memcpy each, so what comes out is
-contiguous; records themselves lie anywhere. Constants are compared a word at a time with bits
-masked out that may vary (padding, stamps).
+A gather copies the same range of bytes of every record, one small memcpy each, into a contiguous
+array; the records themselves may lie anywhere. Constants are compared a word at a time; bits that
+may vary (padding, stamps) are masked out.
 """
 
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ _BEFORE = 5  # a row starts this far before its record: then CDR's origin is a m
 
 @dataclass(slots=True)
 class _Region:
-    """`size` words of a row from `start` that hold constants.
+    """`size` words of a row from word `start` that hold constants to compare.
 
-    `tile` has the words expected and the bits that count, repeated as often as there were messages
-    at a time, so that comparing is one long loop instead of a short one a message. It is replaced
-    as a whole, since several threads use it.
+    `tile` holds the expected words and the bits to compare, repeated for as many messages as were
+    met at a time, so that comparing is one long loop instead of a short one per message. It is
+    replaced as a whole, since several threads use it.
     """
 
     start: int
@@ -39,7 +39,7 @@ class _Region:
     tile: tuple[Words, Words]
 
     def differs(self, words: Words) -> Words:
-        """Bits of (n, size) words that are not as expected."""
+        """Return the bits of `words` (n, size) that differ from the expected ones."""
         n = len(words)
         text, bits = self.tile
         if len(text) < n:
@@ -51,10 +51,10 @@ class _Region:
 
 
 class Gather:
-    """A layout turned into gathers. `record` is the size of a whole record in bytes.
+    """The gather operations for one layout; `record` is the size of a whole record in bytes.
 
-    `spans` are the stretches of the layout's blocks that are wanted; none means all blocks.
-    Two threads may share one.
+    `spans` are the parts of the layout's blocks that are wanted; () means all blocks. Threads may
+    share one.
     """
 
     def __init__(self, layout: Layout, channel: int, spans: tuple[Span, ...] = ()) -> None:
@@ -77,7 +77,7 @@ class Gather:
         )
 
     def _find(self, layout: Layout, channel: int) -> list[_Region]:
-        """The regions; the first holds all of a row before its first block, so the times too."""
+        """Return the regions of constants; the first is all before the first block, with times."""
         width = -(-(_BEFORE + self.record) // 8) * 8
         text, mask = np.zeros(width, np.uint8), np.zeros(width, np.uint8)
         head = b'\x05' + (self.record - 9).to_bytes(8, 'little') + channel.to_bytes(2, 'little')
@@ -95,7 +95,7 @@ class Gather:
         return [_Region(a, b - a, (words[None, a:b], bits[None, a:b])) for a, b in parts]
 
     def matching(self, buffer: Bytes, offsets: Offsets) -> tuple[NDArray[np.bool_] | None, Words]:
-        """Which records have this layout (None: all), and their words up to the first block."""
+        """Return which records have this layout (None: all), and their words before the blocks."""
         good: NDArray[np.bool_] | None = None
         first: Words | None = None
         for region in self._regions:
@@ -110,7 +110,7 @@ class Gather:
         return good, first
 
     def times(self, words: Words) -> tuple[Times, Times]:
-        """Log times and stamps in ns, from the words `matching` gave."""
+        """Return log times and stamps (n,) in ns, from the words that `matching` returned."""
         rows = words.view(self._times)[:, 0]
         stamp = rows['sec'].astype(np.int64)
         stamp *= 1_000_000_000
@@ -118,7 +118,7 @@ class Gather:
         return rows['log_time'].astype(np.int64), stamp
 
     def blocks(self, buffer: Bytes, offsets: Offsets) -> tuple[Floats, ...]:
-        """The wanted numbers of records that match, (n, width) each."""
+        """Return the wanted numbers of matching records, one array (n, width) for each span."""
         return tuple(
             _gather(buffer, offsets, start, 8 * n, f'{self.order}f8').astype(np.float64, copy=False)
             if n
@@ -128,7 +128,7 @@ class Gather:
 
 
 def _gather(buffer: Bytes, offsets: Offsets, start: int, size: int, kind: str) -> NDArray[Any]:
-    """The `size` bytes from byte `start` of every row, as (n, size / 8) of `kind`."""
+    """Return `size` bytes from byte `start` of every row, as (n, size / 8) numbers of `kind`."""
     base = LEAD - _BEFORE + start
     everywhere = np.ndarray(
         (buffer.size - base - size + 1,), f'V{size}', buffer, offset=base, strides=(1,)

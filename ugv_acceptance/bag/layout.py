@@ -1,7 +1,7 @@
-"""Learns how a serialised message is laid out by walking it once: CDR and ROS 1.
+"""Learns the layout of a serialised message (CDR or ROS 1) by walking it once.
 
-Every length and text in a message is part of its layout; what is left are a stamp and blocks of
-float64. Any bytes give a layout or BadSample, nothing else.
+Every length and text in a message is part of its layout; the rest is a stamp and blocks of float64.
+Any bytes give a layout or BadSample, nothing else.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,11 @@ Blocks: TypeAlias = list[tuple[int, int]]
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the numbers of a message lie, and the bytes that say so.
+    """Where the numbers of a message are, and the constant bytes that determine this.
 
     `constant` holds (offset, bytes) of lengths and texts; `blocks` (offset, count) of the float64
-    arrays; `stamp` the offset of sec and nanosec. Offsets are in bytes from the message's start.
+    arrays; `stamp` the offset of sec and nanosec. Offsets are in bytes from the message's start,
+    `length` is the message's; `little` means little endian.
     """
 
     length: int
@@ -41,7 +42,7 @@ class Layout:
 
 
 class Cursor:
-    """Walks a message and notes what is constant; every step is checked against the end."""
+    """Walks over a message and records its constant bytes; BadSample where it is too short."""
 
     def __init__(self, data: bytes, wire: Wire) -> None:
         self.data = data
@@ -71,7 +72,7 @@ class Cursor:
             self.constant.append((start, piece))
 
     def skip(self, size: int, where: str, align: int = 1) -> int:
-        """Offset of the next `size` bytes, which are passed over."""
+        """Skip the next `size` bytes, aligned to `align`, and return their offset."""
         start = self.pos
         if self.wire == 'cdr':
             start += -(start - self.origin) % align
@@ -82,14 +83,14 @@ class Cursor:
         return start
 
     def count(self, where: str) -> int:
-        """A length or count, which is part of the layout."""
+        """Read a length (uint32), which is part of the layout."""
         start = self.skip(4, where, 4)
         self._note(start, start + 4)
         order: Literal['little', 'big'] = 'little' if self.little else 'big'
         return int.from_bytes(self.data[start : start + 4], order)
 
     def text(self, where: str) -> str:
-        """A string, which is part of the layout."""
+        """Read a string, which is part of the layout."""
         size = self.count(where)
         start = self.skip(size, where)
         self._note(start, start + size)
@@ -106,14 +107,14 @@ class Cursor:
             raise BadSample(msg) from error
 
     def floats(self, number: int, where: str) -> tuple[int, int]:
-        """A block of `number` float64."""
+        """Skip a block of `number` float64; return its offset and number."""
         if not number:
             return self.pos, 0
         return self.skip(8 * number, where, 8), number
 
 
 def joint_state_body(cursor: Cursor) -> tuple[Names, Blocks]:
-    """Names and three blocks of a sensor_msgs/JointState."""
+    """Walk the body of a sensor_msgs/JointState: names and three blocks."""
     number = cursor.count('name')
     if number * 4 > len(cursor.data):
         msg = f'name: {number} names do not fit in {len(cursor.data)} bytes'
@@ -130,19 +131,19 @@ def joint_state_body(cursor: Cursor) -> tuple[Names, Blocks]:
 
 
 def imu_body(cursor: Cursor) -> tuple[Names, Blocks]:
-    """The one block of a sensor_msgs/Imu: its 37 float64 without a gap."""
+    """Walk the body of a sensor_msgs/Imu: one block of 37 float64 without a gap."""
     return (), [cursor.floats(37, 'orientation to linear_acceleration_covariance')]
 
 
 def payload_body(cursor: Cursor) -> tuple[Names, Blocks]:
-    """The one block of a geometry_msgs/InertiaStamped: mass, centre, six moments."""
+    """Walk the body of a geometry_msgs/InertiaStamped: one block of mass, centre, six moments."""
     return (), [cursor.floats(10, 'inertia')]
 
 
 def learn(
     body: Callable[[Cursor], tuple[Names, Blocks]], data: bytes, wire: Wire = 'cdr'
 ) -> Layout:
-    """Walk one message; BadSample says at which field it breaks."""
+    """Return the layout of one message; BadSample says which field is wrong."""
     cursor = Cursor(data, wire)
     if wire == 'ros1':
         cursor.skip(4, 'header.seq')

@@ -1,7 +1,7 @@
-"""Decompresses LZ4 frames into a buffer that is already there, by liblz4.
+"""Decompresses LZ4 frames into an existing buffer, by calling liblz4 directly.
 
-`lz4.frame` itself takes new memory for every chunk, which costs five times as much as LZ4 does. A
-frame's own checksums are looked at where it has any.
+`lz4.frame` itself allocates new memory for every chunk, which takes five times as long as LZ4 does.
+A frame's own checksums are verified if it has any.
 """
 
 import ctypes
@@ -17,7 +17,7 @@ _VERSION = 100  # of liblz4's interface for frames
 
 
 def _liblz4() -> ctypes.CDLL | None:
-    """liblz4 of the lz4 package: inside it in wheels, beside it in Debian; None: neither."""
+    """Load the liblz4 of the lz4 package, in wheels and in Debian; None if it is not found."""
     try:
         library = ctypes.CDLL(lz4.frame._frame.__file__)  # noqa: SLF001 - its file is all we need
         library.LZ4F_decompress.argtypes = [c_void_p] * 6
@@ -33,7 +33,7 @@ def _liblz4() -> ctypes.CDLL | None:
 
 
 class Lz4:
-    """Unpacks frames one after another; each thread needs one of its own."""
+    """Decompresses LZ4 frames one after another; each thread needs its own."""
 
     def __init__(self) -> None:
         self._lib = _liblz4()
@@ -43,9 +43,9 @@ class Lz4:
             weakref.finalize(self, self._lib.LZ4F_freeDecompressionContext, self._context)
 
     def unpack(self, source: memoryview, target: memoryview) -> int:
-        """Unpack a frame into `target`; the bytes it unpacks to, at least one more if too many.
+        """Decompress a frame into `target`; return its size, more than the target's if too large.
 
-        BadBag where it is broken.
+        Raises BadBag if the frame is broken.
         """
         if self._lib is None or not source or not target:
             return unpack_whole(source, target)
@@ -74,7 +74,7 @@ class Lz4:
 
 
 def unpack_whole(source: memoryview, target: memoryview) -> int:
-    """Unpack a frame like `Lz4.unpack`, by way of new memory."""
+    """Decompress a frame as `Lz4.unpack` does, but with the lz4 package and new memory."""
     unpacker = lz4.frame.LZ4FrameDecompressor()
     try:
         data = unpacker.decompress(source, max_length=len(target) + 1)

@@ -1,4 +1,7 @@
-"""The index of an MCAP file: what it holds and where, from its summary or by scanning."""
+"""The index of an MCAP file (its channels and chunks), read from the file's summary.
+
+salvage.py makes the same index by scanning a file whose summary is missing or wrong.
+"""
 
 import os
 import struct
@@ -29,7 +32,7 @@ _MAX_SUMMARY_BYTES = 1 << 30
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic in one file: its ROS type name ('' where it has no schema), encoding of messages."""
+    """A channel of one file: topic, ROS type ('' if it has no schema), encoding of messages."""
 
     id: int
     topic: str
@@ -39,10 +42,10 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A stretch of a file that is read on its own: a chunk, or bare message records.
+    """A part of a file that can be read on its own: a chunk, or message records without a chunk.
 
-    `start`, `length` in bytes; `first`, `last` log times in ns; `head` None for bare records;
-    `indexes` says where each channel's MessageIndex lies in the file, None where there is none.
+    `start`, `length` in bytes; `first`, `last` log times in ns; `head` is None without a chunk;
+    `indexes` gives the position of each channel's MessageIndex in the file, None without one.
     """
 
     start: int
@@ -56,10 +59,11 @@ class Piece:
 
 @dataclass(slots=True)
 class McapIndex:
-    """Channels and pieces of one file; `counts` messages a channel id.
+    """The index of one MCAP file: channels, pieces, and `counts` of messages by channel id.
 
-    `protected` says that a checksum of the whole data section was there and right, which is only
-    looked at where the file is scanned anyway.
+    `protected` says that the whole data section has a correct checksum, which is verified only if
+    the file is scanned anyway. `salvaged` is a sentence if the file breaks off; `findings` are
+    sentences about what is odd.
     """
 
     size: int
@@ -75,12 +79,12 @@ Record = TypeVar('Record')
 
 
 def pread(file: BinaryIO, start: int, length: int) -> bytes:
-    """`length` bytes of the file from `start`, fewer at its end."""
+    """Read `length` bytes of the file from `start`, fewer at its end."""
     return os.pread(file.fileno(), max(length, 0), start)
 
 
 def parse(read: Callable[[ReadDataStream], Record], content: bytes, what: str) -> Record:
-    """A record from its content; BadBag where it is garbled."""
+    """Parse the content of a record; BadBag if it is garbled. `what` names it in the error."""
     try:
         return read(ReadDataStream(BytesIO(content)))
     except (McapError, struct.error, ValueError, KeyError) as error:
@@ -88,7 +92,7 @@ def parse(read: Callable[[ReadDataStream], Record], content: bytes, what: str) -
 
 
 def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int, bytes]]) -> None:
-    """Take Schema and Channel records into `index`; garbled ones become findings."""
+    """Add Schema and Channel records (opcode, content) to `index`; garbled ones become findings."""
     for opcode, content in found:
         try:
             if opcode == 3:
@@ -107,17 +111,17 @@ def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int,
 
 
 def definitions(data: memoryview, walked: Walked) -> list[tuple[int, bytes]]:
-    """Schema and Channel records of a walk, schemas first."""
+    """Return the Schema and Channel records found by a walk, schemas first."""
     held = [(op, bytes(data[at : at + n])) for op, at, n in walked.others if op in (3, 4)]
     return sorted(held, key=lambda item: item[0])
 
 
 class NoIndex(BadBag):
-    """A sound file that was written without an index: to be scanned, nothing to report."""
+    """An intact file that was written without an index: it is scanned, without a finding."""
 
 
 def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
-    """Index of a file that was closed properly; BadBag says why its summary cannot serve."""
+    """Read the index from a file's summary; BadBag says why the summary cannot be used."""
     size = os.fstat(file.fileno()).st_size
     summary = _summary(file, size)
     index = McapIndex(size)
@@ -161,7 +165,7 @@ def _summary(file: BinaryIO, size: int) -> bytes:
 def _check(
     index: McapIndex, chunks: list[records.ChunkIndex], statistics: records.Statistics | None
 ) -> None:
-    """Raise BadBag unless the summary says all that reading by index needs."""
+    """Raise BadBag unless the summary holds all that reading by index needs."""
     if statistics is None:
         raise NoIndex('its summary has no statistics')
     counts = {c: n for c, n in statistics.channel_message_counts.items() if n}
@@ -218,7 +222,7 @@ def _indexed_piece(chunk: records.ChunkIndex, start: int, head: ChunkHead, size:
 
 
 def too_big(head: ChunkHead, max_chunk_bytes: int) -> str:
-    """Why a chunk is refused for its size, '' if it is not."""
+    """Return why a chunk is refused for its size, '' if it is not."""
     if max(head.size, head.packed) <= max_chunk_bytes:
         return ''
     claimed = max(head.size, head.packed) / (1 << 20)

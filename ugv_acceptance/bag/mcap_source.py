@@ -1,4 +1,4 @@
-"""Reads the chunks of one MCAP file, each decoded on its own."""
+"""Reads and decodes the chunks of one MCAP file, each independently of the others."""
 
 import os
 from collections.abc import Callable
@@ -18,7 +18,10 @@ from ugv_acceptance.bag.salvage import scan
 
 @dataclass(slots=True)
 class Piecework:
-    """What came of one piece: columns; a topic's messages and malformed ones; findings."""
+    """The result of decoding one piece: columns, counts by topic, and findings.
+
+    `malformed` holds by topic the number of malformed messages and the first one's reason.
+    """
 
     columns: list[Columns] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
@@ -26,7 +29,7 @@ class Piecework:
     findings: list[str] = field(default_factory=list)
 
     def add(self, topic: str, decoded: Decoded) -> None:
-        """Take in what was decoded of one topic."""
+        """Add what was decoded of one topic."""
         self.columns += decoded.columns
         self.counts[topic] = self.counts.get(topic, 0) + decoded.count + decoded.malformed
         if decoded.malformed:
@@ -34,11 +37,14 @@ class Piecework:
             self.malformed[topic] = (number + decoded.malformed, reason)
 
 
-Wanted = dict[int, tuple[str, ColumnDecoder]]  # topic and decoder a channel id
+Wanted = dict[int, tuple[str, ColumnDecoder]]  # channel id -> topic and decoder
 
 
 def open_mcap(file: BinaryIO, name: str, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
-    """Index of an MCAP file, by its summary or, where that cannot serve, by scanning it."""
+    """Return the index of an MCAP file, from its summary or, if that is unusable, by scanning.
+
+    Raises BadBag if it is not an MCAP file; `name` is for errors.
+    """
     magic = pread(file, 0, len(MAGIC))
     if magic != MAGIC:
         size = os.fstat(file.fileno()).st_size
@@ -53,7 +59,7 @@ def open_mcap(file: BinaryIO, name: str, max_chunk_bytes: int = MAX_CHUNK_BYTES)
 
 
 class McapSource:
-    """One open MCAP file and the channels wanted of it. `decode` may be called by many threads."""
+    """An open MCAP file and its wanted channels; `decode` may be called by several threads."""
 
     def __init__(self, path: Path, name: str, index: McapIndex, wanted: Wanted) -> None:
         self.name = name
@@ -63,7 +69,7 @@ class McapSource:
 
     @property
     def pieces(self) -> list[Piece]:
-        """The pieces that may hold a wanted message."""
+        """The pieces of the file that may hold a wanted message."""
         return [
             p
             for p in self.index.pieces
@@ -71,7 +77,7 @@ class McapSource:
         ]
 
     def decode(self, piece: Piece, buffers: Buffers) -> Piecework:
-        """Decode one piece; what is broken in it becomes a finding."""
+        """Decode one piece; damage in it becomes a finding."""
         work = Piecework()
         at = f'{self.name}: chunk at byte {piece.start}'
         try:
@@ -97,7 +103,7 @@ class McapSource:
     def _records(
         self, piece: Piece, buffers: Buffers
     ) -> tuple[Bytes, int, Callable[[int], Offsets | None]]:
-        """Records of a piece in a buffer, their size, and the offsets of a channel's messages."""
+        """Return a buffer with a piece's records, their size, and a channel's offsets function."""
         total = piece.length + piece.index_length
         if piece.head is None:
             packed = buffers.packed(LEAD + total)
@@ -123,7 +129,7 @@ class McapSource:
         work: Piecework,
         what: str,
     ) -> list[tuple[str, Decoded]]:
-        """Second try where the message index names places that hold no message."""
+        """Decode by walking the records, after the message index pointed to non-messages."""
         walked = walk(records.data[LEAD : LEAD + size])
         if not walked.whole:
             work.findings.append(
@@ -141,7 +147,7 @@ class McapSource:
         ]
 
     def _lost(self, piece: Piece) -> str:
-        """How many messages a piece that cannot be used holds, where its index says so."""
+        """Return a text on how many messages an unusable piece holds, '' if there is no index."""
         if piece.indexes is None:
             return ''
         data = pread(self.file, piece.start + piece.length, piece.index_length)

@@ -1,7 +1,7 @@
-"""Writes an MCAP file: chunks with checksums and an index.
+"""Writes an MCAP file: chunks with checksums, and an index.
 
 The writer of the mcap package ends a chunk only when it is full, so a process that is killed may
-lose minutes of a slow recording. The records themselves are those of that package.
+lose minutes of a slow recording; here the caller ends chunks. Records are those of that package.
 """
 
 import struct
@@ -22,7 +22,7 @@ _MESSAGE = struct.Struct('<BQHIQQ')
 
 @dataclass(slots=True)
 class _Open:
-    """The chunk being filled; `at` holds (log time, offset) a channel."""
+    """The chunk being filled; `at` holds (log time, offset) of each message by channel id."""
 
     parts: list[bytes] = field(default_factory=list)
     size: int = 0
@@ -32,7 +32,7 @@ class _Open:
 
 
 class McapWriter:
-    """Writes records to `file`, which stays the caller's. Times are ns."""
+    """Writes MCAP records to `file`, which the caller closes; all times are in ns."""
 
     def __init__(self, file: BinaryIO, library: str, compression: Compression = 'zstd') -> None:
         self._file = file
@@ -48,7 +48,7 @@ class McapWriter:
 
     @property
     def counts(self) -> dict[int, int]:
-        """Messages written a channel id."""
+        """Number of messages written, by channel id."""
         return self._counts
 
     @property
@@ -57,12 +57,12 @@ class McapWriter:
         return (self._open.size, self._open.first) if self._open.at else None
 
     def channel(self, topic: str, type_: str, schema: str, metadata: dict[str, str]) -> int:
-        """Id of a new channel of a ROS 2 type."""
+        """Create a channel of a ROS 2 type and return its id; `schema` is the type's definition."""
         known = self._schema(type_, 'ros2msg', schema.encode())
         return self._add(topic, 'cdr', metadata, known)
 
     def copy(self, channel: records.Channel, schema: records.Schema | None) -> int:
-        """Id of a new channel like one of another file; `schema` None: it has none."""
+        """Create a channel like one of another file and return its id; `schema` may be None."""
         known = 0 if schema is None else self._schema(schema.name, schema.encoding, schema.data)
         return self._add(channel.topic, channel.message_encoding, channel.metadata, known)
 
@@ -85,7 +85,7 @@ class McapWriter:
     def message(
         self, channel: int, log_time: int, data: bytes, published: int | None = None
     ) -> None:
-        """Add a message to the open chunk; `published` None: when it was logged."""
+        """Add a message to the open chunk; `published` is by default the log time."""
         sent = log_time if published is None else published
         chunk = self._open
         if chunk.at:
@@ -99,7 +99,7 @@ class McapWriter:
         self._append(data)
 
     def end_chunk(self) -> None:
-        """Write the open chunk, if there is anything in it, and hand it to the system."""
+        """Write the open chunk, unless it is empty, and flush it to the operating system."""
         chunk = self._open
         if not chunk.size:
             return
@@ -132,14 +132,14 @@ class McapWriter:
         self._file.flush()
 
     def span(self) -> tuple[int, int]:
-        """First and last log time of the chunks written, (0, 0) of none."""
+        """Return the first and last log time of the chunks written; (0, 0) without messages."""
         held = [c for c in self._chunks if c.message_index_offsets]
         if not held:
             return 0, 0
         return min(c.message_start_time for c in held), max(c.message_end_time for c in held)
 
     def finish(self) -> None:
-        """Write the open chunk and the summary."""
+        """Write the open chunk and the summary, which completes the file."""
         self.end_chunk()
         self._put(_record(records.DataEnd(0)))
         start = self._pos

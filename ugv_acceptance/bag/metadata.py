@@ -1,4 +1,4 @@
-"""Reads the metadata.yaml of a rosbag2 folder, any version, and finds its files."""
+"""Reads the metadata.yaml of a rosbag2 folder (any version) and finds the folder's files."""
 
 import os
 import posixpath
@@ -16,14 +16,17 @@ NAME = 'metadata.yaml'
 _MAX_BYTES = 64 << 20
 SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
 _PACKED = '.zstd'
-# Runs are looked for so many folders deep, and so many are named.
+# Depth of folders that is searched for runs, and number of runs named in an error.
 _DEEP, _NAMED = 3, 3
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True)
 class Metadata:
-    """Files in order, messages in all and a topic; None where metadata.yaml does not say."""
+    """The content of metadata.yaml: files in order, number of messages in all and by topic.
+
+    None where it does not say.
+    """
 
     files: tuple[str, ...] = ()
     message_count: int | None = None
@@ -31,7 +34,7 @@ class Metadata:
 
 
 def read_metadata(folder: Path) -> Metadata:
-    """Metadata of a rosbag2 folder; BadBag where metadata.yaml cannot be understood."""
+    """Read the metadata.yaml of a rosbag2 folder; BadBag if it cannot be parsed."""
     path = folder / NAME
     if path.stat().st_size > _MAX_BYTES:
         raise BadBag(f'{path}: {path.stat().st_size} bytes are too many for {NAME}')
@@ -52,7 +55,10 @@ def read_metadata(folder: Path) -> Metadata:
 
 
 def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
-    """Files of a recording in order, its metadata, and findings; BadBag where there are none."""
+    """Return the files of a recording in order, its metadata, and findings; BadBag without files.
+
+    `path` is a file or a rosbag2 folder; a folder with several recordings is refused.
+    """
     if not path.exists():
         raise BadBag(f'{path}: no such file or folder')
     if path.is_file():
@@ -84,7 +90,7 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
 
 
 def numbered(files: Sequence[str]) -> list[list[str]]:
-    """Return files grouped: those that differ only in _NUMBER are the parts of one recording."""
+    """Group files into recordings: names that differ only in _NUMBER are parts of one."""
     groups: dict[str, list[tuple[int, str]]] = {}
     for file in files:
         stem, _, number = posixpath.basename(file).partition('.')[0].rpartition('_')
@@ -96,7 +102,7 @@ def numbered(files: Sequence[str]) -> list[list[str]]:
 
 
 def runs_in(folder: Path) -> list[Path]:
-    """Return the recordings in a folder and those below: rosbag2 folders, and first files else."""
+    """Return the recordings in a folder and below: rosbag2 folders, else each one's first file."""
     found: list[Path] = []
     for place, folders, names in os.walk(folder):
         here = Path(place)
@@ -111,7 +117,7 @@ def runs_in(folder: Path) -> list[Path]:
 
 
 def _refuse_several(folder: Path) -> None:
-    """Raise BadBag where a folder is not one recording but holds some; say how to judge them."""
+    """Raise BadBag if a folder holds recordings but is not one; it says how to judge them."""
     runs = runs_in(folder)
     if not runs:
         return
@@ -133,11 +139,11 @@ def _refuse_several(folder: Path) -> None:
 def _listed(
     folder: Path, names: Sequence[str], present: Sequence[Path]
 ) -> tuple[list[Path], list[str]]:
-    """Return the files that metadata.yaml lists and findings; no files: read those present."""
+    """Return the files that metadata.yaml lists, and findings; no files means: use `present`."""
     files, findings, missing = [], [], []
     listed = {Path(name).name for name in names}
     for name in names:
-        # Old versions put the folder's own name in front; nothing outside the folder is a part.
+        # Old versions prefix the folder's name; files outside the folder are never read.
         file = folder / Path(name).name
         packed = folder / f'{file.name}{_PACKED}'
         other = file.with_suffix('') if file.suffix == _PACKED else packed

@@ -1,4 +1,4 @@
-"""Sorts columns into batches that follow each other in log time."""
+"""Sorts columns of overlapping chunks into batches that follow each other in log time."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ from ugv_acceptance.evaluation.samples import Batch
 
 
 class Sequencer:
-    """Holds back messages until nothing earlier can come.
+    """Holds messages back until no earlier one can come.
 
     Chunks overlap a little in time, since several topics are written as they arrive. Only the
     overlap is held, so memory does not grow with the recording.
@@ -21,10 +21,10 @@ class Sequencer:
         self.late = 0
 
     def push(self, columns: Iterable[Columns], until: int | None) -> Batch | None:
-        """Batch of all messages before `until`, a log time in ns before which none will follow.
+        """Add columns; return a batch of all messages logged before `until` (ns), None if none.
 
-        None says that nothing will follow at all. Messages that come in spite of an earlier
-        promise are dropped and counted in `late`. Returns None where there is no message.
+        `until` promises that no earlier message follows; None, that none follows at all. Messages
+        that break an earlier promise are dropped and counted in `late`.
         """
         ready, held = [], []
         for part in [*self._held, *self._on_time(columns)]:
@@ -47,7 +47,7 @@ class Sequencer:
 
 
 def _split(columns: Columns, until: int | None) -> tuple[list[Columns], list[Columns]]:
-    """The messages before `until` and the others, each in the order they had."""
+    """Split columns into messages logged before `until` (ns) and the others, order kept."""
     if until is None or not columns.log_time.size or columns.log_time.max() < until:
         return [columns], []
     before = columns.log_time < until

@@ -1,4 +1,4 @@
-"""Reads a recording message by message, serialised as it was logged, for replay."""
+"""Reads a recording message by message, still serialised, for replay and copying."""
 
 import heapq
 import os
@@ -25,7 +25,7 @@ _HEADER = 31  # bytes of a Message record before its content
 
 
 class Logged(NamedTuple):
-    """One message: log time (ns), topic, its content as CDR, publish time (ns), file's channel."""
+    """A serialised message: log time (ns), topic, CDR content, publish time (ns), channel id."""
 
     log_time: int
     topic: str
@@ -36,17 +36,17 @@ class Logged(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Offered:
-    """What a topic's publisher offered: reliable or best_effort; volatile or transient_local."""
+    """The QoS a topic's publisher offered: reliable/best_effort, volatile/transient_local."""
 
     reliability: str = 'reliable'
     durability: str = 'volatile'
 
 
 def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
-    """Yield the messages of `topics` in order of log time; ROS 1 messages are turned into CDR.
+    """Yield the messages of `topics` in order of log time; ROS 1 messages are converted to CDR.
 
-    What cannot be read is left out, as in `Bag.batches`, and message compression is undone; BadBag
-    where an SQLite or ROS 1 file breaks off.
+    Unreadable messages are left out, as in `Bag.batches`, and compressed ones decompressed. Raises
+    BadBag where an SQLite or ROS 1 file breaks off.
     """
     wanted = set(topics)
     streams = [messages_of(member, wanted) for member in bag.members]
@@ -67,7 +67,7 @@ def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:
 
 
 def _mcap(member: Member, wanted: set[str]) -> Iterator[Logged]:
-    """Chunks overlap in time: messages are held until no later chunk can bring an earlier one."""
+    """Yield an MCAP file's messages by log time, held back until no earlier one can come."""
     index: Any = member.index
     channels = {c.id: c.topic for c in index.channels.values() if c.topic in wanted}
     buffers, held = Buffers(), list[tuple[int, int, Logged]]()
@@ -129,15 +129,15 @@ def _foreign(member: Member, wanted: set[str]) -> Iterator[Logged]:
 
 
 def _cdr(store: Typestore, data: bytes, kind: str) -> bytes | None:
-    """A ROS 1 message as CDR; None where it is not what its type says."""
+    """Convert a ROS 1 message to CDR; None if it does not fit its type."""
     try:
         return bytes(store.ros1_to_cdr(data, kind))
-    except Exception:  # noqa: BLE001 (rosbags lets whatever garbled bytes cause through)
+    except Exception:  # noqa: BLE001 (rosbags raises anything for garbled bytes)
         return None
 
 
 def offered(bag: Bag) -> dict[str, Offered]:
-    """Return the recorded QoS of topics, from metadata.yaml of any version; absent: not known."""
+    """Return the recorded QoS by topic, from metadata.yaml; topics without it are missing."""
     found: dict[str, Offered] = {}
     for folder in {path.parent for path in bag.paths}:
         path = folder / NAME
@@ -157,12 +157,12 @@ def _profiles(text: str) -> dict[str, Offered]:
             if profiles:
                 found[str(metadata['name'])] = _offered(profiles[0])
     except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, RecursionError):
-        return found  # the reader has said what is wrong with it
+        return found  # the reader has reported what is wrong with it
     return found
 
 
 def _offered(profile: dict[str, Any]) -> Offered:
-    """Versions before 9 write the numbers of rmw, later ones their names."""
+    """Return the QoS of a profile; versions before 9 write the numbers of rmw, later ones names."""
     best_effort = str(profile.get('reliability')) in {'2', 'best_effort'}
     latched = str(profile.get('durability')) in {'1', 'transient_local'}
     return Offered(

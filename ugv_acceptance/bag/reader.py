@@ -1,4 +1,7 @@
-"""Opens a recording: files, topics, checksums, damage; its messages come as batches."""
+"""Opens a recording and finds its files, topics, checksums and damage.
+
+`Bag.batches` (reading.py) then reads its messages.
+"""
 
 import hashlib
 import tempfile
@@ -20,15 +23,15 @@ from ugv_acceptance.bag.metadata import Metadata, files_of
 from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
 
 _BLOCK = 1 << 20
-# A packed file may unpack to this many times its size, or to as much as a chunk may: no recording
-# packs better, and a bomb of a few kB must not fill the disk.
+# A compressed file may unpack to this many times its size, or to as much as a chunk may: no real
+# recording compresses better, and a decompression bomb of a few kB must not fill the disk.
 _MAX_RATIO = 200
 _MAGIC = {b'\x89MCAP0\r\n': 'mcap', b'SQLite f': 'sqlite3', b'#ROSBAG ': 'ros1'}
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic's ROS 2 type ('' where not said), number of messages, and their encoding."""
+    """A topic's ROS 2 type ('' if not known), number of messages, and their encoding."""
 
     type: str
     count: int
@@ -37,7 +40,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The topics to read; None is not read."""
+    """The names of the topics to read; None: that input is not read."""
 
     joint_states: str | None
     imu: str | None
@@ -48,10 +51,10 @@ class Topics:
 class Bag:
     """A recording: one or several files of one storage format, as found when it was opened.
 
-    Log times are ns; `protected` says whether all, part or none of its chunks carry a checksum;
-    `salvaged` is a sentence where a file breaks off, else None; `findings` are sentences about
-    what is odd. What only reading finds is in `Reading.facts`. `promised` are the messages a topic
-    that metadata.yaml tells of, as far as it does.
+    `start_ns` and `end_ns` are the first and last log time. `protected` says whether all, part or
+    none of its chunks have a checksum; `salvaged` is a sentence if a file breaks off, else None;
+    `findings` are sentences about what is odd. What only reading can find is in `Reading.facts`.
+    `promised` is the number of messages by topic according to metadata.yaml.
     """
 
     paths: tuple[Path, ...]
@@ -71,9 +74,9 @@ class Bag:
         return (self.end_ns - self.start_ns) * 1e-9
 
     def sha256(self) -> str:
-        """SHA-256 of the file; of several, that of their SHA-256 digests in the order of `paths`.
+        """Return the SHA-256 of the file; of several, that of their digests in order of `paths`.
 
-        metadata.yaml is not part of it: it says nothing that the files do not. Computed once.
+        metadata.yaml is not included, since it adds nothing to the files. Computed once.
         """
         if not self._hash:
             digests = [_sha256(path) for path in self.paths]
@@ -82,10 +85,10 @@ class Bag:
         return self._hash[0]
 
     def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
-        """The messages of `topics` as an iterator of batches that follow each other in log time.
+        """Read the messages of `topics` as an iterator of batches in order of log time.
 
         Memory is bounded by the size of a chunk. `workers` threads decompress and decode; by
-        default two where there is more than one core.
+        default two if there is more than one core.
         """
         chosen = ((JOINT_STATE, topics.joint_states), (IMU, topics.imu), (PAYLOAD, topics.payload))
         wanted = {name: kind for kind, name in chosen if name is not None}
@@ -99,7 +102,7 @@ def open_bag(
     """Open a recording: rosbag2 folders, MCAP (also .zstd), SQLite or ROS 1 files.
 
     Several paths are the parts of one recording. A chunk that claims to unpack to more than
-    `max_chunk_bytes` is not read. BadBag where there is nothing that can be read.
+    `max_chunk_bytes` is not read. Raises BadBag if nothing can be read.
     """
     given = [paths] if isinstance(paths, (str, Path)) else paths
     if not given:
@@ -160,7 +163,7 @@ def _member(path: Path, max_chunk_bytes: int) -> Member:
 
 
 def _unzstd(path: Path) -> 'tempfile._TemporaryFileWrapper[bytes]':
-    """The unpacked content in a temporary file, which lives as long as what is returned."""
+    """Decompress a file into a temporary one, which exists as long as the returned object."""
     local = tempfile.NamedTemporaryFile(prefix='bag-')  # noqa: SIM115 (the member keeps it)
     most = max(MAX_CHUNK_BYTES, _MAX_RATIO * path.stat().st_size)
     try:
@@ -188,7 +191,7 @@ def _salvaged(index: McapIndex | ForeignIndex) -> str | None:
 
 
 def _compared(metadata: Metadata, members: list[Member]) -> list[str]:
-    """Findings where metadata.yaml and the files disagree on numbers of messages."""
+    """Return findings where metadata.yaml and the files disagree on numbers of messages."""
     findings = []
     held, _ = _topics(members)
     said = metadata.counts or {}
@@ -203,7 +206,7 @@ def _compared(metadata: Metadata, members: list[Member]) -> list[str]:
 
 
 def _topics(members: Iterable[Member]) -> tuple[dict[str, Topic], list[str]]:
-    """Topics of all files, and a finding for each that has several types."""
+    """Return the topics of all files, and a finding for each topic with several types."""
     held: dict[str, dict[Channel, int]] = {}
     for member in members:
         for channel in member.index.channels.values():
@@ -240,10 +243,10 @@ def choose_topics(
     *,
     imu_required: bool = True,
 ) -> Topics:
-    """The topics to read: by configured name, else by type where exactly one topic has it.
+    """Choose the topics to read: by configured name, else by type if exactly one topic has it.
 
-    A leading slash in a name is not significant. BadBag lists what the bag holds where the choice
-    is not clear. Without `imu_required`, a bag that has no IMU topic gives None.
+    A leading slash in a name does not matter. Raises BadBag, which lists the topics, if the choice
+    is ambiguous. Without `imu_required` the IMU is None for a bag without an IMU topic.
     """
     joints = _choice(bag, JOINT_STATE, joint_states)
     if joints is None:

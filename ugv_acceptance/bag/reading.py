@@ -1,4 +1,4 @@
-"""Reads through a recording once: chunks decoded by a few threads, in order of log time."""
+"""Reads a recording once from start to end: a few threads decode chunks in order of log time."""
 
 import os
 from collections import deque
@@ -25,19 +25,23 @@ _MAX_FINDINGS = 200
 
 
 def normal_type(name: str) -> str:
-    """A type's ROS 2 name: sensor_msgs/Imu is sensor_msgs/msg/Imu."""
+    """Return the ROS 2 name of a type: sensor_msgs/Imu becomes sensor_msgs/msg/Imu."""
     parts = name.split('/')
     return f'{parts[0]}/msg/{parts[1]}' if len(parts) == 2 else name
 
 
 def wire_of(channel: Channel) -> Wire | None:
-    """How the channel's messages are packed, None where we cannot read that."""
+    """Return the encoding of a channel's messages: cdr or ros1, None if it is another."""
     return _WIRES.get(channel.encoding)
 
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One file of a recording: where it is, where its content is, its format and its index."""
+    """One file of a recording: its path, storage format and index.
+
+    `content` is the path of the uncompressed content, a temporary file (`keep` holds it) if `path`
+    is compressed.
+    """
 
     path: Path
     content: Path
@@ -51,19 +55,19 @@ class Member:
         return self.path.name
 
     def span(self) -> tuple[int, int] | None:
-        """First and last log time in ns, None of a file without messages."""
+        """Return the first and last log time in ns, None without messages."""
         if isinstance(self.index, ForeignIndex):
             return (self.index.first, self.index.last) if any(self.index.counts.values()) else None
-        # A chunk without messages, only schemas, says that it spans from 0 to 0.
+        # A chunk that holds only schemas gives its time span as 0 to 0.
         held = [p for p in self.index.pieces if p.last] or self.index.pieces
         return (min(p.first for p in held), max(p.last for p in held)) if held else None
 
     def findings(self) -> list[str]:
-        """What opening the file found."""
+        """Return the sentences about oddities that were found when the file was opened."""
         return self.index.findings if isinstance(self.index, McapIndex) else []
 
     def wanted(self, topics: dict[str, Kind[Any]]) -> Wanted:
-        """Decoders of the file's channels that carry these topics in a form we read."""
+        """Return decoders for the file's channels that hold these topics in a readable form."""
         found = {}
         for channel in self.index.channels.values():
             kind, wire = topics.get(channel.topic), wire_of(channel)
@@ -74,11 +78,11 @@ class Member:
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What a pass over a recording found.
+    """Counts and findings from reading a recording.
 
-    `counts` are messages read a topic; `malformed` those of them that could not be decoded, with
-    the reason of the first; `late` messages logged before what was already handed out, which are
-    dropped; `findings` sentences; `complete` whether the pass reached the end.
+    `counts` are messages read by topic; `malformed` those of them that could not be decoded, with
+    the reason of the first; `late` counts messages logged before the end of an earlier batch, which
+    are dropped; `findings` are sentences; `complete` says whether reading reached the end.
     """
 
     counts: dict[str, int] = field(default_factory=dict)
@@ -89,10 +93,10 @@ class Facts:
 
 
 class Reading(Iterator[Batch]):
-    """Batches of a recording in log time order; `facts` tells what was found so far.
+    """An iterator over the batches of a recording by log time; `facts` is what was found so far.
 
-    Within a batch a topic's messages are grouped by names (and by which arrays they carry), and
-    by stretches: each group is in file order, groups are in order of their first message.
+    Within a batch a topic's messages are grouped by chunk, by names, and by which arrays they hold:
+    each group is in file order, groups are in order of their first message.
     """
 
     def __init__(
@@ -115,12 +119,12 @@ class Reading(Iterator[Batch]):
         return next(self._stream)
 
     def close(self) -> None:
-        """End the pass early and give its threads and files back."""
+        """Stop reading early and release threads and files."""
         self._stream.close()
 
     @property
     def facts(self) -> Facts:
-        """What has been found so far; all of it once the batches are used up."""
+        """Counts and findings so far; complete once all batches have been taken."""
         total = self._total
         findings = list(dict.fromkeys(total.findings))
         if len(findings) > _MAX_FINDINGS:
@@ -182,7 +186,7 @@ class Reading(Iterator[Batch]):
         yield Piecework(), None
 
     def _mcap(self) -> Iterator[tuple[Piecework, int | None]]:
-        """Work on all pieces in order of their first log time, with the next piece's."""
+        """Yield each piece's decoded work by first log time, with that of the next piece (ns)."""
         with ExitStack() as stack:
             sources = []
             for member in self._members:
@@ -210,7 +214,7 @@ def _inline(jobs: list[_Job]) -> Iterator[Piecework]:
 
 
 def _threaded(jobs: list[_Job], workers: int) -> Iterator[Piecework]:
-    """Decode ahead by a few pieces; results come in the order of the jobs."""
+    """Decode a few pieces ahead in threads; yield results in the order of the jobs."""
     spare: SimpleQueue[Buffers] = SimpleQueue()
     for _ in range(workers):
         spare.put(Buffers())

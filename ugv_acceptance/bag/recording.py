@@ -1,4 +1,4 @@
-"""A recording opened by its path: what it holds, and its messages one by one."""
+"""The Python front door to recordings: `open_recording`, topics, and messages one by one."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,9 +23,9 @@ Message = JointStateSample | ImuSample | PayloadSample | BadSample
 
 
 class Sample(NamedTuple):
-    """One message of a recording: when it was logged (ns since the epoch), its topic, its content.
+    """One decoded message of a recording: log time (ns since the epoch), topic and content.
 
-    `message` is a BadSample, which says what is wrong, where the content cannot be decoded.
+    `message` is a BadSample, which says what is wrong, if the content cannot be decoded.
     """
 
     time_ns: int
@@ -37,8 +37,8 @@ class Sample(NamedTuple):
 class Recording:
     """An opened recording; iterating it yields the samples that an evaluation reads, in log order.
 
-    `names` are the topics looked for, of joint states, IMU and payload; where none has such a name,
-    the only topic of the type counts.
+    `names` are the topics of joint states, IMU and payload; if there is no topic of that name, the
+    only topic of the type is used.
 
     Examples
     --------
@@ -80,7 +80,7 @@ class Recording:
         return (*broken, *self.bag.findings)
 
     def chosen(self, *, imu_required: bool = True) -> Topics:
-        """Return the topics that are read. Raises BadBag where the choice is not clear."""
+        """Return the topics to read; BadBag if the choice is ambiguous."""
         return choose_topics(self.bag, *self.names, imu_required=imu_required)
 
     def __iter__(self) -> Iterator[Sample]:
@@ -113,7 +113,7 @@ def open_recording(path: Paths, *, names: tuple[str, str, str] | None = None) ->
     Raises
     ------
     BadBag
-        Where there is nothing that can be read; the message says which file and why.
+        If nothing can be read; the message says which file and why.
 
     Examples
     --------

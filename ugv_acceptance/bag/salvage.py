@@ -35,14 +35,16 @@ _GAP = 1 << 14  # between chunks there is little more than message indexes
 
 
 def scan(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> McapIndex:
-    """Index of a file read from its start to its end, or to the first record that is broken.
+    """Make the index of an MCAP file by reading it from its start, up to the first broken record.
 
-    `salvaged` says where and how the file breaks; what lies before is in the index.
+    The index's `salvaged` says where and how the file breaks off; what lies before is in the index.
     """
     return _Scan(file, max_chunk_bytes).run()
 
 
 class _Scan:
+    """One scan of a file, which builds its index record by record."""
+
     def __init__(self, file: BinaryIO, max_chunk_bytes: int) -> None:
         self.file = file
         self.max_chunk_bytes = max_chunk_bytes
@@ -71,7 +73,7 @@ class _Scan:
         return self.index
 
     def _chunk(self, pos: int, head: bytes) -> int | None:
-        """Take a chunk in; the position behind it, None where the file breaks in it."""
+        """Add a chunk to the index; return the position after it, None if the file ends in it."""
         at = f'chunk at byte {pos}'
         self.block = _GAP
         try:
@@ -107,7 +109,7 @@ class _Scan:
         return after
 
     def _bare(self, pos: int, head: bytes) -> int | None:
-        """Take records outside chunks in, a block at a time."""
+        """Add a block of records outside chunks; return the position after them, None if broken."""
         size = self.block
         self.block = _BLOCK
         if len(head) >= 9:
@@ -128,7 +130,7 @@ class _Scan:
         return pos + walked.stop if walked.stop else None
 
     def _end(self, pos: int, data: Bytes, walked: Walked) -> None:
-        """Note the end of the data section and check its checksum, if it has one."""
+        """Detect the end of the data section and verify its checksum, if it has one."""
         for opcode, at, size in walked.others:
             if opcode == DATA_END and size >= 4:
                 crc = int.from_bytes(data[at : at + 4].tobytes(), 'little')
@@ -147,7 +149,7 @@ class _Scan:
         return crc
 
     def _take(self, data: Bytes, walked: Walked) -> tuple[int, int]:
-        """Note channels and counts; first and last log time."""
+        """Add channels and counts to the index; return the first and last log time (ns)."""
         define(self.index, self.schemas, definitions(data.data, walked))
         for channel, offsets in walked.messages.items():
             self.index.counts[channel] = self.index.counts.get(channel, 0) + len(offsets)

@@ -1,4 +1,4 @@
-"""Writes a rosbag2 folder: an MCAP with checksums, and metadata.yaml when it is closed."""
+"""Writes a rosbag2 folder: an MCAP file with checksums, and metadata.yaml when it is closed."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -21,7 +21,7 @@ _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """What a publisher offered: what decides whether a subscriber matches."""
+    """The QoS that a publisher offered, as far as it decides whether a subscriber matches."""
 
     reliability: Literal['reliable', 'best_effort'] = 'reliable'
     durability: Literal['volatile', 'transient_local'] = 'volatile'
@@ -38,9 +38,9 @@ class _Topic:
 class BagWriter:
     """Records a rosbag2 folder; a context manager that closes it, also after an error.
 
-    No more than `flush_s` seconds of log time (or 1 MiB) are held back, so that is what a killed
+    At most `flush_s` seconds of log time (or `chunk_bytes`) are held back, which is what a killed
     process loses; `flush` writes what is held at once, for a caller with a clock. The folder must
-    not exist or be empty, else BadBag.
+    be new or empty, else BadBag.
     """
 
     def __init__(
@@ -104,11 +104,11 @@ class BagWriter:
         self._mcap.message(known.channel, log_time_ns, cdr)
 
     def flush(self) -> None:
-        """Hand what is held back to the operating system."""
+        """Write the messages held back, and flush them to the operating system."""
         self._mcap.end_chunk()
 
     def close(self) -> None:
-        """Finish the file and write metadata.yaml, whole or not at all; more calls do nothing."""
+        """Finish the file and write metadata.yaml; further calls do nothing."""
         if self._file.closed:
             return
         try:
@@ -174,7 +174,7 @@ def _typestore() -> Typestore:
 
 @cache
 def definition_of(type_: str) -> tuple[str, str]:
-    """Text of a type's definition and its hash; BadBag of a type Jazzy does not have."""
+    """Return the text and the hash of a type's definition; BadBag if Jazzy does not have it."""
     try:
         text, _ = _typestore().generate_msgdef(type_, ros_version=2)
         return text, _typestore().hash_rihs01(type_)
