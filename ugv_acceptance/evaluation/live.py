@@ -71,7 +71,7 @@ class LiveEvaluator:
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
 
     def start(self, now: int) -> None:
-        """Begin to listen at `now` (ns), from when on a silent input counts as silent."""
+        """Begin to listen at `now` (ns): an input of which no message comes will become stale."""
         for fresh in self._fresh:
             fresh.started = now
         self._began = now

@@ -92,7 +92,7 @@ class RecordedEvaluator:
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     def start(self, now: int) -> None:
-        """Begin at the recording's start, `now` (ns), from when on a silent input is silent."""
+        """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
         for fresh in self.fresh:
             fresh.started = now
         self.watch.relax(now)

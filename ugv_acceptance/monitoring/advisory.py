@@ -21,7 +21,7 @@ from ugv_acceptance.monitoring.trends import Ahead, Trends
 FRESH = 250_000_000
 # Consecutive estimates (one a second) of another payload before it is reported.
 PERSISTENT = 3
-# Time to a limit (s) below which the operator is told at once; time (ns) until the next telling.
+# Time to a limit (s) below which the operator is warned at once; time (ns) between such warnings.
 URGENT, AGAIN = 2.0, 1_000_000_000
 
 

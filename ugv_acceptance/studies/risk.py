@@ -137,7 +137,7 @@ def _triples(values: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _tipped(robot: Robot, posture: Posture, gravity: Columns, count: int) -> NDArray[np.bool_]:
-    """Return which samples (count,) tip over: no positive moment holds them, or there is none."""
+    """Return which samples (count,) tip: no positive moment holds them, or no margin exists."""
     tipped = np.ones(count, dtype=np.bool_)
     for rows, stance in stances_of(mechanics_of(robot), posture, count):
         gx, gy, gz = (g[rows] for g in gravity)
