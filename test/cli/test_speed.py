@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.speed import speed
 from ugv_acceptance.config import load
-from ugv_acceptance.studies.postures import joint_range, random_postures, sweeps
+from ugv_acceptance.studies.postures import random_postures, sweeps
 from ugv_acceptance.studies.validity import critical_value
 
 app = typer.Typer()
@@ -64,7 +64,7 @@ def test_wrong_options_are_named(arguments: tuple[str, ...], words: str) -> None
 def test_postures_stay_in_range() -> None:
     """Random postures and sweeps keep each joint's range; a sweep moves one joint."""
     robot = load().settings.robot
-    ranges = np.array([joint_range(robot, name) for name in robot.joint_names])
+    ranges = np.array([robot.joint(name).travel() for name in robot.joint_names])
     postures = random_postures(robot, 500, seed=1)
     assert (postures >= ranges[:, 0]).all()
     assert (postures <= ranges[:, 1]).all()

@@ -67,7 +67,7 @@ def _axis(
         known = ', '.join(robot.joint_names)
         raise BadConfig(f'{option}: expected a measured joint ({known}), got {name}')
     joint = robot.joint(name)
-    slides = joint.kind == 'prismatic'
+    slides = joint.slides
     low, high = default
     if slides or not span:
         low, high = max(joint.lower, low), min(joint.upper, high)
@@ -93,7 +93,7 @@ def _limits(robot: Robot, limits: Limits, text: str) -> Limits:
         if name not in torque or not equals:
             known = ', '.join(torque)
             raise BadConfig(f'--limit: expected JOINT=TORQUE with one of {known}, got {part}')
-        kind = 'force' if robot.joint(name).kind == 'prismatic' else 'torque'
+        kind = 'force' if robot.joint(name).slides else 'torque'
         torque[name] = quantity(value, kind, f'--limit: {name}')
         if torque[name] <= 0.0:
             raise BadConfig(f'--limit: {name}: expected a torque > 0 N m, got {torque[name]:g}')

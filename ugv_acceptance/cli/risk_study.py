@@ -14,7 +14,6 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import quantity
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.studies.postures import joint_range
 from ugv_acceptance.studies.risk import EVENTS, Risk, Study, estimate
 from ugv_acceptance.studies.risk_kernel import known_names
 from ugv_acceptance.studies.spread import NORMAL, Spread, normal, together, uniform
@@ -102,7 +101,7 @@ def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: 
         if math.isfinite(limit):
             spreads[f'{joint}.rate'] = normal(0.0, RATE)
         if not posture and not _moves_contact(robot, joint):
-            spreads[f'{joint}.position'] = uniform(*joint_range(robot, joint))
+            spreads[f'{joint}.position'] = uniform(*robot.joint(joint).travel())
     for text in vary:
         key, spread = spread_from(robot, text)
         spreads[key] = spread
@@ -176,7 +175,7 @@ def _kind(robot: Robot, key: str) -> str:
     owner, _, part = key.rpartition('.')
     if key in {'slope', 'heading'}:
         return 'angle'
-    slides = owner in robot.joint_names and robot.joint(owner).kind == 'prismatic'
+    slides = owner in robot.joint_names and robot.joint(owner).slides
     turning = {'position': 'angle', 'rate': 'angular rate', 'limit': 'torque'}
     sliding = {'position': 'length', 'rate': 'rate', 'limit': 'force'}
     fixed = {'mass': 'mass', 'x': 'length', 'y': 'length', 'z': 'length'}

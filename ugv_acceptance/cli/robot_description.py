@@ -77,7 +77,7 @@ def posture_from(robot: Robot, text: str) -> list[float]:
         if name not in q:
             known = ', '.join(q) or 'none'
             raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}')
-        kind = 'length' if robot.joint(name).kind == 'prismatic' else 'angle'
+        kind = 'length' if robot.joint(name).slides else 'angle'
         q[name] = quantity(value, kind, f'--posture {name}={value}')
     return list(q.values())
 
@@ -152,14 +152,13 @@ def _joints(config: Config, q: list[float], torque: tuple[Any, ...]) -> list[Val
 
 
 def _joint(joint: Joint, position: float) -> Values:
-    slides = joint.kind == 'prismatic'
     return {
         'name': joint.name,
         'kind': joint.kind,
         'parent': joint.parent,
         'child': joint.child,
-        'unit': 'm' if slides else 'rad',
-        'torque_unit': 'N' if slides else 'N m',
+        'unit': joint.units.position,
+        'torque_unit': joint.units.effort,
         'lower': _finite(joint.lower),
         'upper': _finite(joint.upper),
         'position': position,

@@ -86,5 +86,5 @@ def _speed(robot: 'Robot', name: str, limit: float) -> str:
 
     if not math.isfinite(limit):
         return '     any'
-    slides = robot.joint(name).kind == 'prismatic'
+    slides = robot.joint(name).slides
     return f'{limit:8.3f} m/s' if slides else f'{math.degrees(limit):8.1f} deg/s'

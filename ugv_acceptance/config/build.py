@@ -191,7 +191,7 @@ def _of_joint(
     build: Build, path: Path, joint: Joint, given: Given, turning: str, sliding: str
 ) -> float:
     """Return a number of a joint in SI; BadConfig for metres of a rotary joint and the like."""
-    kind = sliding if joint.kind == 'prismatic' else turning
+    kind = sliding if joint.slides else turning
     if given.kind not in (None, kind):
         raise build.refuse(
             path, f'expected {EXAMPLES[kind]} for a {joint.kind} joint, got a {given.kind}'

@@ -222,7 +222,7 @@ def _limit_of(reading: _Reading, side: str, given: Given, signal: str, of: str) 
     kinds = SIGNALS[signal].kinds
     kind = kinds[0]
     if len(kinds) > 1 and of != ANY:
-        kind = kinds[1] if reading.settings.robot.joint(of).kind == 'prismatic' else kinds[0]
+        kind = kinds[1] if reading.settings.robot.joint(of).slides else kinds[0]
     if given.kind not in (None, kind):
         example = EXAMPLES.get(kind, 'a bare number')
         raise reading.refuse(side, f'expected {example} for {signal}, got a unit of {given.kind}')
@@ -268,7 +268,7 @@ def _map(reading: _Reading, section: CriterionSection) -> Demand:
     if section.at_least is None:
         raise reading.refuse('', 'expected at_least, the share of the cells to visit')
     _check_shares(reading, section)
-    if len({joint.kind == 'prismatic' for joint in joints}) > 1 or section.cell is None:
+    if len({joint.slides for joint in joints}) > 1 or section.cell is None:
         raise reading.refuse('cell', 'expected one cell size, for two joints of one kind')
     x, y = (_range(reading, joint) for joint in joints)
     cell = section.cell
@@ -276,12 +276,9 @@ def _map(reading: _Reading, section: CriterionSection) -> Demand:
 
 
 def _range(reading: _Reading, joint: Joint) -> tuple[float, float]:
-    turn = (-math.pi, math.pi)
-    if joint.kind != 'prismatic' and not math.isfinite(joint.lower + joint.upper):
-        return turn
-    if not math.isfinite(joint.lower + joint.upper):
+    if joint.slides and not math.isfinite(joint.lower + joint.upper):
         raise reading.refuse('map', f'expected a joint with limits in the URDF, got {joint.name}')
-    return joint.lower, joint.upper
+    return joint.travel()
 
 
 _READERS: dict[str, Callable[[_Reading, CriterionSection], Demand]] = {

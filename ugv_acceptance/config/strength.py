@@ -36,13 +36,11 @@ def worst_torques(robot: Robot, payload: Payload) -> tuple[Worst, ...]:
     torque = np.abs(static_torque(robot, q, (0.0, 0.0, -robot.gravity), payload))
     rows = torque.argmax(axis=0)
     return tuple(
-        Worst(name, float(torque[row, j]), _unit(robot, name), tuple(map(float, q[row])))
+        Worst(
+            name, float(torque[row, j]), robot.joint(name).units.effort, tuple(map(float, q[row]))
+        )
         for j, (name, row) in enumerate(zip(robot.joint_names, rows, strict=True))
     )
-
-
-def _unit(robot: Robot, name: str) -> str:
-    return 'N' if robot.joint(name).kind == 'prismatic' else 'N m'
 
 
 def postures(robot: Robot) -> NDArray[np.float64]:
@@ -51,10 +49,8 @@ def postures(robot: Robot) -> NDArray[np.float64]:
     columns = []
     for name in robot.joint_names:
         joint = robot.joint(name)
-        full = (0.0, 0.0) if joint.kind == 'prismatic' else (-math.pi, math.pi)
-        lower = joint.lower if math.isfinite(joint.lower) else full[0]
-        upper = joint.upper if math.isfinite(joint.upper) else full[1]
-        right = [k * math.pi / 2 for k in range(-2, 3)] if joint.kind != 'prismatic' else [0.0]
+        lower, upper = joint.travel()
+        right = [0.0] if joint.slides else [k * math.pi / 2 for k in range(-2, 3)]
         corners = [x for x in (*right, lower, upper) if lower <= x <= upper]
         columns.append(
             np.concatenate(

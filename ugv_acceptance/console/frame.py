@@ -42,7 +42,7 @@ def describe_robot(settings: Settings) -> Plain:
             {
                 'name': name,
                 'kind': robot.joint(name).kind,
-                'unit': 'N' if robot.joint(name).kind == 'prismatic' else 'N m',
+                'unit': robot.joint(name).units.effort,
                 'limit': number(limit),
             }
             for name, limit in zip(robot.joint_names, limits.torque, strict=True)

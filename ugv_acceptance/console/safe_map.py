@@ -11,7 +11,6 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.console.frame import Plain, number
 from ugv_acceptance.console.snapshot import Snapshot
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import SIDES, stability
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.studies.bilinear import Grid, grid_of
@@ -29,6 +28,8 @@ SAFE_CELL, CAUTION_CELL, TORQUE_CELL, TIP_CELL, BOTH_CELL = range(5)
 CELLS = 73
 # Changes smaller than this (rad, m; m/s2; kg) do not make a new map.
 _STEP = 0.01
+# How far (m) a joint that slides without limits is shown to each side.
+_SLIDE = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,16 +120,9 @@ def probe(
 
 
 def _grid(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Grid:
-    ranges = [_range(settings.robot, name) for name in axes]
+    ranges = [settings.robot.joint(name).travel(_SLIDE) for name in axes]
     q = np.nan_to_num(np.array(snapshot.q))
     return grid_of(settings.robot, axes, ranges, (CELLS, CELLS), q)
-
-
-def _range(robot: Robot, name: str) -> tuple[float, float]:
-    joint = robot.joint(name)
-    if math.isfinite(joint.lower) and math.isfinite(joint.upper):
-        return joint.lower, joint.upper
-    return (-1.0, 1.0) if joint.kind == 'prismatic' else (-math.pi, math.pi)
 
 
 def _cells(snapshot: Snapshot, settings: Settings, grid: Grid) -> NDArray[np.uint8]:

@@ -132,7 +132,7 @@ class Breach:
 def torque_name(settings: Settings, j: int) -> str:
     """Return the parameter name of joint number j's limit, such as joints.elbow.limit_nm."""
     joint = settings.robot.joint_names[j]
-    unit = 'n' if settings.robot.joint(joint).kind == 'prismatic' else 'nm'
+    unit = 'n' if settings.robot.joint(joint).slides else 'nm'
     return f'joints.{joint}.limit_{unit}'
 
 

@@ -249,7 +249,7 @@ def _torque_result(summary: Summary, j: int, start: int) -> dict[str, Any]:
     seen = np.isfinite(worst.value)
     return {
         'limit': limit,
-        'unit': 'N' if summary.settings.robot.joint(name).kind == 'prismatic' else 'N m',
+        'unit': summary.settings.robot.joint(name).units.effort,
         'max_abs': worst.value if seen else None,
         'min_margin': limit - worst.value if seen else None,
         'time_of_min_s': (worst.time - start) / 1e9 if seen else None,

@@ -1,5 +1,6 @@
 """A robot as data: links, joints and contact points of a URDF tree, and what it carries."""
 
+import math
 from dataclasses import dataclass
 
 Vector = tuple[float, float, float]
@@ -21,6 +22,18 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class JointUnits:
+    """The units of a joint's numbers, as people write them."""
+
+    position: str
+    rate: str
+    effort: str
+
+
+TURNING, SLIDING = JointUnits('rad', 'rad/s', 'N m'), JointUnits('m', 'm/s', 'N')
+
+
+@dataclass(frozen=True, slots=True)
 class Joint:
     """A URDF joint: `xyz` (m) and `rotation` place it in the parent link, `axis` is a unit vector.
 
@@ -39,6 +52,26 @@ class Joint:
     upper: float = float('inf')
     effort: float = float('inf')
     velocity: float = float('inf')
+
+    @property
+    def slides(self) -> bool:
+        """Whether it moves along its axis: its numbers are then of lengths and forces."""
+        return self.kind == 'prismatic'
+
+    @property
+    def units(self) -> JointUnits:
+        """The units of its position, rate and effort."""
+        return SLIDING if self.slides else TURNING
+
+    def travel(self, half_slide: float = 0.0) -> tuple[float, float]:
+        """Return the first and last position of its travel (rad, m): its limits.
+
+        Where it has none it is one turn, half a turn to each side; `half_slide` (m) if it slides.
+        """
+        half = half_slide if self.slides else math.pi
+        low = self.lower if math.isfinite(self.lower) else 0.0 - half
+        high = self.upper if math.isfinite(self.upper) else half
+        return low, high
 
 
 @dataclass(frozen=True, slots=True)

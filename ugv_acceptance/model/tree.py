@@ -99,9 +99,7 @@ def tree_of(robot: Robot) -> Tree:
     for k, (joint, parent) in enumerate(moving):
         at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
         axis = _plain(rotate(frames[joint.child].rotation, joint.axis))
-        bodies.append(
-            Body(joint.name, parent.body, joint.kind == 'prismatic', axis, at, *_lump(members[k]))
-        )
+        bodies.append(Body(joint.name, parent.body, joint.slides, axis, at, *_lump(members[k])))
     return Tree(tuple(bodies), {n: (f.body, f.rotation, f.xyz) for n, f in frames.items()})
 
 
@@ -143,7 +141,7 @@ def _child_frame(
         moving.append((joint, parent))
         return _Frame(number, turned, ZERO)
     at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
-    if joint.kind == 'prismatic':
+    if joint.slides:
         at = _plain(add(at, scale(rotate(turned, joint.axis), held)))
     elif joint.kind != 'fixed':
         turned = _plain_matrix(matmul(turned, rotation_about(joint.axis, held)))

@@ -133,7 +133,7 @@ def joint_columns(robot: Robot, what: str, units: tuple[str, str]) -> list[str]:
     """Return a column name for each joint; `units` are for rotary and for prismatic joints."""
     turns, slides = units
     return [
-        f'{name}_{what}_{slides if robot.joint(name).kind == "prismatic" else turns}'
+        f'{name}_{what}_{slides if robot.joint(name).slides else turns}'
         for name in robot.joint_names
     ]
 

@@ -30,7 +30,7 @@ _LINES = {'payload': (1.0, 2.0, 3.0, 6.0, 8.0, 12.0), 'drag': (25.0, 100.0, 150.
 
 
 def _turns(robot: Robot, joint: int) -> bool:
-    return robot.joint(robot.joint_names[joint]).kind != 'prismatic'
+    return not robot.joint(robot.joint_names[joint]).slides
 
 
 def shown(robot: Robot, joint: int, values: Floats) -> Floats:

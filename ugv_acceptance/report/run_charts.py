@@ -183,7 +183,7 @@ def _moving_pair(strips: Strips, settings: Settings) -> list[int] | None:
     turning = [
         j
         for j in judged_joints(settings)
-        if settings.robot.joint(settings.robot.joint_names[j]).kind != 'prismatic'
+        if not settings.robot.joint(settings.robot.joint_names[j]).slides
     ]
     known = strips.q[np.isfinite(strips.q).all(axis=1)]
     if len(turning) < 2 or len(known) < 2:
@@ -213,17 +213,12 @@ def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
 
 def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
     q = np.array([x['position'] for x in moment['joints'].values()])
-    turning = [
-        settings.robot.joint(name).kind != 'prismatic' for name in settings.robot.joint_names
-    ]
+    turning = [not settings.robot.joint(name).slides for name in settings.robot.joint_names]
     q = np.where(turning, np.radians(q), q)
     x, y = (np.linspace(*_range(settings, j), CELLS) for j in pair)
     return Grid(pair[0], pair[1], x, y, q)
 
 
 def _range(settings: Settings, joint: int) -> tuple[float, float]:
-    limits = settings.robot.joint(settings.robot.joint_names[joint])
-    low, high = limits.lower, limits.upper
-    if not math.isfinite(low + high) or high - low > 2.0 * math.pi:
-        return -math.pi, math.pi
-    return low, high
+    low, high = settings.robot.joint(settings.robot.joint_names[joint]).travel()
+    return (low, high) if high - low <= 2.0 * math.pi else (-math.pi, math.pi)

@@ -124,7 +124,7 @@ def _sample(vehicle: Vehicle, data: mujoco.MjData) -> tuple[Floats, ...]:
         joint = robot.joint(name)
         turn = base.T @ data.site(f'joint:{name}').xmat.reshape(3, 3)
         force, torque = (data.sensor(f'{kind}:{name}').data for kind in ('force', 'torque'))
-        efforts.append((force if joint.kind == 'prismatic' else torque) @ np.array(joint.axis))
+        efforts.append((force if joint.slides else torque) @ np.array(joint.axis))
         forces.append(turn @ force)
         torques.append(turn @ torque)
     return (

@@ -173,7 +173,7 @@ def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> E
     held = 0.0 if moving else dict(robot.held).get(joint.name, 0.0)
     rotation, shift = np.array(joint.rotation), np.array(joint.xyz)
     axis = np.array(joint.axis)
-    if joint.kind == 'prismatic':
+    if joint.slides:
         shift = shift + rotation @ axis * held
     elif joint.kind != 'fixed':
         rotation = rotation @ _rotation(axis, held)
@@ -183,7 +183,7 @@ def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> E
     )
     ET.SubElement(body, 'site', name=f'joint:{joint.name}')
     if moving:
-        kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
+        kind = 'slide' if joint.slides else 'hinge'
         ET.SubElement(
             body,
             'joint',

@@ -67,7 +67,7 @@ def _basis(values: Floats, *, prismatic: bool) -> Floats:
 
 
 def _prismatic(robot: Robot, joint: int) -> bool:
-    return robot.joint(robot.joint_names[joint]).kind == 'prismatic'
+    return robot.joint(robot.joint_names[joint]).slides
 
 
 # Three positions of each joint determine a form; the pseudo-inverse leaves out the third column,

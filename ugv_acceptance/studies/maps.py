@@ -140,9 +140,9 @@ def _within(
 
 
 def _equal_steps(robot: Robot, grid: Grid) -> bool:
-    kinds = {robot.joint(robot.joint_names[k]).kind for k in (grid.first, grid.second)}
+    slides = [robot.joint(robot.joint_names[k]).slides for k in (grid.first, grid.second)]
     steps = np.concatenate([np.diff(grid.x), np.diff(grid.y)])
-    return 'prismatic' not in kinds and bool(np.ptp(steps) < 1e-12)
+    return not any(slides) and bool(np.ptp(steps) < 1e-12)
 
 
 def _by_rows(count: int, workers: int, run: Callable[[slice], None]) -> None:

@@ -38,7 +38,7 @@ def torque_waves(
 
     Raises BadConfig if the joint is prismatic: its torques are not sinusoidal.
     """
-    if robot.joint(joint).kind == 'prismatic':
+    if robot.joint(joint).slides:
         raise BadConfig(f'joint {joint}: expected a turning joint, it slides')
     nodes = np.array([0.0, TURN / 3.0, -TURN / 3.0])
     postures = np.tile(np.asarray(q, dtype=np.float64), (3, 1))

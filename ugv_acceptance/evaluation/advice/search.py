@@ -29,7 +29,7 @@ def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
     """Return how to move a joint along a path up to a step, such as "raise the elbow by 20 deg"."""
     joint, amount = robot.joint(path.subject), float(path.amount[step])
     name = path.subject.removesuffix('_joint').replace('_', ' ')
-    if joint.kind == 'prismatic':
+    if joint.slides:
         return f'{"extend" if amount > 0.0 else "retract"} the {name} by {abs(amount) * 100:.0f} cm'
     by = f'by {abs(math.degrees(amount)):.0f} deg'
     if abs(joint.axis[2]) > 0.9:
@@ -332,5 +332,5 @@ def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
 def _gain_words(case: _Case, gain: float) -> str:
     if case.tips:
         return f'{math.degrees(gain):.0f} deg further from tipping to the {case.subject}'
-    unit = 'N' if case.settings.robot.joint(case.subject).kind == 'prismatic' else 'N m'
+    unit = case.settings.robot.joint(case.subject).units.effort
     return f'{gain:.0f} {unit} less on the {case.subject.removesuffix("_joint")}'

@@ -6,6 +6,7 @@ from enum import Enum
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import TURNING
 
 
 class FailureSource(Enum):
@@ -153,7 +154,8 @@ def describe(alert: Alert, settings: Settings) -> str:
     rule = alert.rule
     peak, limit = alert.peak, rule.on
     robot = settings.robot
-    slides = rule.subject in robot.joint_names and robot.joint(rule.subject).kind == 'prismatic'
+    known = rule.subject in robot.joint_names
+    units = robot.joint(rule.subject).units if known else TURNING
     if rule.code == 'TORQUE_LIMIT':
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
@@ -162,8 +164,8 @@ def describe(alert: Alert, settings: Settings) -> str:
         subject=rule.subject,
         peak=peak,
         limit=limit,
-        unit='N' if slides else 'N m',
-        rate='m/s' if slides else 'rad/s',
+        unit=units.effort,
+        rate=units.rate,
         tilt=tilt_left(peak),
         degrees=math.degrees(alert.peak),
         slope=max(math.degrees(-alert.peak), 0.0),

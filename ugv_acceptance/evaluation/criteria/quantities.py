@@ -8,6 +8,7 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.criteria import ANY
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import SLIDING
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.type_aliases import Floats, Json
 
@@ -101,14 +102,10 @@ def subjects_of(kind: SignalKind, settings: Settings) -> tuple[str, ...]:
 def shown(signal: str, subject: str, settings: Settings) -> tuple[float, str]:
     """Return the factor from SI and the unit in which people see a signal of this subject."""
     kind = SIGNALS[signal]
-    sliding = (
-        kind.subjects == 'joints'
-        and subject != ANY
-        and settings.robot.joint(subject).kind == 'prismatic'
-    )
-    if not sliding:
+    of_joint = kind.subjects == 'joints' and subject != ANY
+    if not of_joint or not settings.robot.joint(subject).slides:
         return kind.scale, kind.unit
-    units = {'N m': 'N', 'deg': 'm', 'deg/s': 'm/s'}
+    units = {'N m': SLIDING.effort, 'deg': SLIDING.position, 'deg/s': SLIDING.rate}
     return 1.0, units.get(kind.unit, kind.unit)
 
 

@@ -139,7 +139,7 @@ class EffortComparison:
                     'measured': p.measured,
                     'model': p.model,
                     'difference': p.measured - p.model,
-                    'unit': 'N' if self.settings.robot.joint(name).kind == 'prismatic' else 'N m',
+                    'unit': self.settings.robot.joint(name).units.effort,
                     'effort_per_kg': p.slope,
                     'payload_kg_that_explains_it': p.payload,
                     'saturated': p.saturated,

@@ -146,7 +146,7 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
             do = f'check joints.{name}.sign and offset'
             # A continuous joint has no limits: its angle does not show a wrong unit.
             in_degrees = how.sign * math.radians(told) + how.offset
-            if joint.kind != 'prismatic' and _within(joint, in_degrees):
+            if not joint.slides and _within(joint, in_degrees):
                 do += '; are degrees sent in place of radians?'
             yield Finding(FAIL, name, text, do)
 

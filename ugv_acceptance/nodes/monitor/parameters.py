@@ -138,8 +138,8 @@ def _torque_knob(settings: Settings, j: int) -> TunableParameter:
         return replace(current, limits=replace(current.limits, torque=tuple(limits)))
 
     name = torque_name(settings, j)
-    unit = 'N' if name.endswith('_n') else 'N m'
-    what = f'limit, {unit}; 0: not known, so not judged'
+    joint = settings.robot.joint(settings.robot.joint_names[j])
+    what = f'limit, {joint.units.effort}; 0: not known, so not judged'
     return TunableParameter(name, what, get, put, 0.0, 1e9)
 
 
