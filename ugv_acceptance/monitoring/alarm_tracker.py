@@ -1,5 +1,6 @@
 """Follows the log of alerts and turns it into alarms and their changes."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Alarms, Change, State, key_of
@@ -8,6 +9,33 @@ from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 
 # Number of cleared alerts that are kept.
 KEPT = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An alert that `begins`, or ends, at `time` (ns)."""
+
+    time: int
+    begins: bool
+    alert: Alert
+
+
+def events_of(raised: Iterable[Alert], known: Iterable[Alert]) -> list[Event]:
+    """Return the beginnings of `raised` and the ends of all `known` that are over, by time.
+
+    Of the same moment an end comes before a beginning, but no alert's end before its own.
+    """
+    events = [Event(alert.start, begins=True, alert=alert) for alert in raised]
+    events += [
+        Event(alert.end, begins=False, alert=alert) for alert in known if alert.end is not None
+    ]
+    return sorted(events, key=_place)
+
+
+def _place(event: Event) -> tuple[int, int]:
+    if event.begins:
+        return event.time, 1
+    return event.time, 0 if event.time > event.alert.start else 2
 
 
 @dataclass(slots=True)
@@ -32,17 +60,10 @@ class AlarmTracker:
     def take(self) -> list[Change]:
         """Return the alarm changes since the last call, in order of time."""
         fresh = self.log[self._seen :]
-        # At equal times ends come before beginnings, except the end of an alert just begun.
-        events = [(alert.start, 1, alert) for alert in fresh]
-        events += [
-            (alert.end, 0 if alert.end > alert.start else 2, alert)
-            for alert in [*self.open, *fresh]
-            if alert.end is not None
-        ]
         found: list[Change] = []
-        for now, which, alert in sorted(events, key=lambda event: event[:2]):
-            take = self.alarms.raised if which == 1 else self.alarms.cleared
-            found += take(now, alert)
+        for event in events_of(fresh, [*self.open, *fresh]):
+            take = self.alarms.raised if event.begins else self.alarms.cleared
+            found += take(event.time, event.alert)
         self.open = [alert for alert in [*self.open, *fresh] if alert.end is None]
         self._prune()
         return found

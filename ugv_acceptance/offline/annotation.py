@@ -19,6 +19,7 @@ from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.stability import SIDES, Stability
+from ugv_acceptance.monitoring.alarm_tracker import Event, events_of
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
 from ugv_acceptance.monitoring.drawing import (
     FRAME,
@@ -67,7 +68,7 @@ class Annotation:
     _session: ReplayedSession = field(init=False)
     _figure: Figure = field(init=False)
     _bytes: tuple[JointStateBytes, JointStateBytes] = field(init=False)
-    _events: list[tuple[int, int, Alert]] = field(init=False)
+    _events: list[Event] = field(init=False)
     _open: dict[int, Alert] = field(default_factory=dict)
     _due: list[int] = field(init=False)
     _until: int = 0
@@ -82,10 +83,8 @@ class Annotation:
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
-        # At equal times ends come before beginnings, except the end of an alert just begun.
-        events = [(a.start, 1, a) for a in log]
-        events += [(a.end, 0 if a.end > a.start else 2, a) for a in log if a.end is not None]
-        self._events = sorted(events, key=lambda event: event[:2], reverse=True)
+        # The next is the last of the list; of alike ones the last of the log.
+        self._events = events_of(log[::-1], log[::-1])[::-1]
         self._due = [self.bag.start_ns, self.bag.start_ns]
 
     @property
@@ -143,7 +142,7 @@ class Annotation:
         """Yield the alerts, verdicts and drawings due before `end` (ns), at their margins."""
         while True:
             verdict, drawing = self._due
-            event = self._events[-1][0] if self._events else end
+            event = self._events[-1].time if self._events else end
             now = min(verdict, drawing, event)
             if now >= end:
                 return
@@ -151,7 +150,7 @@ class Annotation:
                 self._session.evaluator.margins = None
             self._session.past.at = now
             if event == now:
-                yield from self._change(now, *self._events.pop()[1:])
+                yield from self._change(self._events.pop())
             elif verdict == now:
                 self._due[0] += SECOND
                 self._session.advisory.feel()
@@ -160,10 +159,10 @@ class Annotation:
                 self._due[1] += DRAWING
                 yield from self._draw(now)
 
-    def _change(self, now: int, which: int, alert: Alert) -> Iterator[Said]:
+    def _change(self, event: Event) -> Iterator[Said]:
         """Yield the messages of an alert's beginning (`which` is 1) or end, and the new verdict."""
-        session = self._session
-        if which == 1:
+        session, now, alert = self._session, event.time, event.alert
+        if event.begins:
             self._open[id(alert)] = replace(alert, end=None, peak=self._peak(alert))
             changes = session.raise_alert(self._open[id(alert)])
         else:
