@@ -9,6 +9,7 @@ from ugv_acceptance.console.latest_messages import (
     Heartbeat,
     Newest,
     Pick,
+    hints_of,
     newest_attitude,
     newest_of_joints,
 )
@@ -105,3 +106,21 @@ def test_silence_is_judged_by_the_period_heard() -> None:
         pulse.beat(0.4 * k)
     assert not pulse.silent(39.6 + 1.0, 0.5)
     assert pulse.silent(39.6 + 3.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ('values', 'hints'),
+    [
+        ({}, ()),
+        ({'tip_of': 'front'}, ()),
+        ({'tip_in_s': '1.2', 'tip_of': 'front'}, ('it tips to the front in 1.2 s at this rate',)),
+        ({'tip_in_s': '1.2'}, ('it tips to the ? in 1.2 s at this rate',)),
+        (
+            {'payload_estimate_kg': '3.5', 'saturation_in_s': '0.7', 'saturation_of': 'elbow'},
+            ('elbow saturates in 0.7 s at this rate', 'efforts tell of a payload of 3.5 kg'),
+        ),
+    ],
+)
+def test_hints_are_what_the_verdict_tells(values: dict[str, str], hints: tuple[str, ...]) -> None:
+    """The time to a limit and the load that is felt, of whatever it tells."""
+    assert hints_of(values) == hints

@@ -3,13 +3,13 @@
 A picture needs only the newest message of each kind before it; the monitor judges every one.
 """
 
-from collections import defaultdict
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder
 from ugv_acceptance.evaluation.settings import ImuInput
+from ugv_acceptance.monitoring.trends import end_words
 
 # Chooses which of an input's messages are evaluated, in order of arrival; at least one came.
 Pick = Callable[[Sequence[bytes]], Sequence[bytes]]
@@ -108,10 +108,13 @@ def newest_attitude(imu: ImuInput) -> Pick:
 
 def hints_of(values: Mapping[str, str]) -> tuple[str, ...]:
     """Return the hints in a verdict's values beside the alerts, in plain words."""
-    forms = (
-        ('tip_in_s', 'it tips to the {tip_of} in {tip_in_s} s at this rate'),
-        ('saturation_in_s', '{saturation_of} saturates in {saturation_in_s} s at this rate'),
-        ('payload_estimate_kg', 'efforts tell of a payload of {payload_estimate_kg} kg'),
-    )
-    missing = defaultdict(lambda: '?', values)
-    return tuple(form.format_map(missing) for key, form in forms if key in values)
+    hints = []
+    for kind, tips in (('tip', True), ('saturation', False)):
+        seconds = values.get(f'{kind}_in_s')
+        if seconds is not None:
+            end = end_words(values.get(f'{kind}_of', '?'), seconds, tips=tips)
+            hints.append(f'{end} at this rate')
+    mass = values.get('payload_estimate_kg')
+    if mass is not None:
+        hints.append(f'efforts tell of a payload of {mass} kg')
+    return tuple(hints)

@@ -15,7 +15,7 @@ from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.faults import what_to_do
-from ugv_acceptance.monitoring.trends import Ahead, Trends
+from ugv_acceptance.monitoring.trends import Ahead, Trends, end_words
 
 # Age (ns) at which computed advice is renewed.
 FRESH = 250_000_000
@@ -150,9 +150,7 @@ class Advisory:
 
 
 def _ahead_words(ahead: Ahead) -> str:
-    if ahead.subject in SIDES:
-        rate = abs(math.degrees(ahead.rate))
-        what, unit = f'it tips to the {ahead.subject}', 'deg/s'
-    else:
-        what, unit, rate = f'{ahead.subject} saturates', 'N m/s', abs(ahead.rate)
-    return f'shrinking by {rate:.0f} {unit}: {what} in {ahead.seconds:.1f} s'
+    tips, rate = ahead.subject in SIDES, abs(ahead.rate)
+    shrinks = f'{math.degrees(rate):.0f} deg/s' if tips else f'{rate:.0f} N m/s'
+    end = end_words(ahead.subject, f'{ahead.seconds:.1f}', tips=tips)
+    return f'shrinking by {shrinks}: {end}'

@@ -42,6 +42,12 @@ class Ahead:
     seconds: float
 
 
+def end_words(subject: str, seconds: str, *, tips: bool) -> str:
+    """Return what happens when a margin of a side (`tips`) or a joint is used up, and when."""
+    what = f'it tips to the {subject}' if tips else f'{subject} saturates'
+    return f'{what} in {seconds} s'
+
+
 @dataclass(slots=True)
 class Trends:
     """Follows the margins of a running robot: their minima and their rates of change.
