@@ -12,6 +12,7 @@ from typing import Any
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
+from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
@@ -61,7 +62,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'word': WORDS[level],
         'cause': cause,
         'advice': advice,
-        'left': '' if level == STALE else what_is_left(snapshot, settings),
+        'left': '' if level == STALE else _left(snapshot, settings),
         'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
         'q': numbers(snapshot.q),
         'posture': _posture(snapshot, figure),
@@ -87,33 +88,18 @@ def numbers(values: Iterable[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def what_is_left(snapshot: Snapshot, settings: Settings) -> str:
-    """Return the smallest margins as a short text; '' where they are not known."""
+def _left(snapshot: Snapshot, settings: Settings) -> str:
+    """Return the smallest margins in a few words; '' where they are not known."""
     if not snapshot.known:
         return ''
-    parts = []
-    tilts = [(a, side) for side, a in zip(SIDES, snapshot.angle, strict=True) if math.isfinite(a)]
-    if tilts:
-        angle, side = min(tilts)
-        degrees = math.degrees(angle)
+    side, angle = least_tilt(snapshot.angle)
+    degrees = math.degrees(angle)
+    if side:
         ways = (f'{degrees:.1f} degrees of tilt left', f'{-degrees:.1f} degrees past tipping')
-        parts.append(f'{ways[degrees < 0]} to the {side}')
+        tilt = f'{ways[degrees < 0]} to the {side}'
     else:
-        parts.append(f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})')
-    uses = _uses(snapshot, settings)
-    if uses:
-        use, name = max(uses)
-        parts.append(f'{name} at {use:.0%} of its limit')
-    return '; '.join([', '.join(parts), *snapshot.hints])
-
-
-def _uses(snapshot: Snapshot, settings: Settings) -> list[tuple[float, str]]:
-    joints = zip(settings.robot.joint_names, snapshot.torque, settings.limits.torque, strict=False)
-    return [
-        (abs(tau) / limit, name)
-        for name, tau, limit in joints
-        if math.isfinite(limit) and math.isfinite(tau)
-    ]
+        tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
+    return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])
 
 
 def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:

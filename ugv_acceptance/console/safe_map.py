@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from ugv_acceptance import BadSample
 from ugv_acceptance.console.frame import Plain, number
 from ugv_acceptance.console.snapshot import Snapshot
+from ugv_acceptance.evaluation.least_margins import least_tilt, most_used
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.stability import SIDES, stability
+from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.studies.bilinear import Grid, grid_of
 from ugv_acceptance.studies.maps import (
@@ -100,16 +101,9 @@ def probe(
     for name, value in zip(axes, at, strict=True):
         q[robot.joint_names.index(name)] = value
     torque = static_torque(robot, q, snapshot.gravity, load)
-    angle: Any = [float(a) for a in stability(robot, q, snapshot.gravity, load).angle]
-    known = [(a, side) for a, side in zip(angle, SIDES, strict=True) if math.isfinite(a)]
-    least, side = min(known, default=(math.nan, ''))
-    limits = settings.limits.torque
-    uses = [
-        (abs(float(tau)) / limit, name)
-        for name, tau, limit in zip(robot.joint_names, torque, limits, strict=True)
-        if limit < np.inf
-    ]
-    use, joint = max(uses, default=(math.nan, ''))
+    angle: Any = stability(robot, q, snapshot.gravity, load).angle
+    side, least = least_tilt(angle)
+    joint, use = most_used(torque, settings)
     return {
         'at': [number(x) for x in at],
         'tilt_deg': number(math.degrees(least)),

@@ -9,6 +9,7 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
+from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.evaluation.settings import Settings
@@ -27,26 +28,8 @@ class Status:
     values: dict[str, object] = field(default_factory=dict)
 
 
-def worst_joint(margins: Margins, settings: Settings) -> tuple[str, float]:
-    """Return the joint with the largest utilisation (share of its limit); '' if none has one."""
-    joints = zip(settings.robot.joint_names, margins.torque, settings.limits.torque, strict=True)
-    uses = [(name, abs(tau) / limit) for name, tau, limit in joints if math.isfinite(limit)]
-    return max(uses, key=lambda use: use[1], default=('', 0.0))
-
-
-def least_tilt(margins: Margins) -> tuple[str, float]:
-    """Return the side with the least tilt left and how much (rad); '' and NaN if none is known."""
-    angles = map(float, margins.stability.angle)
-    known = [(s, a) for s, a in zip(SIDES, angles, strict=True) if not math.isnan(a)]
-    return min(known, key=lambda side: side[1], default=('', math.nan))
-
-
-def what_is_left(margins: Margins, settings: Settings) -> str:
-    """Return the smallest margins in words: tilt left, and the most loaded joint."""
-    side, angle = least_tilt(margins)
-    joint, use = worst_joint(margins, settings)
-    tilt = f'{math.degrees(angle):.1f} deg of tilt left ({side})' if side else 'no tilt margin'
-    return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
+def _tilt_words(side: str, angle: float) -> str:
+    return f'{math.degrees(angle):.1f} deg of tilt left ({side})'
 
 
 def verdict_of(session: Session) -> Status:
@@ -54,7 +37,7 @@ def verdict_of(session: Session) -> Status:
     alarm_tracker, now = session.alarm_tracker, session.clock.now()
     margins, active = session.evaluator.margins, session.active
     session.advisory.renew(now, active)
-    left = what_is_left(margins, session.settings) if margins else 'margins not known'
+    left = _left(margins, session.settings) if margins else 'margins not known'
     unseen = sum(alarm.state.unseen for alarm in alarm_tracker.alarms.table.values())
     values: dict[str, object] = {
         'left': left,
@@ -72,6 +55,12 @@ def verdict_of(session: Session) -> Status:
     if alarm_tracker.waiting:
         return _over(session, alarm_tracker.waiting[-1], left, values | known)
     return Status(OK, '', f'all margins kept: {left}', values | known)
+
+
+def _left(margins: Margins, settings: Settings) -> str:
+    side, angle = least_tilt(margins.stability.angle)
+    tilt = _tilt_words(side, angle) if side else 'no tilt margin'
+    return with_most_used(tilt, margins.torque, settings)
 
 
 def _worst(
@@ -207,9 +196,9 @@ def _tip_status(margins: Margins | None, active: Sequence[Alert]) -> Status:
         values[f'{side}_moment_nm'] = float(moment)
     if stability.state >= NO_CONTACT:
         return Status(level, 'Tip-over', f'no margin: {state}', values)
-    side, angle = least_tilt(margins)
+    side, angle = least_tilt(stability.angle)
     values['edge'] = side
-    return Status(level, 'Tip-over', f'{math.degrees(angle):.1f} deg of tilt left ({side})', values)
+    return Status(level, 'Tip-over', _tilt_words(side, angle), values)
 
 
 def _level(active: Sequence[Alert], code: str, subject: str | None, margins: Margins | None) -> int:
