@@ -2,6 +2,7 @@
 
 import struct
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,10 +16,11 @@ from nodes.live_case import FOLDED, NAMES, imu, joints
 from ugv_acceptance.bag.encode import JointStateBytes, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
+from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker
 from ugv_acceptance.monitoring.diagnostics import guarded
 from ugv_acceptance.monitoring.faults import WORDS
-from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock
+from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.parameters import knobs_of, unknown
 
@@ -30,6 +32,17 @@ def session(problems: list[str] | None = None) -> Session:
     """Return a session of the PackBot whose problems are written to a list."""
     told = [] if problems is None else problems
     return Session(CONFIG.settings, lambda _s, _m: None, lambda: None, told.append)
+
+
+@dataclass(slots=True)
+class Stopwatch:
+    """A clock that shows what it is set to (ns)."""
+
+    at: int
+
+    def now(self) -> int:
+        """Return that."""
+        return self.at
 
 
 GOOD = {'joint_states': joints(stamp=NS), 'imu': imu(stamp=NS)}
@@ -114,6 +127,22 @@ def test_margins_come_with_the_second_input() -> None:
     assert watched.level == OK
 
 
+def test_any_clock_dates_what_is_heard() -> None:
+    """Receipt, silence and faults are dated by the clock that is given, nothing by another."""
+    clock, told = Stopwatch(time.time_ns()), list[str]()
+    got: list[Margins] = []
+    watched = Session(CONFIG.settings, lambda _, m: got.append(m), lambda: None, told.append, clock)
+    for _ in range(20):
+        clock.at += NS // 50
+        watched.take_imu(imu(stamp=clock.at))
+        watched.take_joint_state(joints(stamp=clock.at))
+    assert (told, got[-1].time) == ([], clock.at)
+    assert watched.level == OK
+    clock.at += 100 * NS
+    watched.tick()
+    assert {a.rule.code for a in watched.active} == {'INPUT_STALE'}
+
+
 @given(
     st.integers(0, 2**31 - 1),
     st.lists(st.tuples(st.floats(width=64), st.floats(width=64)), min_size=1, max_size=8),
@@ -138,16 +167,16 @@ def test_the_receipt_clock_is_the_wall_clock_at_first() -> None:
 @given(st.integers(0, 2**60), st.integers(0, 2**60))
 def test_simulated_stamps_are_shifted_into_receipt_time(now: int, simulated: int) -> None:
     """After /clock was seen, a stamp of its time is the time of receipt, within the slack."""
-    clock = ReceiptClock(simulated=True)
-    clock.follow(now, simulated)
-    assert abs(clock.stamp(now, simulated) - now) <= RESHIFT
+    stamps = StampShift(simulated=True)
+    stamps.follow(now, simulated)
+    assert abs(stamps.stamp(now, simulated) - now) <= RESHIFT
 
 
 def test_real_stamps_are_not_shifted() -> None:
     """Without use_sim_time nothing moves a stamp."""
-    clock = ReceiptClock()
-    clock.follow(10 * NS, 3 * NS)
-    assert clock.stamp(10 * NS, 4 * NS) == 4 * NS
+    stamps = StampShift()
+    stamps.follow(10 * NS, 3 * NS)
+    assert stamps.stamp(10 * NS, 4 * NS) == 4 * NS
 
 
 def alert(k: int, code: str = 'TIP_OVER') -> Alert:

@@ -34,7 +34,7 @@ NOTHING = bytes([0, 1, 0, 0]) + bytes(8) + (1).to_bytes(4, 'little') + bytes(8)
 def box_in(folder: Path | None) -> BlackBox:
     """Return a black box that must not report a problem."""
     problems: list[str] = []
-    box = BlackBox(folder, TOPICS, 0, problems.append)
+    box = BlackBox(folder, TOPICS, time.monotonic_ns, problems.append)
     assert not problems
     return box
 
@@ -152,7 +152,7 @@ def test_a_folder_that_cannot_be_written_is_said_and_survived(tmp_path: Path) ->
     """The problem is told in one line; messages are taken as before."""
     (tmp_path / 'file').write_text('')
     problems: list[str] = []
-    box = BlackBox(tmp_path / 'file', TOPICS, 0, problems.append)
+    box = BlackBox(tmp_path / 'file', TOPICS, time.monotonic_ns, problems.append)
     feed(box, START, START + SECOND)
     box.alerts(START + SECOND, [TIP], NOTHING)
     feed(box, START + SECOND, START + 2 * SECOND)

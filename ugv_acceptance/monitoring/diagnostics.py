@@ -272,7 +272,7 @@ def _monitor(verdict: Status, config: Config | None, session: Session | None) ->
     if session is not None:
         values |= {
             'evaluated': session.evaluator.evaluated,
-            'use_sim_time': session.clock.simulated,
+            'use_sim_time': session.stamps.simulated,
         }
     return Status(verdict.level, 'Monitor', verdict.message, {**values, **verdict.values})
 

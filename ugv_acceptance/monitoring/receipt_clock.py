@@ -7,6 +7,7 @@ stamps are compared with this clock, in simulation after a shift from the time o
 
 import time
 from dataclasses import dataclass, field
+from typing import Protocol
 
 # Simulated time may drift this far (ns) from real time before the shift is renewed.
 RESHIFT = 250_000_000
@@ -14,6 +15,13 @@ RESHIFT = 250_000_000
 
 def _offset() -> int:
     return time.time_ns() - time.monotonic_ns()
+
+
+class Clock(Protocol):
+    """What dates the receipt of messages."""
+
+    def now(self) -> int:
+        """Return the time of receipt of what is in hand now (ns)."""
 
 
 @dataclass(slots=True)
@@ -24,14 +32,23 @@ class ReceiptClock:
     header stamp equals the present.
     """
 
-    simulated: bool = False
     offset: int = field(default_factory=_offset)
-    shift: int = 0
-    shifted: bool = False
 
     def now(self) -> int:
         """Return the present time (ns since the epoch)."""
         return time.monotonic_ns() + self.offset
+
+
+@dataclass(slots=True)
+class StampShift:
+    """Turns header stamps into receipt time by `shift` (ns), where they are `simulated`.
+
+    The shift follows `/clock`; until that came, the first stamp is taken for now.
+    """
+
+    simulated: bool = False
+    shift: int = 0
+    shifted: bool = False
 
     def stamp(self, now: int, stamp: int) -> int:
         """Return a header stamp (ns) converted to the time of this clock."""

@@ -4,7 +4,6 @@ The three `take_*` are the hot path. Bytes are decoded by the decoder that reads
 object is made; whatever they hold, the worst that can happen is that they count as malformed.
 """
 
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
 from ugv_acceptance.monitoring.faults import Faults
-from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.receipt_clock import Clock, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.trends import Trends
 
 # Fields of a sample that the evaluator takes after time and stamp.
@@ -74,15 +73,16 @@ class Session:
     """One session of monitoring a running robot: decodes, evaluates, counts and tracks alarms.
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
-    stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log.
-    `take_joint_state`, `take_imu` and `take_payload` take a serialised message and never raise.
+    stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
+    dates what comes in, `stamps` turns header stamps into its time.
     """
 
     settings: Settings
     on_margins: Callable[[int, Margins], None]
     on_change: Callable[[], None]
     on_problem: Callable[[str], None]
-    clock: ReceiptClock = field(default_factory=ReceiptClock)
+    clock: Clock = field(default_factory=ReceiptClock)
+    stamps: StampShift = field(default_factory=StampShift)
     evaluator: LiveEvaluator = field(init=False)
     faults: Faults = field(init=False)
     alarm_tracker: AlarmTracker = field(init=False)
@@ -166,16 +166,16 @@ class Session:
         evaluate: Callable[..., Margins | None],
     ) -> Callable[[bytes], None]:
         """Return a function that decodes a message of input `name` and evaluates its `fields`."""
-        clock, count, alarm_tracker = self.clock, self.counts[name], self.alarm_tracker
-        see = self.trends.see
+        count, alarm_tracker, stamps = self.counts[name], self.alarm_tracker, self.stamps
+        receipt, see = self.clock.now, self.trends.see
 
         def take(data: bytes) -> None:
-            now = time.monotonic_ns() + clock.offset
+            now = receipt()
             sample = decode(data)
             stamp = sample.stamp
             count.taken += 1
             count.last = now
-            local = clock.stamp(now, stamp) if clock.simulated else stamp
+            local = stamps.stamp(now, stamp) if stamps.simulated else stamp
             margins = evaluate(now, local, *fields(sample))
             if margins is not None:
                 see(margins)

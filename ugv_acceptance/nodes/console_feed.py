@@ -30,7 +30,7 @@ from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, Input
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.monitoring.faults import what_to_do
-from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import INPUTS, Session
 from ugv_acceptance.nodes.executor import Stop, ros
 from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
@@ -64,7 +64,7 @@ class ConsoleNode(Node):
             lambda _stamp, _margins: None,
             self._take_own,
             self._complain,
-            ReceiptClock(bool(self.get_parameter('use_sim_time').value)),
+            stamps=StampShift(bool(self.get_parameter('use_sim_time').value)),
         )
         session = self.session
         self._heard = {
@@ -106,9 +106,9 @@ class ConsoleNode(Node):
             # The count is read after what is handed on was counted, never before.
             left_out = newest.hand_on()
             self.session.counts[name].taken += left_out
-        now, clock = time.monotonic(), self.session.clock
-        if clock.simulated:
-            clock.follow(clock.now(), self.get_clock().now().nanoseconds)
+        now, stamps = time.monotonic(), self.session.stamps
+        if stamps.simulated:
+            stamps.follow(self.session.clock.now(), self.get_clock().now().nanoseconds)
         if now >= self._due:
             self._due = now + 1.0
             self._every_second()

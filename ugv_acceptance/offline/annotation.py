@@ -32,7 +32,7 @@ from ugv_acceptance.monitoring.drawing import (
 )
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.margins import margin_rows
-from ugv_acceptance.offline.replayed_session import ReplayedSession, moment_of
+from ugv_acceptance.offline.replayed_session import PastClock, ReplayedSession, moment_of
 
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -65,6 +65,7 @@ class Annotation:
 
     evaluation: Evaluation
     names: dict[str, str] = field(init=False)
+    _clock: PastClock = field(default_factory=PastClock)
     _session: ReplayedSession = field(init=False)
     _figure: Figure = field(init=False)
     _bytes: tuple[JointStateBytes, JointStateBytes] = field(init=False)
@@ -79,7 +80,7 @@ class Annotation:
         log, results = ordered(self._judgement.evaluator.watch.log), self.evaluation.alerts
         told = {moment_of(a): r.advice for a, r in zip(log, results, strict=True)}
         nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
-        self._session = ReplayedSession(self.settings, *nothing, told=told)
+        self._session = ReplayedSession(self.settings, *nothing, self._clock, told=told)
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
@@ -148,7 +149,7 @@ class Annotation:
                 return
             if now > self._until:
                 self._session.evaluator.margins = None
-            self._session.past.at = now
+            self._clock.at = now
             if event == now:
                 yield from self._change(self._events.pop())
             elif verdict == now:

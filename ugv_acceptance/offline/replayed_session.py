@@ -13,7 +13,6 @@ from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.monitoring.advisory import Advisory
-from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
 from ugv_acceptance.monitoring.session import Session
 
 # Rates and efforts of the joints, NaN where not reported.
@@ -21,7 +20,7 @@ Measured = tuple[tuple[float, ...], tuple[float, ...]]
 
 
 @dataclass(slots=True)
-class PastClock(ReceiptClock):
+class PastClock:
     """A receipt clock that stands at the log time `at` (ns)."""
 
     at: int = 0
@@ -77,10 +76,8 @@ class ReplayedSession(Session):
     """A Session at a moment of a recording; `told` is the result's advice, by `moment_of`."""
 
     told: Mapping[tuple[int, str, str, int], str] = field(default_factory=dict)
-    past: PastClock = field(default_factory=PastClock)
 
     def __post_init__(self) -> None:
-        self.clock = self.past
         Session.__post_init__(self)
         self.advisory = PastAdvisory(self.evaluator, self.trends, self.on_problem, told=self.told)
 

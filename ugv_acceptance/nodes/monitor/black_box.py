@@ -53,14 +53,14 @@ def is_critical(alert: Alert) -> bool:
 class BlackBox:
     """Keeps incoming messages in memory and writes recordings into `folder` (None: does nothing).
 
-    Times in ns of receipt; `offset` converts those of the steady clock. `on_problem` is called with
+    Times in ns of receipt; `now` returns that of the message in hand. `on_problem` is called with
     the reason why a recording could not be made; the box then goes on keeping. `saved` are the
     recordings whose past is in the file. A thread writes, so that no message has to wait.
     """
 
     folder: Path | None
     channels: dict[str, Channel]
-    offset: int
+    now: Callable[[], int]
     on_problem: Callable[[str], None] = lambda _text: None
     most: int = MOST
     saved: list[Path] = field(default_factory=list)
@@ -75,10 +75,10 @@ class BlackBox:
         """Return `take` wrapped so that every message of a channel is kept before it is taken."""
         if self.folder is None:
             return take
-        keep, offset, clock = self.keep, self.offset, time.monotonic_ns
+        keep, now = self.keep, self.now
 
         def tapped(data: bytes) -> None:
-            keep(clock() + offset, name, data)
+            keep(now(), name, data)
             take(data)
 
         return tapped

@@ -32,7 +32,7 @@ from ugv_acceptance.monitoring.diagnostics import (
     unavailable,
     verdict_of,
 )
-from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
+from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
@@ -163,7 +163,7 @@ class Monitor(LifecycleNode):
             self._margins.publish if self._margins else lambda _stamp, _margins: None,
             self._on_change,
             lambda text: self.get_logger().warning(text, throttle_duration_sec=5.0),
-            ReceiptClock(bool(self._value('use_sim_time'))),
+            stamps=StampShift(bool(self._value('use_sim_time'))),
         )
 
     def _deactivate(self) -> None:
@@ -190,8 +190,8 @@ class Monitor(LifecycleNode):
     def _on_tick(self) -> None:
         if (session := self.session) is None:
             return
-        if session.clock.simulated:
-            session.clock.follow(session.clock.now(), self.get_clock().now().nanoseconds)
+        if session.stamps.simulated:
+            session.stamps.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
         self._tell_load()
         self._tell(session.alarm_tracker.alarms.advance(now := session.clock.now()))

@@ -99,7 +99,7 @@ def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
     channels['alerts'] = Channel(alerts, 'diagnostic_msgs/msg/DiagnosticArray', 'reliable')
     folder = node.get_parameter('black_box').value
     path = Path(folder).expanduser() if folder else None
-    box = BlackBox(path, channels, session.clock.offset, session.on_problem)
+    box = BlackBox(path, channels, session.clock.now, session.on_problem)
     session.take_joint_state = box.tap('joint_states', session.take_joint_state)
     session.take_imu = box.tap('imu', session.take_imu)
     session.take_payload = box.tap('payload', session.take_payload)

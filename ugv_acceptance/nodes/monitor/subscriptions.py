@@ -162,8 +162,7 @@ class Inputs:
             self._session.faults.clear(now, code, name)
 
     def _look_at_the_clock(self, now: int) -> None:
-        clock = self._session.clock
-        if clock.simulated and not self._node.get_clock().now().nanoseconds:
+        if self._session.stamps.simulated and not self._node.get_clock().now().nanoseconds:
             self._session.faults.set(now, 'NO_CLOCK', 'clock', 1.0)
         else:
             self._session.faults.clear(now, 'NO_CLOCK', 'clock')
