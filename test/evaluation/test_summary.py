@@ -30,7 +30,7 @@ from evaluation.streams import (
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.alerts.messages import WORDS, advice, describe
+from ugv_acceptance.evaluation.alerts.messages import RECORDED, advice, describe
 from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
@@ -151,7 +151,7 @@ def test_every_rule_has_words_and_advice() -> None:
         alert = Alert(signal.rule, T0, 0.3)
         assert '{' not in describe(alert, told)
         assert advice(signal.rule.code)
-    assert {s.rule.code for s in RuleSet(told).signals()} == set(WORDS)
+    assert {s.rule.code for s in RuleSet(told).signals()} == set(RECORDED)
 
 
 def test_a_robot_past_tipping_is_said_to_be() -> None:

@@ -15,7 +15,7 @@ from ugv_acceptance.campaign.failure_log import (
     UNKNOWN,
     Entry,
 )
-from ugv_acceptance.evaluation.alerts.messages import FIRST_SUSPECT, FailureSource
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, FailureSource
 from ugv_acceptance.type_aliases import Json
 
 # Levels at which an alert counts as a failure; a warning does not.
@@ -69,12 +69,12 @@ def from_alerts(run: str, result: Json) -> list[Failure]:
 
 def _from_group(run: str, code: str, group: Sequence[Json]) -> Failure:
     lasting = any(alert['end_s'] is None for alert in group)
-    suspect = FIRST_SUSPECT.get(code)
+    text = ALERTS.get(code)
     return Failure(
         run,
         min(alert['start_s'] for alert in group),
         group[0]['message'],
-        suspect.value if suspect else UNKNOWN,
+        text.suspect.value if text else UNKNOWN,
         TERMINAL if lasting else NON_TERMINAL,
         UNKNOWN if lasting else FIELD,
         'alert',

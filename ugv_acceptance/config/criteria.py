@@ -14,7 +14,7 @@ from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import Document, read_document
 from ugv_acceptance.config.schema import Name, NotNegative, Positive, Section
 from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
-from ugv_acceptance.evaluation.alerts.messages import WORDS
+from ugv_acceptance.evaluation.alerts.messages import RECORDED
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
     AlertDemand,
@@ -230,7 +230,7 @@ def _limit_of(reading: _Reading, side: str, given: Given, signal: str, of: str) 
 
 
 def _alert(reading: _Reading, section: CriterionSection) -> Demand:
-    code = reading.known('alert', str(section.alert), (*WORDS, ANY))
+    code = reading.known('alert', str(section.alert), (*RECORDED, ANY))
     if section.expect is None:
         raise reading.refuse('', 'expected "expect: raised" or "expect: absent"')
     return AlertDemand(

@@ -9,12 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
+from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.effort.plateaus import PayloadEstimate, payload_estimate
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.monitoring.faults import what_to_do
 from ugv_acceptance.monitoring.trends import Ahead, Trends, end_words
 
 # Age (ns) at which computed advice is renewed.
@@ -94,7 +94,7 @@ class Advisory:
         rule = alert.rule
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
-        return what_to_do(alert.rule.code)
+        return advice(rule.code)
 
     def ahead(self, now: int) -> tuple[Ahead, ...]:
         """Return the margins that will be used up soon, the soonest first."""
@@ -129,8 +129,8 @@ class Advisory:
             values['slide_left_deg'] = round(math.degrees(left), 2)
         if self.estimate is not None:
             values['payload_estimate_kg'] = round(max(self.estimate.mass, 0.0), 2)
-        for k, advice in enumerate(self.advice[:3]):
-            values[f'advice_{k + 1}'] = advice.sentence
+        for k, found in enumerate(self.advice[:3]):
+            values[f'advice_{k + 1}'] = found.sentence
         return values
 
     def slide(self) -> float:

@@ -8,13 +8,13 @@ from typing import Any, Protocol
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
+from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
-from ugv_acceptance.monitoring.faults import suspect_of
 from ugv_acceptance.monitoring.session import Session
 
 

@@ -27,9 +27,9 @@ from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
-from ugv_acceptance.monitoring.faults import what_to_do
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import INPUTS, Session
 from ugv_acceptance.nodes.executor import Stop, ros
@@ -199,7 +199,7 @@ class ConsoleNode(Node):
         self.session.tick()
         active = self.session.active
         say = self.session.faults.sentence
-        rows = [row_of(a, say(a, self.settings), what_to_do(a.rule.code)) for a in active]
+        rows = [row_of(a, say(a, self.settings), advice(a.rule.code)) for a in active]
         self._own = {row.key: row for row in rows}
         self._rows = tuple(self._input(name, active) for name in INPUTS)
 

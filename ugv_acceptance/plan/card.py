@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.messages import advice
+from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
@@ -18,30 +18,30 @@ from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 
-# Code -> what it means to the person at the robot.
-MEANINGS = {
-    'TIP_OVER': 'Little tilt is left before the robot tips to the side named.',
-    'TORQUE_LIMIT': 'The joint named carries nearly, or more than, what its motor can hold.',
-    'TIP_AHEAD': 'At this rate the robot tips to the side named within a second.',
-    'TORQUE_AHEAD': 'At this rate the joint named is at its limit within a second.',
-    'EFFORT_LIMIT': 'The motor named gives nearly all it has, whatever the model says.',
-    'MOTOR_WEAK': 'The motor named gives less than it should, and cannot hold its posture.',
-    'SLIDE': 'The robot is about to slide down the slope, before it tips.',
-    'NO_SUPPORT': 'The robot does not stand on its contact points: it is tipping or hanging.',
-    'STATIC_MODEL': 'The joint moves so fast that the margins shown are too good.',
-    'INPUT_STALE': 'Messages of a sensor have stopped: no margin is known.',
-    'INPUT_INCOMPLETE': 'A joint is missing from the messages: no margin is known.',
-    'INPUT_INVALID': 'A sensor sends numbers that cannot be true.',
-    'ENCODER_FROZEN': 'A joint tells no motion while its effort changes: is its position true?',
-    'POSITION_LEAP': 'A position jumps: wrong unit, or two robots tell of one joint.',
-    'IMU_FRAME': 'Another IMU than the one that was set up: tilt cannot be trusted.',
-    'IMU_ORIENTATION': 'The IMU tells an orientation it does not know.',
-    'IMU_GRAVITY': 'The IMU does not feel gravity as it should: tilt cannot be trusted.',
-    'IMU_INCONSISTENT': 'The IMU contradicts itself: tilt cannot be trusted.',
-    'PAYLOAD_INVALID': 'The load that was declared cannot be used.',
-    'LIMITS_RELAXED': 'Somebody made the limit named wider than is safe, and said why.',
-    'CLOCK': 'Clocks disagree: times of messages cannot be trusted.',
-}
+# The order in which the card tells what alerts mean: robot, inputs, what was set.
+SHOWN = (
+    'TIP_OVER',
+    'TORQUE_LIMIT',
+    'TIP_AHEAD',
+    'TORQUE_AHEAD',
+    'EFFORT_LIMIT',
+    'MOTOR_WEAK',
+    'SLIDE',
+    'NO_SUPPORT',
+    'STATIC_MODEL',
+    'INPUT_STALE',
+    'INPUT_INCOMPLETE',
+    'INPUT_INVALID',
+    'ENCODER_FROZEN',
+    'POSITION_LEAP',
+    'IMU_FRAME',
+    'IMU_ORIENTATION',
+    'IMU_GRAVITY',
+    'IMU_INCONSISTENT',
+    'PAYLOAD_INVALID',
+    'LIMITS_RELAXED',
+    'CLOCK',
+)
 LEVELS = (
     ('OK', 'all margins kept', 'go on'),
     (
@@ -105,7 +105,7 @@ def card_of(plan: Plan, config: Config) -> str:
         version=__version__,
         groups=groups,
         levels=LEVELS,
-        meanings=[(code, text, advice(code)) for code, text in MEANINGS.items()],
+        meanings=[(code, ALERTS[code].meaning, ALERTS[code].to_do) for code in SHOWN],
         maps=safe_maps(arm, plan),
         length=time_text(duration(plan), digits=2),
         home=_text(plan.home_deg),

@@ -16,7 +16,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import sentence_of
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.seal import sealed
-from ugv_acceptance.evaluation.alerts.messages import WORDS
+from ugv_acceptance.evaluation.alerts.messages import RECORDED
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.model.robot import Robot, Vector
 from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of
@@ -28,7 +28,7 @@ SIMULATION: Literal['simulation'] = 'simulation'
 def _alert(text: str) -> str:
     parts = text.split()
     level, code = parts[0] if parts else '', parts[1] if len(parts) > 1 else None
-    if level not in LEVELS[1:] or (code is not None and code not in WORDS) or len(parts) > 3:
+    if level not in LEVELS[1:] or (code is not None and code not in RECORDED) or len(parts) > 3:
         raise ValueError(f'expected LEVEL [CODE [SUBJECT]], such as ERROR TIP_OVER, got {text!r}')
     return text
 

@@ -1,6 +1,16 @@
 """The paper's Figure 1 as a classification."""
 
-from ugv_acceptance.evaluation.alerts.messages import FIRST_SUSPECT, HUMAN, WORDS, FailureSource
+import pytest
+
+from ugv_acceptance.evaluation.alerts.messages import (
+    ALERTS,
+    HUMAN,
+    LIVE,
+    RECORDED,
+    FailureSource,
+    suspect_of,
+)
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN
 
 
 def test_the_leaves_are_those_of_the_paper() -> None:
@@ -16,6 +26,18 @@ def test_a_path_says_the_branch() -> None:
     assert FailureSource.DESIGN.path == 'human / design'
 
 
-def test_every_alert_has_a_first_suspect() -> None:
-    """Every alert code has a category of likely cause, and no category names an unknown code."""
-    assert FIRST_SUSPECT.keys() == WORDS.keys()
+@pytest.mark.parametrize('code', ALERTS)
+def test_every_alert_says_what_to_do_and_where_to_look(code: str) -> None:
+    """No row without a sentence, an action and a category."""
+    text = ALERTS[code]
+    assert text.happened
+    assert len(text.to_do.split()) >= 3
+    assert ' / ' in suspect_of(code)
+
+
+def test_an_alert_is_recorded_or_of_a_live_node() -> None:
+    """One a recording shows means something to who stands at the robot; the others have a level."""
+    assert {*RECORDED, *LIVE} == set(ALERTS)
+    assert not LIVE.keys() & set(RECORDED)
+    assert all(ALERTS[code].meaning for code in RECORDED)
+    assert set(LIVE.values()) <= {WARN, ERROR}

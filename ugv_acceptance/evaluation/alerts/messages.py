@@ -1,9 +1,10 @@
 """The sentences of alerts for people: what happened, what to do, and which part to suspect."""
 
 import math
+from dataclasses import dataclass
 from enum import Enum
 
-from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
@@ -33,120 +34,210 @@ class FailureSource(Enum):
 
 HUMAN = frozenset({FailureSource.DESIGN, FailureSource.INTERACTION})
 
-# Alert code -> where to look first. An alert shows an effect, so this is a suspicion, no verdict: a
-# robot that tips was most often driven there, a silent input is most often a communication fault.
-FIRST_SUSPECT = {
-    'TORQUE_LIMIT': FailureSource.EFFECTOR,
-    'TIP_OVER': FailureSource.INTERACTION,
-    'NO_SUPPORT': FailureSource.INTERACTION,
-    'STATIC_MODEL': FailureSource.INTERACTION,
-    'SLIDE': FailureSource.INTERACTION,
-    'TIP_AHEAD': FailureSource.INTERACTION,
-    'TORQUE_AHEAD': FailureSource.INTERACTION,
-    'EFFORT_LIMIT': FailureSource.EFFECTOR,
-    'MOTOR_WEAK': FailureSource.EFFECTOR,
-    'ENCODER_FROZEN': FailureSource.SENSOR,
-    'INPUT_STALE': FailureSource.COMMUNICATIONS,
-    'INPUT_INCOMPLETE': FailureSource.SENSOR,
-    'INPUT_INVALID': FailureSource.SENSOR,
-    'CLOCK': FailureSource.CONTROL_SYSTEM,
-    'POSITION_LEAP': FailureSource.SENSOR,
-    'IMU_FRAME': FailureSource.DESIGN,
-    'IMU_ORIENTATION': FailureSource.SENSOR,
-    'IMU_GRAVITY': FailureSource.SENSOR,
-    'IMU_INCONSISTENT': FailureSource.SENSOR,
-    'PAYLOAD_INVALID': FailureSource.INTERACTION,
-    'LIMITS_RELAXED': FailureSource.INTERACTION,
-}
+
+@dataclass(frozen=True, slots=True)
+class AlertText:
+    """What an alert tells people: what happened, what to do, what it means at the robot.
+
+    `happened` names the joint, input or robot as {subject} and the worst value as {peak}. `suspect`
+    is where to look first: an alert shows an effect, so this is a suspicion, no verdict: a robot
+    that tips was most often led there, an input that is silent most often lost its way. `level` is
+    that of a fault only a live node sees; the others have it from their rules.
+    """
+
+    happened: str
+    to_do: str
+    suspect: FailureSource
+    meaning: str = ''
+    level: int | None = None
 
 
-# Code -> (what happened, what to do). {subject} is a joint, input or robot, {peak} the worst value.
-WORDS = {
-    'TORQUE_LIMIT': (
+ALERTS = {
+    'TORQUE_LIMIT': AlertText(
         '{subject} needs {peak:.1f} {unit}; its limit is {limit:.1f} {unit}',
         'bring the load closer to the joint, or set it down',
+        FailureSource.EFFECTOR,
+        'The joint named carries nearly, or more than, what its motor can hold.',
     ),
-    'TIP_OVER': (
+    'TIP_OVER': AlertText(
         '{tilt} to the {subject}; {kind} {limit:.1f} degrees of tilt left',
         'lower the arm, bring it over the tracks, face the slope; if it stands well, check the IMU',
+        FailureSource.INTERACTION,
+        'Little tilt is left before the robot tips to the side named.',
     ),
-    'NO_SUPPORT': (
+    'NO_SUPPORT': AlertText(
         'the contact points give no support polygon, or nothing presses on the ground',
         'stop; check that the robot stands on its tracks',
+        FailureSource.INTERACTION,
+        'The robot does not stand on its contact points: it is tipping or hanging.',
     ),
-    'STATIC_MODEL': (
+    'STATIC_MODEL': AlertText(
         '{subject} moves at {peak:.2f} {rate}; the static model holds to {limit:.2f} {rate}',
         'move the joint more slowly',
+        FailureSource.INTERACTION,
+        'The joint moves so fast that the margins shown are too good.',
     ),
-    'SLIDE': (
+    'SLIDE': AlertText(
         'the tracks slide before it tips: {slope:.1f} degrees of slope left',
         'stop; go back to where the slope is less, straight up or down it',
+        FailureSource.INTERACTION,
+        'The robot is about to slide down the slope, before it tips.',
     ),
-    'TIP_AHEAD': (
+    'TIP_AHEAD': AlertText(
         'tips to the {subject} within {seconds:.1f} s if it goes on like this',
         'stop the motion that brings it there',
+        FailureSource.INTERACTION,
+        'At this rate the robot tips to the side named within a second.',
     ),
-    'TORQUE_AHEAD': (
+    'TORQUE_AHEAD': AlertText(
         '{subject} is at its limit within {seconds:.1f} s if it goes on like this',
         'stop the motion that brings it there',
+        FailureSource.INTERACTION,
+        'At this rate the joint named is at its limit within a second.',
     ),
-    'EFFORT_LIMIT': (
+    'EFFORT_LIMIT': AlertText(
         'the motor of {subject} gives {peak:.1f} {unit}; its limit is {torque:.1f} {unit}',
         'move the joint more slowly, bring the load closer, or set it down',
+        FailureSource.EFFECTOR,
+        'The motor named gives nearly all it has, whatever the model says.',
     ),
-    'MOTOR_WEAK': (
+    'MOTOR_WEAK': AlertText(
         'the motor of {subject} gives no more, below its limit, while its posture needs more',
         'set the load down; check the supply and the motor, or the limit in the configuration',
+        FailureSource.EFFECTOR,
+        'The motor named gives less than it should, and cannot hold its posture.',
     ),
-    'ENCODER_FROZEN': (
+    'ENCODER_FROZEN': AlertText(
         '{subject} does not move at all while its effort changes',
         'check its encoder; else something blocks the joint or pulls at it',
+        FailureSource.SENSOR,
+        'A joint tells no motion while its effort changes: is its position true?',
     ),
-    'INPUT_STALE': (
+    'INPUT_STALE': AlertText(
         'no message from {subject}',
         'check that its driver runs, its topic name and its quality of service',
+        FailureSource.COMMUNICATIONS,
+        'Messages of a sensor have stopped: no margin is known.',
     ),
-    'INPUT_INCOMPLETE': (
+    'INPUT_INCOMPLETE': AlertText(
         'at least one joint of the robot is missing from {subject}, or is not refreshed',
         'check the joint names in the configuration against the topic',
+        FailureSource.SENSOR,
+        'A joint is missing from the messages: no margin is known.',
     ),
-    'INPUT_INVALID': (
+    'INPUT_INVALID': AlertText(
         '{subject} holds numbers that cannot be used',
         'check for not-a-number, degrees for radians, raw counts, a quaternion that is no rotation',
+        FailureSource.SENSOR,
+        'A sensor sends numbers that cannot be true.',
     ),
-    'CLOCK': (
+    'CLOCK': AlertText(
         'header stamps of {subject} are over a second from the time of receipt, jump or stand',
         'check the clocks and use_sim_time',
+        FailureSource.CONTROL_SYSTEM,
+        'Clocks disagree: times of messages cannot be trusted.',
     ),
-    'POSITION_LEAP': (
+    'POSITION_LEAP': AlertText(
         'the position of {subject} changes by {peak:.1f} {rate}, ten times faster than it can move',
         'check its unit (rad, not degrees), its name, and that nobody else publishes it',
+        FailureSource.SENSOR,
+        'A position jumps: wrong unit, or two robots tell of one joint.',
     ),
-    'IMU_FRAME': (
+    'IMU_FRAME': AlertText(
         'messages of {subject} come from another frame than the configuration names',
         'see that this is the IMU whose mounting is given; else mend topics.imu.frame_id',
+        FailureSource.DESIGN,
+        'Another IMU than the one that was set up: tilt cannot be trusted.',
     ),
-    'IMU_ORIENTATION': (
+    'IMU_ORIENTATION': AlertText(
         'the orientation of {subject} is no rotation, or level while its acceleration is not',
         'mend its driver; if it has no orientation, it should say so (covariance -1, REP-145)',
+        FailureSource.SENSOR,
+        'The IMU tells an orientation it does not know.',
     ),
-    'IMU_GRAVITY': (
+    'IMU_GRAVITY': AlertText(
         'at rest the acceleration differs from gravity by {peak:.0%}',
         'check its unit (m/s2, not g) and that gravity is not removed from it',
+        FailureSource.SENSOR,
+        'The IMU does not feel gravity as it should: tilt cannot be trusted.',
     ),
-    'IMU_INCONSISTENT': (
+    'IMU_INCONSISTENT': AlertText(
         'orientation and acceleration of the IMU disagree by {degrees:.1f} degrees at rest',
         'check the IMU: its orientation may be a default, or its axes exchanged',
+        FailureSource.SENSOR,
+        'The IMU contradicts itself: tilt cannot be trusted.',
     ),
-    'PAYLOAD_INVALID': (
+    'PAYLOAD_INVALID': AlertText(
         'a declared payload cannot be used',
         'give a mass in kg that is not negative, in the frame of the payload link',
+        FailureSource.INTERACTION,
+        'The load that was declared cannot be used.',
     ),
-    'LIMITS_RELAXED': (
+    'LIMITS_RELAXED': AlertText(
         '{relaxed}',
         'keep people away; set it back into its range as soon as the reason is gone',
+        FailureSource.INTERACTION,
+        'Somebody made the limit named wider than is safe, and said why.',
+    ),
+    # What only a live node sees; {detail} says who or why.
+    'SECOND_PUBLISHER': AlertText(
+        '{subject} has {peak:.0f} publishers: {detail}',
+        "stop all but the robot's own driver; samples of two sources are mixed",
+        FailureSource.CONTROL_SYSTEM,
+        level=WARN,
+    ),
+    'FOREIGN_PUBLISHER': AlertText(
+        '{subject} is published by {detail}, which allowed_publishers does not name',
+        'stop that node, or add it to allowed_publishers',
+        FailureSource.CONTROL_SYSTEM,
+        level=WARN,
+    ),
+    'INPUT_MALFORMED': AlertText(
+        '{subject}: {peak:.0f} messages could not be decoded; the last: {detail}',
+        'check the type and the version of the node that publishes it',
+        FailureSource.COMMUNICATIONS,
+        level=ERROR,
+    ),
+    'INPUT_QOS': AlertText(
+        'a publisher of {subject} offers a quality of service that does not match: {detail}',
+        'set the reliability and durability of the topic in the configuration to what is offered',
+        FailureSource.DESIGN,
+        level=ERROR,
+    ),
+    'MESSAGES_LOST': AlertText(
+        '{peak:.0f} messages of {subject} were lost before the monitor could take them',
+        'raise the parameter depth, or free the processor',
+        FailureSource.COMMUNICATIONS,
+        level=WARN,
+    ),
+    'EFFORT_SIGN': AlertText(
+        'the effort of {subject} is the opposite of what its load needs',
+        'if nothing holds the arm up, set effort_sign of this joint in the configuration',
+        FailureSource.DESIGN,
+        level=WARN,
+    ),
+    'NO_CLOCK': AlertText(
+        'use_sim_time is true but nothing came on /clock',
+        'start the simulation, or set use_sim_time to false',
+        FailureSource.CONTROL_SYSTEM,
+        level=WARN,
+    ),
+    'PAYLOAD_DIFFERS': AlertText(
+        '{detail}',
+        'declare the load that is in the hand; else see what the arm touches',
+        FailureSource.INTERACTION,
+        level=WARN,
+    ),
+    'MONITOR_FAULT': AlertText(
+        'the monitor could not evaluate a message of {subject}: {detail}',
+        'report this with the log of the node: it is a fault of the program',
+        FailureSource.CONTROL_SYSTEM,
+        level=ERROR,
     ),
 }
+# The faults only a live node sees, with their levels; the other alerts a recording shows as well.
+LIVE = {code: text.level for code, text in ALERTS.items() if text.level is not None}
+RECORDED = tuple(code for code in ALERTS if code not in LIVE)
 
 
 def describe(alert: Alert, settings: Settings) -> str:
@@ -160,7 +251,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
-    return WORDS[rule.code][0].format(
+    return ALERTS[rule.code].happened.format(
         subject=rule.subject,
         peak=peak,
         limit=limit,
@@ -198,5 +289,10 @@ def tilt_left(degrees: float) -> str:
 
 
 def advice(code: str) -> str:
-    """Return what to do in general about an alert of this code."""
-    return WORDS[code][1]
+    """Return what to do about an alert."""
+    return ALERTS[code].to_do
+
+
+def suspect_of(code: str) -> str:
+    """Return where to look first for the failure behind an alert, such as "physical / sensor"."""
+    return ALERTS[code].suspect.path
