@@ -13,7 +13,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.cli.outputs import Overwrite, check_folder, inputs_of
+from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
+from ugv_acceptance.cli.outputs import check_folder, inputs_of
 from ugv_acceptance.report.format import hours_text
 from ugv_acceptance.type_aliases import Json
 
@@ -176,17 +177,9 @@ def campaign(
     out: Annotated[
         Path, typer.Option('--out', '-o', help='Folder of results; run again to resume.')
     ] = Path('campaign'),
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
-    criteria: Annotated[
-        Path | None,
-        typer.Option(help='YAML file of criteria; without it the limits of the configuration.'),
-    ] = None,
+    config: ConfigFile = None,
+    urdf: UrdfFile = None,
+    criteria: CriteriaFile = None,
     failures: Annotated[
         Path | None, typer.Option(help='Failure log a person wrote, YAML or CSV.')
     ] = None,

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from ugv_acceptance.cli.options import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
 
 COLOURS = {'OK': 'bold green', 'WARN': 'bold yellow', 'FAIL': 'bold red'}
 FINE, AILING = 0, 1
@@ -52,13 +52,8 @@ __all__ = ['CONTEXT', 'doctor']
 
 def doctor(
     context: typer.Context,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
+    config: ConfigFile = None,
+    urdf: UrdfFile = None,
     seconds: Annotated[float, typer.Option(help='How long to listen.')] = 5.0,
 ) -> None:
     """Check a set-up: ROS, topics, rates, QoS, joint names, IMU. One line each, with advice.

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
+from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 
 if TYPE_CHECKING:
     pass
@@ -20,13 +21,8 @@ def evaluate(
         list[Path],
         typer.Argument(help='rosbag2 folders, .mcap files (parts of a split bag go together), ...'),
     ],
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
+    config: ConfigFile = None,
+    urdf: UrdfFile = None,
     json_file: Annotated[
         Path | None, typer.Option('--json', help='Write the result to this file.')
     ] = None,
@@ -37,10 +33,7 @@ def evaluate(
         bool,
         typer.Option('--compare-effort', help='Measured effort beside static torque at rest.'),
     ] = False,
-    criteria: Annotated[
-        Path | None,
-        typer.Option(help='YAML file of criteria; without it the limits of the configuration.'),
-    ] = None,
+    criteria: CriteriaFile = None,
     init_criteria: Annotated[
         Path | None, typer.Option(help='Propose criteria from this (good) run in this file.')
     ] = None,

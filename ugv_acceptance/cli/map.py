@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+from ugv_acceptance.cli.options import Overwrite, PayloadMass, RobotFile
+from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 from ugv_acceptance.type_aliases import Floats
 
 if TYPE_CHECKING:
@@ -19,9 +20,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
         list[Path] | None,
         typer.Option(help='File to write: .svg, .png, .csv or .npz; may be given again.'),
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
-    ] = None,
+    config: RobotFile = None,
     x: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:180deg.')] = 'shoulder_joint',
     y: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:360deg.')] = 'elbow_joint',
     posture: Annotated[str, typer.Option(help='joint=30deg,... of the joints not mapped.')] = '',
@@ -29,7 +28,7 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
         str, typer.Option(help='level, right, left, nose-up, nose-down, nose-up-right, ...')
     ] = 'level',
     slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',
-    payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
+    payload: PayloadMass = '',
     limit: Annotated[
         str, typer.Option(help='joint="50 N m",... in place of configured limits.')
     ] = '',

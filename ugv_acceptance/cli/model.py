@@ -1,7 +1,6 @@
 """`ugv-acceptance model`: shows the robot as its files describe it, and margins in one posture."""
 
 import math
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -10,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
 from ugv_acceptance.report.format import number_text
 
 Values = dict[str, Any]
@@ -160,18 +160,13 @@ def _numbers(values: list[float]) -> list[str]:
 
 
 def model(
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
+    config: ConfigFile = None,
+    urdf: UrdfFile = None,
     posture: Annotated[str, typer.Option(help='joint=30deg,...; joints left out are at 0.')] = '',
     tilt: Annotated[
         str, typer.Option(help='roll=10deg,pitch=5deg; positive pitch lowers the front.')
     ] = '',
-    payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
+    payload: PayloadMass = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
     """Print what the tool believes the robot is, and its margins in one posture.

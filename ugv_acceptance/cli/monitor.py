@@ -15,7 +15,7 @@ from rich.live import Live
 from rich.markup import escape
 from rich.table import Table
 
-from ugv_acceptance.cli.options import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
 
 if TYPE_CHECKING:
     from ugv_acceptance.monitoring.diagnostics import Status
@@ -164,13 +164,8 @@ __all__ = ['CONTEXT', 'monitor']
 
 def monitor(
     context: typer.Context,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help='URDF in place of the one the YAML names.')
-    ] = None,
+    config: ConfigFile = None,
+    urdf: UrdfFile = None,
     every: Annotated[
         float, typer.Option(help='Seconds between lines where the output is no terminal.')
     ] = 5.0,

@@ -1,9 +1,31 @@
 """Options that several verbs share, and the arguments after --ros-args."""
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
 
 # For the verbs that run nodes: what typer does not know is kept for ROS.
 CONTEXT = {'allow_extra_args': True, 'ignore_unknown_options': True}
+
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
+]
+# The same where a verb is about a robot and reads no recording.
+RobotFile = Annotated[
+    Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
+]
+UrdfFile = Annotated[Path | None, typer.Option(help='URDF in place of the one the YAML names.')]
+CriteriaFile = Annotated[
+    Path | None,
+    typer.Option(help='YAML file of criteria; without it the limits of the configuration.'),
+]
+PayloadMass = Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')]
+Overwrite = Annotated[
+    bool,
+    typer.Option('--overwrite', help='Replace files that exist, whatever they are; never inputs.'),
+]
 
 
 def ros_arguments(context: typer.Context) -> list[str]:

@@ -10,20 +10,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from ugv_acceptance import AcceptanceError
 
 if TYPE_CHECKING:
     from ugv_acceptance.cli.output_kinds import FolderKind, Kind
     from ugv_acceptance.config import Config
-
-Overwrite = Annotated[
-    bool,
-    typer.Option('--overwrite', help='Replace files that exist, whatever they are; never inputs.'),
-]
 
 
 @dataclass(frozen=True, slots=True)

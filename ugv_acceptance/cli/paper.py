@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ugv_acceptance.cli.outputs import Overwrite, check_folder, inputs_of
+from ugv_acceptance.cli.options import Overwrite, RobotFile
+from ugv_acceptance.cli.outputs import check_folder, inputs_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,9 +20,7 @@ def paper(
     out: Annotated[Path, typer.Option(help='Folder for paper.html and paper.json.')] = Path(
         'paper'
     ),
-    config: Annotated[
-        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
-    ] = None,
+    config: RobotFile = None,
     simulate: Annotated[
         bool, typer.Option(help='Run the arm in MuJoCo beside the closed form.')
     ] = True,

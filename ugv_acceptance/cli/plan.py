@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.outputs import Output, Overwrite, check_outputs, inputs_of
+from ugv_acceptance.cli.options import ConfigFile, Overwrite
+from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 
 if TYPE_CHECKING:
     from ugv_acceptance.plan.plan import Plan
@@ -25,10 +26,7 @@ def plan(
     existing: Annotated[
         Path | None, typer.Option('--from', help='Take this plan instead of deriving one.')
     ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
+    config: ConfigFile = None,
     tilt: Annotated[
         str, typer.Option(help='Tilt of the ramp for the orientations, 1deg to 45deg.')
     ] = '10deg',

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
+from ugv_acceptance.cli.options import RobotFile
+
 
 def risk(
-    config: Annotated[
-        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
-    ] = None,
+    config: RobotFile = None,
     posture: Annotated[
         str, typer.Option(help='joint=30deg,...; left out: the arm anywhere in its range.')
     ] = '',

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import CONTEXT, ros_arguments
+from ugv_acceptance.cli.options import CONTEXT, ConfigFile, ros_arguments
 
 __all__ = ['CONTEXT', 'run']
 
@@ -41,10 +41,7 @@ def run(
     skip: Annotated[
         list[str] | None, typer.Option(help='Not this step or group; may be given several times.')
     ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
+    config: ConfigFile = None,
     attempts: Annotated[
         int,
         typer.Option(min=1, max=100, help='Times a step is tried that messages were missing in.'),

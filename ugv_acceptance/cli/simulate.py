@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.options import ConfigFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
 
 if TYPE_CHECKING:
@@ -33,10 +34,7 @@ def simulate(
             'may be given several times.'
         ),
     ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option('--config', '-c', help='YAML file, or the name of one that ships: packbot.'),
-    ] = None,
+    config: ConfigFile = None,
     listed: Annotated[
         bool, typer.Option('--list', help='Print scenarios and faults and end.')
     ] = False,

@@ -1,22 +1,21 @@
 """`ugv-acceptance speed`: prints the joint speeds up to which the static model holds."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from ugv_acceptance.cli.options import PayloadMass, RobotFile
 
 if TYPE_CHECKING:
     from ugv_acceptance.model.robot import Robot
 
 
 def speed(
-    config: Annotated[
-        Path | None, typer.Option('--config', '-c', help='YAML file of the robot, or its name.')
-    ] = None,
+    config: RobotFile = None,
     posture: Annotated[
         str, typer.Option(help='joint=30deg,... held while each joint turns; else all postures.')
     ] = '',
-    payload: Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')] = '',
+    payload: PayloadMass = '',
     reference: Annotated[
         float, typer.Option(help="The static model's own error, N m (rms): 1.0 as in the paper.")
     ] = 1.0,
