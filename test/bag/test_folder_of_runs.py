@@ -9,8 +9,10 @@ import pytest
 from bag.bag_cases import run, write_mcap
 
 from ugv_acceptance import BadBag
+from ugv_acceptance.bag.metadata import numbered
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.bag.writer import BagWriter
+from ugv_acceptance.cli.evaluate import recordings
 
 
 def write_runs(folder: Path, *names: str) -> Path:
@@ -50,6 +52,17 @@ def test_parts_without_metadata_are_one_recording(tmp_path: Path) -> None:
     for name in ('run_0.mcap', 'run_1.mcap'):
         write_mcap(tmp_path / name, run(20))
     assert len(open_bag(tmp_path).paths) == 2
+
+
+@pytest.mark.parametrize('number', ['²', '1²', '①', 'x', ''])
+def test_what_is_no_decimal_number_makes_no_part(number: str, tmp_path: Path) -> None:
+    """A name may hold any digit of any script: the file is a recording of its own."""
+    names = ['run_0.mcap', f'run_{number}.mcap']
+    assert sorted(numbered(names)) == [[name] for name in sorted(names)]
+    paths = [tmp_path / name for name in names]
+    for path in paths:
+        path.touch()
+    assert recordings(paths) == [[path] for path in paths]
 
 
 def test_a_run_one_folder_further_down_is_named(tmp_path: Path) -> None:

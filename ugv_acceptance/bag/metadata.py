@@ -89,15 +89,19 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
     return files, metadata, findings
 
 
+def part_of(name: str) -> tuple[str, int] | None:
+    """Return stem and number of a file's name where it may be a part: run_3.mcap is 3 of run."""
+    stem, _, number = name.partition('.')[0].rpartition('_')
+    return (stem, int(number)) if stem and number.isdecimal() else None
+
+
 def numbered(files: Sequence[str]) -> list[list[str]]:
     """Group files into recordings: names that differ only in _NUMBER are parts of one."""
     groups: dict[str, list[tuple[int, str]]] = {}
     for file in files:
-        stem, _, number = posixpath.basename(file).partition('.')[0].rpartition('_')
-        split = bool(stem) and number.isdigit()
-        groups.setdefault(stem + '/' if split else file, []).append(
-            (int(number) if split else 0, file)
-        )
+        part = part_of(posixpath.basename(file))
+        key, number = (f'{part[0]}/', part[1]) if part else (file, 0)
+        groups.setdefault(key, []).append((number, file))
     return [[file for _, file in sorted(group)] for group in groups.values()]
 
 

@@ -115,10 +115,11 @@ def worst(codes: list[int]) -> int:
 
 def recordings(paths: list[Path]) -> list[list[Path]]:
     """Return the paths that belong together: files of one folder that differ only in _NUMBER."""
+    from ugv_acceptance.bag.metadata import part_of
+
     groups: dict[tuple[Path, str], list[Path]] = {}
     for path in paths:
-        stem, _, number = path.name.partition('.')[0].rpartition('_')
-        part = path.is_file() and stem and number.isdigit()
-        key = (path.parent, stem) if part else (path, '')
+        part = part_of(path.name) if path.is_file() else None
+        key = (path.parent, part[0]) if part else (path, '')
         groups.setdefault(key, []).append(path)
     return list(groups.values())
