@@ -1,5 +1,7 @@
 """The console's list of alerts against what the monitor publishes."""
 
+import pytest
+
 from ugv_acceptance.console.alert_list import AlertBook
 from ugv_acceptance.console.snapshot import AlertRow
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR
@@ -74,3 +76,11 @@ def test_strange_messages_are_taken() -> None:
     book = AlertBook()
     book.take({'start_ns': 'x', 'level': '<b>'}, '')
     assert only(book).level == ERROR
+
+
+@pytest.mark.parametrize('odd', ['²', '--5', '9' * 30, '9' * 5_000, '1e9'])
+def test_a_time_that_is_none_is_taken_for_zero(odd: str) -> None:
+    """Digits that are no number, and numbers that are no time, do not end the page."""
+    book = AlertBook()
+    say(book, 'raised', 'active, not acknowledged', start_ns=odd)
+    assert only(book).start == 0

@@ -79,7 +79,7 @@ def test_without_the_topic_nothing_is_said(tmp_path: Path) -> None:
     assert result == {'alerts': [alert(2.0)]}
 
 
-@pytest.mark.parametrize('wrong', ['', 'soon', '-5', '1e9'])
+@pytest.mark.parametrize('wrong', ['', 'soon', '-5', '1e9', '²', '9' * 400, '9' * 5_000])
 def test_an_acknowledgement_without_a_time_is_left_out(tmp_path: Path, wrong: str) -> None:
     """An acknowledgement whose times are no numbers is left out."""
     odd = status(state='acknowledged', start_ns=START + 2 * S, time_ns=wrong)

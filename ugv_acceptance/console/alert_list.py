@@ -13,6 +13,8 @@ from ugv_acceptance.evaluation.alerts.alarms import State
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, Alert
 
 _STATES = {state.value: state for state in State}
+# Times (ns) have 64 bits; what is larger is none.
+MOST = 2**63
 
 
 @dataclass(slots=True)
@@ -83,4 +85,9 @@ def row_of(alert: Alert, text: str, advice: str) -> AlertRow:
 
 
 def _whole(text: str | None) -> int | None:
-    return int(text) if text and text.lstrip('-').isdigit() else None
+    """Return a whole number of 64 bits; None for any other text."""
+    try:
+        value = int(text or '')
+    except ValueError:
+        return None
+    return value if abs(value) < MOST else None

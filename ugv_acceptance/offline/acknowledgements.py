@@ -14,6 +14,8 @@ from ugv_acceptance.type_aliases import Json
 TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
 # The monitor dates alerts by its own clock: starts that differ by less (ns) belong to one alert.
 SAME = 500_000_000
+# Times (ns) have 64 bits; what is larger is none.
+MOST = 2**63
 
 
 def add_acknowledgements(result: Json, bag: Bag) -> None:
@@ -59,4 +61,7 @@ def _acknowledged(path: Path, topics: list[str]) -> Iterator[dict[str, str]]:
 
 
 def _dated(values: dict[str, str]) -> bool:
-    return all(values.get(key, '').isdigit() for key in ('time_ns', 'start_ns'))
+    try:
+        return all(0 <= int(values.get(key, '')) < MOST for key in ('time_ns', 'start_ns'))
+    except ValueError:
+        return False
