@@ -1,13 +1,14 @@
 """Which margins are the least at one moment: the side it tips to first, the joint most used."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from typing import SupportsFloat
 
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
 
-def least_tilt(angles: Iterable[float]) -> tuple[str, float]:
+def least_tilt(angles: Iterable[SupportsFloat]) -> tuple[str, float]:
     """Return the side to which least tilt is left, and how much (rad); ('', NaN): none is known.
 
     `angles` (rad) are those of SIDES: infinite where no edge lies, NaN where nothing is known.
@@ -17,21 +18,22 @@ def least_tilt(angles: Iterable[float]) -> tuple[str, float]:
     return min(known, key=lambda tilt: tilt[1], default=('', math.nan))
 
 
-def most_used(torque: Sequence[float], settings: Settings) -> tuple[str, float]:
+def most_used(torque: Iterable[SupportsFloat], settings: Settings) -> tuple[str, float]:
     """Return the joint that uses most of its limit, and its share; ('', NaN): none has a limit.
 
     `torque` (N m; N) is that of each joint; one that is not known does not count.
     """
-    joints = zip(settings.robot.joint_names, torque, settings.limits.torque, strict=True)
+    of = map(float, torque)
+    joints = zip(settings.robot.joint_names, of, settings.limits.torque, strict=True)
     uses = [
-        (name, abs(float(tau)) / limit)
+        (name, abs(tau) / limit)
         for name, tau, limit in joints
         if math.isfinite(limit) and math.isfinite(tau)
     ]
     return max(uses, key=lambda use: use[1], default=('', math.nan))
 
 
-def with_most_used(tilt: str, torque: Sequence[float], settings: Settings) -> str:
+def with_most_used(tilt: str, torque: Iterable[SupportsFloat], settings: Settings) -> str:
     """Return words on the tilt left, and behind them the joint that uses most of its limit."""
     joint, use = most_used(torque, settings)
     return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
