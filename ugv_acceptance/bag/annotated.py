@@ -18,7 +18,7 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
 from ugv_acceptance import BadBag, __version__
-from ugv_acceptance.bag.atomic_files import is_stream, unwritable, whole
+from ugv_acceptance.bag.atomic_files import is_stream, naming, whole
 from ugv_acceptance.bag.mcap_writer import McapWriter
 from ugv_acceptance.bag.raw import Logged, messages_of
 from ugv_acceptance.bag.reader import Bag
@@ -55,16 +55,13 @@ def write_annotated(
     chunk has a checksum. The file gets its name only when it is complete. Raises AcceptanceError if
     it cannot be written.
     """
-    try:
-        with whole(path) as file:
-            writer = McapWriter(file, f'ugv_acceptance {__version__}')
-            count = _write(writer, bag, types, said, progress)
-            writer.finish()
-            file.flush()
-            if not is_stream(path):
-                os.fsync(file.fileno())
-    except OSError as error:
-        raise unwritable(path, error.strerror) from None
+    with naming(path), whole(path) as file:
+        writer = McapWriter(file, f'ugv_acceptance {__version__}')
+        count = _write(writer, bag, types, said, progress)
+        writer.finish()
+        file.flush()
+        if not is_stream(path):
+            os.fsync(file.fileno())
     return count
 
 

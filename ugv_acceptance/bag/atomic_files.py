@@ -32,10 +32,16 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, completely or not at all; AcceptanceError if it cannot be written."""
+    """Write a file, whole or not at all."""
+    with naming(path), whole(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Say of an OSError of the block, such as a full disk, what was to be written."""
     try:
-        with whole(path) as file:
-            file.write(content)
+        yield
     except OSError as error:
         raise unwritable(path, error.strerror) from None
 
@@ -61,12 +67,10 @@ def whole(path: Path) -> Iterator[BinaryIO]:
         raise unwritable(path, error.strerror) from None
     try:
         yield file
-        try:
+        with naming(path):
             file.close()
             if part is not None:
                 part.replace(path)
-        except OSError as error:
-            raise unwritable(path, error.strerror) from None
     finally:
         with suppress(OSError):
             file.close()

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.atomic_files import unwritable, write_text
+from ugv_acceptance.bag.atomic_files import naming, write_text
 from ugv_acceptance.type_aliases import Json
 
 RUNS = 'runs'
@@ -13,11 +13,9 @@ _KEY = 64
 
 
 def prepare(folder: Path) -> None:
-    """Make the folder. Raises AcceptanceError where that is not possible."""
-    try:
+    """Make the folder. AcceptanceError where that cannot be."""
+    with naming(folder):
         (folder / RUNS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(folder, error.strerror) from None
 
 
 def known_keys(folder: Path) -> frozenset[str]:

@@ -75,12 +75,10 @@ def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
     """Write the page's folder; paper.json comes first, because it marks the folder as ours."""
     import json
 
-    from ugv_acceptance.bag.atomic_files import unwritable, write_text
+    from ugv_acceptance.bag.atomic_files import naming, write_text
 
-    try:
+    with naming(out):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise unwritable(out, error.strerror) from None
     text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     for name, content in {'paper.json': text + '\n', **files}.items():
         write_text(out / name, content)

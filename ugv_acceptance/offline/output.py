@@ -11,7 +11,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from ugv_acceptance import AcceptanceError, pip_install
-from ugv_acceptance.bag.atomic_files import unwritable, whole
+from ugv_acceptance.bag.atomic_files import naming, whole
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.offline.margins import (
@@ -52,7 +52,7 @@ class CsvSink:
     ) -> None:
         """Rename the temporary file to the path if the block succeeded, else delete it."""
         if self._file is not None and kind is None:
-            self._stack.callback(self._told, self._file.flush)
+            self._stack.callback(_written, self._path, self._file.flush)
         self._stack.__exit__(kind, error, trace)
 
     @property
@@ -71,14 +71,7 @@ class CsvSink:
                 f'{time:.9f},{stamp},{state},{",".join(map(_cell, cells))}\n'
                 for time, stamp, state, cells in lines
             )
-            self._told(lambda: file.writelines(text))
-
-    def _told(self, write: Callable[[], None]) -> None:
-        """Call `write`; an OSError, as of a full disk, becomes an error that names the file."""
-        try:
-            write()
-        except OSError as error:
-            raise unwritable(self._path or Path(), error.strerror) from None
+            _written(self._path, lambda: file.writelines(text))
 
 
 def _cell(number: Any) -> str:  # noqa: ANN401 - a float
@@ -118,7 +111,7 @@ class ParquetSink:
     ) -> None:
         """Rename the temporary file to the path if the block succeeded, else delete it."""
         if self._writer is not None:
-            self._stack.callback(self._told, self._writer.close)
+            self._stack.callback(_written, self._path, self._writer.close)
         self._stack.__exit__(kind, error, trace)
 
     @property
@@ -135,11 +128,9 @@ class ParquetSink:
         if self._writer is None:
             file = self._stack.enter_context(whole(self._path or Path()))
             self._writer = self._parquet.ParquetWriter(file, table.schema)
-        self._told(lambda: self._writer.write_table(table))
+        _written(self._path, lambda: self._writer.write_table(table))
 
-    def _told(self, write: Callable[[], None]) -> None:
-        """Call `write`; an OSError, as of a full disk, becomes an error that names the file."""
-        try:
-            write()
-        except OSError as error:
-            raise unwritable(self._path or Path(), error.strerror) from None
+
+def _written(path: Path | None, write: Callable[[], object]) -> None:
+    with naming(path or Path()):
+        write()
