@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Document, Path
@@ -18,7 +18,8 @@ from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Lim
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 
 T = TypeVar('T')
-# A robot lighter than this (kg) is a mistake of unit.
+M = TypeVar('M', bound=BaseModel)
+# Lighter robots are mistakes of unit.
 LEAST_MASS = 1e-6
 
 
@@ -40,10 +41,10 @@ class Build:
         self.warnings.append(f'{self.document.where(path)}: {text}')
 
 
-def file_from(document: Document) -> File:
+def checked(document: Document, model: type[M]) -> M:
     """Return the validated file; BadConfig with file, line and field of its first error."""
     try:
-        return File.model_validate(document.data)
+        return model.model_validate(document.data)
     except ValidationError as error:
         raise BadConfig(sentence_of(document, error)) from None
 

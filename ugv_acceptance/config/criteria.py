@@ -7,10 +7,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.build import sentence_of
+from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import Document, read_document
 from ugv_acceptance.config.schema import Name, NotNegative, Positive, Section
 from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
@@ -147,10 +147,7 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
     except OSError as error:
         raise BadConfig(f'{path}: expected a file of criteria, got: {error.strerror}') from None
     document = read_document(text, str(path))
-    try:
-        file = CriteriaFile.model_validate(document.data)
-    except ValidationError as error:
-        raise BadConfig(sentence_of(document, error)) from None
+    file = checked(document, CriteriaFile)
     if not file.criteria:
         raise BadConfig(f'{document.where(("criteria",))}: expected at least one criterion')
     criteria = tuple(

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.build import Build, file_from, settings_from
+from ugv_acceptance.config.build import Build, checked, settings_from
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.strength import worst_torques
 from ugv_acceptance.config.topics import Topics, topics_from
 from ugv_acceptance.config.urdf import read_urdf
@@ -61,7 +62,7 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
     at = find(DEFAULT if path is None else Path(path))
     yaml_bytes = _read(at, 'configuration')
     document = read_document(_text(yaml_bytes, at), str(at))
-    file = file_from(document)
+    file = checked(document, File)
     if urdf is None and file.urdf is None:
         raise BadConfig(f'{at}: urdf: expected the path of a URDF here or with --urdf, got none')
     urdf_at = _beside(at, str(file.urdf)) if urdf is None else Path(urdf)

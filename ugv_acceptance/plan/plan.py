@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.build import sentence_of
+from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.seal import sealed
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
@@ -159,10 +159,7 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
         got = error.strerror if isinstance(error, OSError) else error
         raise BadConfig(f'{path}: expected a plan, got: {got}') from None
     document = read_document(text, str(path))
-    try:
-        plan = Plan.model_validate(document.data)
-    except ValidationError as error:
-        raise BadConfig(sentence_of(document, error)) from None
+    plan = checked(document, Plan)
     for k, step in enumerate(plan.steps):
         for posture in (step.posture_deg, *step.via_deg, plan.home_deg):
             unknown = sorted(set(posture) - set(robot.joint_names)) if robot else []
