@@ -18,19 +18,15 @@ def _offset() -> int:
 
 
 class Clock(Protocol):
-    """What dates the receipt of messages."""
+    """Dates the receipt of messages; of a recording, it stands at a log time."""
 
     def now(self) -> int:
-        """Return the time of receipt of what is in hand now (ns)."""
+        """Return the time of receipt (ns since the epoch) of the message in hand."""
 
 
 @dataclass(slots=True)
 class ReceiptClock:
-    """A steady clock in ns since the epoch; `shift` (ns) converts header stamps to its time.
-
-    With `simulated` the shift follows `/clock`; before its first message, it is such that the first
-    header stamp equals the present.
-    """
+    """A steady clock in ns since the epoch: `offset` (ns) is added to that of the machine."""
 
     offset: int = field(default_factory=_offset)
 
@@ -41,9 +37,10 @@ class ReceiptClock:
 
 @dataclass(slots=True)
 class StampShift:
-    """Turns header stamps into receipt time by `shift` (ns), where they are `simulated`.
+    """Converts header stamps to receipt time by `shift` (ns), where they are `simulated`.
 
-    The shift follows `/clock`; until that came, the first stamp is taken for now.
+    The shift follows `/clock`; before its first message, it is such that the first header stamp
+    equals the present.
     """
 
     simulated: bool = False

@@ -74,7 +74,8 @@ class Session:
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
     stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
-    dates what comes in, `stamps` turns header stamps into its time.
+    dates what comes in, `stamps` converts header stamps to its time. `take_joint_state`, `take_imu`
+    and `take_payload` take a serialised message and never raise.
     """
 
     settings: Settings
