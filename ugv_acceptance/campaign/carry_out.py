@@ -1,11 +1,12 @@
 """Carries out a campaign: judges the runs that have no result yet, collects runs and failures."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.campaign import store
+from ugv_acceptance.bag.atomic_files import naming, write_text
 from ugv_acceptance.campaign.cluster import WAIT_S
 from ugv_acceptance.campaign.failure_log import Entry
 from ugv_acceptance.campaign.failures import Failure, with_log
@@ -20,6 +21,42 @@ from ugv_acceptance.campaign.run_table import (
 )
 from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Brief, Done, judge_source
+from ugv_acceptance.type_aliases import Json
+
+RUNS = 'runs'
+# Hexadecimal digits of a key.
+_KEY = 64
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make the folder. AcceptanceError where that cannot be."""
+    with naming(folder):
+        (folder / RUNS).mkdir(parents=True, exist_ok=True)
+
+
+def known_keys(folder: Path) -> frozenset[str]:
+    """Return the keys of the results in the folder."""
+    return frozenset(p.stem for p in (folder / RUNS).glob('*.json') if len(p.stem) == _KEY)
+
+
+def keep_result(folder: Path, key: str, text: str) -> None:
+    """Write the JSON of a run's result, complete or not at all."""
+    write_text(folder / RUNS / f'{key}.json', text)
+
+
+def read_result(folder: Path, key: str) -> Json:
+    """Return a run's result. Raises AcceptanceError where it is not as it was written."""
+    path = folder / RUNS / f'{key}.json'
+    try:
+        result = json.loads(path.read_text('utf-8'))
+        if not all(field in result for field in ('verdict', 'coverage', 'alerts', 'start_ns')):
+            raise AcceptanceError(f'{path}: expected a result of a run; remove it')
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise AcceptanceError(
+            f'{path}: expected a result of a run, got: {error}; remove it'
+        ) from None
+    found: Json = result
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +92,8 @@ def carry_out(
     A run with a result in the folder is not judged again; a run that could not be judged is tried
     again. `progress` is called with every run as it is ready.
     """
-    store.prepare(place.folder)
-    brief = replace(brief, known=store.known_keys(place.folder))
+    prepare_folder(place.folder)
+    brief = replace(brief, known=known_keys(place.folder))
     rows, effort = [], Effort()
     for done in judge_all(sources, brief, place.workers, place.scheduler, place.wait_s):
         rows.append(_row(done, brief, place.folder))
@@ -75,10 +112,10 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
     if done.error:
         return broken_row(name, done.error)
     if done.row is not None:
-        store.keep(folder, done.key, done.text)
+        keep_result(folder, done.key, done.text)
         return done.row
     try:
-        return row_of(name, done.key, store.read(folder, done.key))
+        return row_of(name, done.key, read_result(folder, done.key))
     except (AcceptanceError, LookupError, TypeError, ValueError, AttributeError):
         # A stored result that is damaged counts as missing.
         again = judge_source(done.source, replace(brief, known=frozenset()))
