@@ -104,15 +104,15 @@ def test_a_garbled_definition_spoils_no_other(tmp_path: Path, kind: int) -> None
     path = with_summary(write_mcap(tmp_path / 'run.mcap', WRITTEN), lambda _: None, garbled)
     bag, batches, _ = read(path)
     assert rows(batches) == expected(WRITTEN)
-    assert ['garbled record' in text for text in bag.findings] == [True]
+    assert ['damaged record' in text for text in bag.findings] == [True]
 
 
 @pytest.mark.parametrize(
     ('extra', 'finding'),
     [
-        (b'\x08' + GARBLED[1:], 'chunk index: garbled record'),
-        (b'\x0b' + GARBLED[1:], 'statistics: garbled record'),
-        (b'\x0c' + struct.pack('<Q', 1 << 40), 'its summary is cut off'),
+        (b'\x08' + GARBLED[1:], 'chunk index: damaged record'),
+        (b'\x0b' + GARBLED[1:], 'statistics: damaged record'),
+        (b'\x0c' + struct.pack('<Q', 1 << 40), 'its summary is truncated'),
     ],
 )
 def test_a_garbled_summary_is_scanned(tmp_path: Path, extra: bytes, finding: str) -> None:
@@ -200,7 +200,7 @@ def test_a_scan_says_where_the_records_of_a_chunk_break(tmp_path: Path) -> None:
     found = rows(batches)
     assert 0 < len(found) < len(WRITTEN)
     assert set(found) < set(expected(WRITTEN))
-    assert f'chunk at byte {start}: its records break at byte' in bag.findings[0]
+    assert f'chunk at byte {start}: damaged at byte' in bag.findings[0]
 
 
 def test_a_scan_passes_a_record_that_is_too_big(tmp_path: Path) -> None:
@@ -233,7 +233,7 @@ def test_findings_are_not_without_end(tmp_path: Path) -> None:
     _, batches, facts = read(path)
     assert rows(batches) == []
     # 300 chunks, and both topics of which the index counts more than was read.
-    assert facts.findings[-1] == 'and 102 more findings like these'
+    assert facts.findings[-1] == 'and 102 more findings of this kind'
     assert len(facts.findings) == 201
 
 

@@ -91,7 +91,9 @@ def test_a_renamed_recording_is_said_to_be_read(tmp_path: Path, storage: Storage
     bag, batches, _ = read(folder)
     assert rows(batches) == expected(messages)
     (finding,) = bag.findings
-    assert finding.endswith(f'lists {old.name!r}, not there; read in its place: {new.name}')
+    assert finding.endswith(
+        f'lists {old.name!r}, which does not exist; {new.name} was read instead'
+    )
 
 
 @pytest.mark.parametrize('parts', [1, 2])
@@ -115,7 +117,7 @@ def test_a_part_packed_or_unpacked_later_is_read(tmp_path: Path, parts: int, lis
     bag, batches, _ = read(folder)
     assert rows(batches) == expected(messages)
     assert not any('missing' in text or 'not read' in text for text in bag.findings)
-    assert any(f'file {name!r} is not there' in text for text in bag.findings)
+    assert any(f'file {name!r} does not exist' in text for text in bag.findings)
 
 
 def test_a_part_that_is_not_read_is_still_said_so(tmp_path: Path) -> None:
@@ -128,7 +130,7 @@ def test_a_part_that_is_not_read_is_still_said_so(tmp_path: Path) -> None:
     bag, batches, _ = read(folder)
     assert rows(batches) == expected(messages)
     assert "metadata.yaml: file 'part.mcap' is missing" in bag.findings
-    assert 'metadata.yaml does not list renamed.mcap: not read' in bag.findings
+    assert 'metadata.yaml does not list renamed.mcap: it was not read' in bag.findings
 
 
 @pytest.mark.parametrize('storage', [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
@@ -225,7 +227,7 @@ def test_files_that_metadata_does_not_list_are_told(tmp_path: Path) -> None:
     write_mcap(folder / 'other.mcap', run(3))
     bag, batches, _ = read(folder)
     assert rows(batches) == expected(messages)
-    assert bag.findings == ('metadata.yaml does not list other.mcap: not read',)
+    assert bag.findings == ('metadata.yaml does not list other.mcap: it was not read',)
 
 
 def test_the_total_of_metadata_is_compared(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_a_resumed_campaign_computes_nothing_again(fleet: Path, single: Path) ->
     """What was judged with the same hashes is taken from the folder, and says the same."""
     before = (single / 'campaign.json').read_bytes()
     _, text = campaign(single, fleet, '--workers', '1', '--require-mtbf', '96')
-    assert '0 of 6 judged anew' in text
+    assert '0 of 6 newly judged' in text
     assert (single / 'campaign.json').read_bytes() == before
 
 
@@ -87,7 +87,7 @@ def test_another_bag_or_criteria_is_computed(fleet: Path, tmp_path: Path) -> Non
     assert carry_out(both, brief(), out)[1].judged == 1
     criteria = tmp_path / 'criteria.yaml'
     code, text = campaign(tmp_path / 'out', fleet / 'good_a', '--criteria', written(criteria))
-    assert '1 of 1 judged anew' in text
+    assert '1 of 1 newly judged' in text
     assert code == 0
 
 

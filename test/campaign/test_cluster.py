@@ -166,7 +166,7 @@ def test_a_worker_that_does_not_see_a_path_breaks_no_run(
         'gone.mcap': 'BROKEN',
         'run_00': 'NOT_JUDGED',
     }
-    assert 'does not see this path' in rows[1].reasons[0]
+    assert 'cannot read this path' in rows[1].reasons[0]
 
 
 def test_a_log_may_tell_of_an_alert_of_a_run_not_judged() -> None:

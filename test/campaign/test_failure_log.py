@@ -124,7 +124,10 @@ def test_a_trend_is_drawn_as_its_power_law(rows: list[Row], tmp_path: Path) -> N
         ('{run: good_a, repair_h: -1}', 'repair_h: expected a number of 0 or more, got -1'),
         ('{run: good_a, at_s: soon}', "at_s: expected a number of 0 or more, got 'soon'"),
         ('{what: no run}', 'run: expected the name of a run, got none'),
-        ('{run: nowhere}', "run: expected one run of the campaign, got 'nowhere': no run ends so"),
+        (
+            '{run: nowhere}',
+            "run: expected one run of the campaign, got 'nowhere': no run name ends with it",
+        ),
         ('{run: good_a, alert: TIP_OVER}', 'alert: expected a critical alert of this run'),
         ('just words', 'expected fields of a failure, got str'),
     ],

@@ -120,8 +120,8 @@ def test_a_recording_that_breaks_off_is_no_pass(repository: Path, tmp_path: Path
     file.write_bytes(file.read_bytes()[:60_000])
     for place in (run, file):
         done = evaluate(place)
-        assert (done.returncode, 'the recording breaks off' in done.stdout) == (3, True)
-    assert '7374 messages that metadata.yaml tells of are missing' in evaluate(run).stdout
+        assert (done.returncode, 'the recording is truncated' in done.stdout) == (3, True)
+    assert '7374 messages counted in metadata.yaml are missing' in evaluate(run).stdout
 
 
 def test_a_recording_with_a_part_missing_is_no_pass(repository: Path, tmp_path: Path) -> None:
@@ -131,14 +131,14 @@ def test_a_recording_with_a_part_missing_is_no_pass(repository: Path, tmp_path: 
     (run / 'run_0.mcap').rename(run / 'packbot_pass_0.mcap')
     done = evaluate(run)
     assert done.returncode == 3
-    assert 'messages that metadata.yaml tells of are missing' in done.stdout
+    assert 'messages counted in metadata.yaml are missing' in done.stdout
 
 
 def test_less_than_a_second_is_no_pass(tmp_path: Path) -> None:
     """A recording shorter than 1 s does not pass: no silence could be noticed in it."""
     done = evaluate(write_run(tmp_path / 'run', seconds=0.9))
     assert done.returncode == 3
-    assert 'duration: 0.89 s; length of the recording at least 1 s' in done.stdout
+    assert 'duration: 0.89 s; length of the recording: at least 1 s' in done.stdout
 
 
 def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
     done = evaluate(write_run(tmp_path / 'run', names=['a', 'b', 'c', 'd']))
     assert done.returncode == 3
     assert '/joint_states: 150 messages' in done.stdout
-    assert 'none tells of a joint of this robot' in done.stdout
+    assert 'none contains a joint of this robot' in done.stdout
 
 
 def test_csv_has_one_row_a_message(tmp_path: Path) -> None:
@@ -236,7 +236,7 @@ def test_effort_of_a_foreign_recording_shows_its_payload(
         *(folder, '--config', repository / 'msg_configs' / 'abitobot.yaml'),
         *('--urdf', folder / 'robot.urdf', '--compare-effort', '--json', found),
     )
-    assert 'appears as their difference' in done.stdout
+    assert 'shows up as a difference' in done.stdout
     plateaus = json.loads(found.read_text())['effort']['arm_3_link_joint']
     grasped = [p for p in plateaus if 137.0 < p['measured'] < 137.4]
     assert [p['payload_kg_that_explains_it'] for p in grasped] == [pytest.approx(4.0, abs=0.01)]

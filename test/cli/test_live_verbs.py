@@ -33,7 +33,7 @@ def test_the_demo_shows_live_alerts_and_the_verdict(repository: Path) -> None:
     process = start('demo', '--rate', '3', '--bag', str(repository / 'bags' / 'packbot_fail'))
     text, errors = process.communicate(timeout=120)
     assert process.returncode == 0, text + errors
-    assert re.search(r'ERROR\s+raised: .* degrees of tilt left', text)
+    assert re.search(r'DANGER\s+raised: .* degrees of tilt left', text)
     assert 'FAIL is the right verdict' in text
 
 
@@ -45,7 +45,7 @@ def test_the_demo_played_fast_warns_neither_of_stamps_nor_of_the_load(repository
     assert process.returncode == 0, text + errors
     assert 'all margins kept' in text.partition('2. The same run')[0]
     assert 'raised: header stamps' not in text
-    assert 'were in the hand' not in text
+    assert 'suggest a payload' not in text
 
 
 def test_the_monitor_prints_lines_and_ends_when_asked() -> None:
@@ -53,7 +53,7 @@ def test_the_monitor_prints_lines_and_ends_when_asked() -> None:
     process = start('monitor', '--every', '1', '--ros-args', '-r', '__ns:=/alone')
     assert process.stdout
     first = process.stdout.readline()
-    assert 'STALE' in first
+    assert 'NO DATA' in first
     end = time.monotonic() + 60
     while 'no message from' not in process.stdout.readline():
         assert time.monotonic() < end

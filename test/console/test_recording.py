@@ -204,7 +204,7 @@ def test_no_alert_tells_what_is_yet_to_come(fail: ShownRecording, seconds: float
     known = fail.track.angle[: fail.track.row(when) + 1].min(initial=math.inf)
     for row in shown.alerts:
         assert row.start <= when
-        if row.code == 'TIP_OVER' and 'before it tips' in row.text:
+        if row.code == 'TIP_OVER' and 'before the robot tips' in row.text:
             said = float(row.text.split(' degrees')[0])
             assert said >= math.degrees(known) - 0.1
 

@@ -110,8 +110,8 @@ def test_a_robot_that_slides_before_it_tips_is_told() -> None:
     assert [a.rule.subject for a in raised(session, 'SLIDE')] == ['robot']
     assert not raised(session, 'TIP_OVER')
     said = verdict_of(session).message
-    assert 'the tracks slide before it tips: 1.7 degrees of slope left' in said
-    assert 'stop; go back to where the slope is less' in said
+    assert 'the tracks will slide before the robot tips: 1.7 degrees of slope left' in said
+    assert 'drive straight up or down the slope to where it is less steep' in said
 
 
 def test_a_robot_that_tips_before_it_slides_is_not_told_of_sliding() -> None:
@@ -138,8 +138,8 @@ def test_a_load_that_the_motors_feel_is_offered() -> None:
     alert = next(a for a in session.active if a.rule.code == 'PAYLOAD_DIFFERS')
     assert alert.peak == pytest.approx(2.0, abs=0.01)
     words = session.faults.sentence(alert, session.settings)
-    assert words == 'the motors work as if 6.0 kg were in the hand, 4.0 kg are declared'
-    assert 'declare the load' in session.advisory.do(alert)
+    assert words == 'measured efforts suggest a payload of 6.0 kg, but 4.0 kg is declared'
+    assert 'declare the payload' in session.advisory.do(alert)
     assert verdict_of(session).values['payload_estimate_kg'] == pytest.approx(6.0, abs=0.01)
 
 
@@ -172,7 +172,7 @@ def test_a_tilt_that_grows_fast_is_urgent() -> None:
     wait_until(lambda: session.advisory.urgent(session.clock.now()), lean)
     verdict = verdict_of(session)
     assert verdict.values['tip_of'] == 'front'
-    assert 'it tips to the front in' in verdict.message
+    assert 'the robot tips to the front in' in verdict.message
 
 
 def message(name: str, /, **values: str) -> DiagnosticStatus:

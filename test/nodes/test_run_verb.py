@@ -151,7 +151,7 @@ def test_an_alert_that_is_not_expected_freezes_the_robot(tmp_path: Path) -> None
     result = json.loads((out / 'result.json').read_text())
     assert code == 1, text
     assert 'STOP' in text
-    assert result['steps'][0]['reasons'][0].startswith('stopped: ERROR TIP_OVER left')
+    assert result['steps'][0]['reasons'][0].startswith('stopped: DANGER TIP_OVER left')
 
 
 @pytest.mark.skipif(not Path('/proc/self').exists(), reason='reads processes from /proc')

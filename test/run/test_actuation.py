@@ -56,7 +56,7 @@ def test_an_operator_who_does_as_told_passes(tmp_path: Path) -> None:
     """He is told what to set up and where to bring the arm; the joint states show that he did."""
     person = Person()
     (result,) = results(of_person(tmp_path / 'out', person, {'preparation': ['level ground']}))
-    assert (result['verdict'], result['reasons']) == ('PASS', ['every alert as expected'])
+    assert (result['verdict'], result['reasons']) == ('PASS', ['all alerts as expected'])
     assert person.asked[0].startswith('stand the robot on its tracks')
     assert 's0: set up: level ground' in person.asked
     assert person.asked[-1].startswith('s0: bring the arm to ')
@@ -98,7 +98,7 @@ def test_what_would_pass_a_limit_is_not_asked_of_a_person(tmp_path: Path) -> Non
     person = Person()
     (result,) = results(of_person(tmp_path / 'out', person, {'where': 'simulation'}))
     assert (result['verdict'], person.asked) == ('SKIPPED', [])
-    assert result['reasons'] == ['would pass a limit: in simulation only']
+    assert result['reasons'] == ['would exceed a limit: in simulation only']
 
 
 def test_what_is_not_asked_of_a_robot_does_not_count_against_it(tmp_path: Path) -> None:
@@ -108,7 +108,9 @@ def test_what_is_not_asked_of_a_robot_does_not_count_against_it(tmp_path: Path) 
     whole = runner.folder.finish(CONFIG, coverage_of(CONFIG, []))
     assert (whole['verdict'], whole['asked']) == ('PASS', 1)
     report = (tmp_path / 'out' / 'report.txt').read_text()
-    assert '2 steps: 1 SKIPPED, 1 PASS; 1 would pass a limit, for the simulation only' in report
+    assert (
+        '2 steps: 1 SKIPPED, 1 PASS; 1 would exceed a limit and are for simulation only' in report
+    )
 
 
 def test_a_plan_that_asks_nothing_of_a_robot_shows_nothing(tmp_path: Path) -> None:
@@ -183,5 +185,8 @@ def test_a_monitor_that_falls_silent_ends_the_run(tmp_path: Path) -> None:
     """No step is begun that nobody would watch, and the run says why it is over."""
     runner = without_monitor(tmp_path / 'out')
     (result,) = results(runner)
-    assert (result['verdict'], result['reasons']) == ('INCONCLUSIVE', ['the monitor says nothing'])
-    assert runner.over == 'the monitor says nothing'
+    assert (result['verdict'], result['reasons']) == (
+        'INCONCLUSIVE',
+        ['the monitor publishes nothing'],
+    )
+    assert runner.over == 'the monitor publishes nothing'

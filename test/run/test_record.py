@@ -130,7 +130,7 @@ def test_a_fault_is_told_or_known_to_be_hidden(tmp_path: Path, kind: str) -> Non
     ('text', 'said'),
     [
         ('gravity', 'expected one of dropped, late'),
-        ('nan:shoulder_joint', 'expected joint_states, imu behind the colon'),
+        ('nan:shoulder_joint', 'expected joint_states, imu after the colon'),
         ('frozen-encoder', 'expected turret_joint, shoulder_joint'),
         ('effort-missing:imu', 'expected no subject'),
         ('dropped=2', 'expected an amount from 0 to 1, got 2'),

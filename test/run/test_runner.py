@@ -58,7 +58,7 @@ def test_an_alarm_that_is_not_expected_stops_the_fall(tmp_path: Path) -> None:
     unexpected = {**TIPS, 'alerts': {'must_not': ['ERROR TIP_OVER']}}
     (result,) = results(runner_of(tmp_path / 'out', plan_of(unexpected)))
     assert result['verdict'] == 'FAIL'
-    assert result['reasons'][0].startswith('stopped: ERROR TIP_OVER left')
+    assert result['reasons'][0].startswith('stopped: DANGER TIP_OVER left')
     path = tmp_path / 'out' / 'steps' / 's0'
     time, q, _, tilt = seen_in(path, CONFIG).joined()
     after = (time - open_bag(path).start_ns) / 1e9 > result['window_s'][2] + 0.5
@@ -99,7 +99,7 @@ def test_messages_that_never_come_back_show_nothing(tmp_path: Path) -> None:
     """After the last attempt without messages a step is INCONCLUSIVE, with the reason."""
     (result,) = results(runner_of(tmp_path / 'out', plan_of({}), 'dead:imu@1.5'))
     assert result['verdict'] == 'INCONCLUSIVE'
-    assert 'STALE INPUT_STALE imu' in result['reasons'][0]
+    assert 'NO DATA INPUT_STALE imu' in result['reasons'][0]
 
 
 def test_a_posture_that_is_not_reached_fails(tmp_path: Path) -> None:

@@ -145,7 +145,7 @@ def test_a_run_killed_while_it_made_its_folder_is_begun_anew(tmp_path: Path) -> 
     (out / 'plan.yaml').write_text('half of a pl')
     opened(out, tmp_path / 'plan.yaml', resume=True)
     assert read_plan(out / 'plan.yaml') == PLAN
-    with pytest.raises(BadConfig, match='--resume continues'):
+    with pytest.raises(BadConfig, match='use --resume to continue'):
         opened(out, tmp_path / 'plan.yaml')
 
 
@@ -162,7 +162,7 @@ def test_the_journal_tells_what_began_and_what_came_of_it(tmp_path: Path) -> Non
 def test_a_run_is_continued_only_when_asked(tmp_path: Path) -> None:
     """A folder with a run in it is never written over."""
     opened(tmp_path / 'out', tmp_path / 'plan.yaml')
-    with pytest.raises(BadConfig, match='--resume continues'):
+    with pytest.raises(BadConfig, match='use --resume to continue'):
         opened(tmp_path / 'out', tmp_path / 'plan.yaml')
     opened(tmp_path / 'out', tmp_path / 'plan.yaml', resume=True)
 

@@ -60,7 +60,7 @@ def chunk_head(head: bytes) -> ChunkHead:
         compression = head[_HEAD.size : _HEAD.size + text].decode('ascii')
         (packed,) = struct.unpack_from('<Q', head, _HEAD.size + text)
     except (struct.error, UnicodeDecodeError) as error:
-        raise BadBag('expected the head of a chunk, which is cut off or garbled') from error
+        raise BadBag('expected the header of a chunk, which is truncated or damaged') from error
     data = _HEAD.size + text + 8
     if opcode != CHUNK or data + packed > length + 9:
         raise BadBag(f'expected a chunk of {data + packed} bytes, got record {opcode} of {length}')

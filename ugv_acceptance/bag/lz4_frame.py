@@ -70,7 +70,7 @@ class Lz4:
             if got == len(out):
                 return got + 1
             if not here.value and not there.value:
-                raise _broken('cut off')
+                raise _broken('truncated')
 
 
 def unpack_whole(source: memoryview, target: memoryview) -> int:
@@ -81,7 +81,7 @@ def unpack_whole(source: memoryview, target: memoryview) -> int:
     except (RuntimeError, ValueError, EOFError) as error:
         raise _broken(str(error)) from error
     if len(data) <= len(target) and not unpacker.eof:
-        raise _broken('cut off')
+        raise _broken('truncated')
     target[: len(data)] = data[: len(target)]
     return len(data)
 

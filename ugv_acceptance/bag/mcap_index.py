@@ -88,7 +88,7 @@ def parse(read: Callable[[ReadDataStream], Record], content: bytes, what: str) -
     try:
         return read(ReadDataStream(BytesIO(content)))
     except (McapError, struct.error, ValueError, KeyError) as error:
-        raise BadBag(f'{what}: garbled record ({error!r})') from error
+        raise BadBag(f'{what}: damaged record ({error!r})') from error
 
 
 def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int, bytes]]) -> None:
@@ -133,7 +133,7 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
         opcode, length = summary[pos], int.from_bytes(summary[pos + 1 : pos + 9], 'little')
         content = summary[pos + 9 : pos + 9 + length]
         if len(content) < length:
-            raise BadBag('its summary is cut off')
+            raise BadBag('its summary is truncated')
         if opcode in (3, 4):
             define(index, schemas, [(opcode, content)])
         elif opcode == 8:
@@ -149,7 +149,7 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
 def _summary(file: BinaryIO, size: int) -> bytes:
     footer = pread(file, max(size - _FOOTER_BYTES, 0), _FOOTER_BYTES)
     if size < len(MAGIC) + _FOOTER_BYTES or footer[-8:] != MAGIC or footer[0] != 2:
-        raise BadBag('it does not end as a closed MCAP file does')
+        raise BadBag('it has no closing MCAP records')
     start, _, crc = struct.unpack_from('<QQI', footer, 9)
     length = size - _FOOTER_BYTES - start
     if not start:
@@ -171,9 +171,9 @@ def _check(
     counts = {c: n for c, n in statistics.channel_message_counts.items() if n}
     missing = sorted(set(counts) - set(index.channels))
     if missing:
-        raise NoIndex(f'its summary does not say what channels {missing} are')
+        raise NoIndex(f'its summary does not describe channels {missing}')
     if any(index.channels[c].type == UNKNOWN for c in counts):
-        raise NoIndex('its summary does not say what types its channels have')
+        raise NoIndex('its summary does not name the types of its channels')
     if statistics.message_count and not counts:
         raise NoIndex('its statistics do not count by channel')
     if not chunks and statistics.message_count:

@@ -133,8 +133,8 @@ class McapSource:
         walked = walk(records.data[LEAD : LEAD + size])
         if not walked.whole:
             work.findings.append(
-                f'{what} messages lost: no message where its index says, '
-                f'and its records break at byte {walked.stop} of {size}'
+                f'{what} messages lost: its index is wrong, '
+                f'and its records are damaged at byte {walked.stop} of {size}'
             )
             return by_index
         work.findings.append(

@@ -155,14 +155,14 @@ def _listed(
             files.append(file)
         elif other in present and other.name not in listed:
             files.append(other)
-            findings.append(f'{NAME}: file {name!r} is not there, {other.name} was read')
+            findings.append(f'{NAME}: file {name!r} does not exist, {other.name} was read instead')
         else:
             missing.append(name)
     unlisted = ', '.join(p.name for p in present if p not in files)
     if missing and not files and unlisted:
         gone = ', '.join(map(repr, missing))
-        return [], [f'{NAME} lists {gone}, not there; read in its place: {unlisted}']
+        return [], [f'{NAME} lists {gone}, which does not exist; {unlisted} was read instead']
     findings += [f'{NAME}: file {name!r} is missing' for name in missing]
     if names and unlisted:
-        findings.append(f'{NAME} does not list {unlisted}: not read')
+        findings.append(f'{NAME} does not list {unlisted}: it was not read')
     return files, findings

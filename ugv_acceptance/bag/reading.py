@@ -182,7 +182,7 @@ class Reading(Iterator[Batch]):
         findings = list(dict.fromkeys(total.findings))
         if len(findings) > _MAX_FINDINGS:
             more = len(findings) - _MAX_FINDINGS
-            findings = [*findings[:_MAX_FINDINGS], f'and {more} more findings like these']
+            findings = [*findings[:_MAX_FINDINGS], f'and {more} more findings of this kind']
         return Facts(
             dict(total.counts),
             dict(total.malformed),
@@ -221,7 +221,7 @@ class Reading(Iterator[Batch]):
             )
         if self._sequencer.late:
             self._total.findings.append(
-                f'{self._sequencer.late} messages dropped: logged earlier than their chunk says'
+                f'{self._sequencer.late} messages dropped: logged before the start of their chunk'
             )
         self._complete = True
 

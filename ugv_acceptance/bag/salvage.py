@@ -65,10 +65,10 @@ class _Scan:
             pos = after
         if not self.ended:
             held = sum(self.index.counts.values())
-            how = 'ends without its closing records' if pos >= self.size else 'breaks'
+            how = 'is truncated' if pos >= self.size else 'is damaged or truncated'
             self.index.salvaged = (
                 f'the file {how} at byte {pos} of {self.size}: '
-                f'the {held} messages before that were kept'
+                f'the {held} messages before that are used'
             )
         return self.index
 
@@ -82,7 +82,7 @@ class _Scan:
             length = int.from_bytes(head[1:9], 'little')
             if len(head) < 9 or pos + 9 + length > self.size:
                 return None
-            self.index.findings.append(f'{at} not read: its head is garbled')
+            self.index.findings.append(f'{at} not read: its header is damaged')
             return pos + 9 + length
         if pos + parsed.length > self.size:
             return None
@@ -100,8 +100,8 @@ class _Scan:
         walked = walk(records.data)
         if not walked.whole:
             self.index.findings.append(
-                f'{at}: its records break at byte {walked.stop} of {parsed.size}, '
-                'what lies behind is lost'
+                f'{at}: damaged at byte {walked.stop} of {parsed.size}, '
+                'the records after it are lost'
             )
         times = self._take(records, walked)
         if walked.messages:

@@ -50,10 +50,10 @@ def read_result(folder: Path, key: str) -> Json:
     try:
         result = json.loads(path.read_text('utf-8'))
         if not all(field in result for field in ('verdict', 'coverage', 'alerts', 'start_ns')):
-            raise AcceptanceError(f'{path}: expected a result of a run; remove it')
+            raise AcceptanceError(f'{path}: expected a result of a run; remove that file')
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise AcceptanceError(
-            f'{path}: expected a result of a run, got: {error}; remove it'
+            f'{path}: expected a result of a run, got: {error}; remove that file'
         ) from None
     found: Json = result
     return found

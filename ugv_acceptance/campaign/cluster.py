@@ -182,7 +182,7 @@ class _GivenOut:
         left = []
         for run in given.runs:
             if self.faults[run] >= _FAULTS or self.losses[run] >= _LOSSES:
-                self.ended.append(Done(run, lost=f'{why}; given out {self.losses[run]} times'))
+                self.ended.append(Done(run, lost=f'{why}; tried {self.losses[run]} times'))
             else:
                 left.append(run)
         if suspect or given.alone:
@@ -234,7 +234,7 @@ class _GivenOut:
         given = self.given.get(key)
         if given is None:
             return []
-        why, blamed = 'what became of it was lost with its worker', False
+        why, blamed = 'its result was lost with its worker', False
         try:
             if given.future.status == 'finished':
                 found: list[Done] = given.future.result(timeout=_FETCH_S)
@@ -244,7 +244,7 @@ class _GivenOut:
             if given.future.status == 'error':
                 error = given.future.exception(timeout=_FETCH_S)
                 killed = isinstance(error, self.distributed.KilledWorker)
-                why = DIED if killed else f'its worker could not: {words(error)}'
+                why = DIED if killed else f'its worker failed: {words(error)}'
                 blamed = not killed or self.only(given.worker)
             else:
                 # Cancelled: mostly since the scheduler is another one.
@@ -262,7 +262,7 @@ class _GivenOut:
 def _seen_here(done: Done) -> Done:
     """Return a run's outcome; not judged if its worker lacks files that exist here."""
     if done.missing and all(Path(file).exists() for file in done.source.files):
-        why = 'its worker does not see this path, which is here'
+        why = 'its worker cannot read this path, this machine can'
         return replace(done, error='', lost=f'{why}: {done.error}')
     return done
 

@@ -65,7 +65,7 @@ class Entry:
             {run for name, run in runs.items() if _parts(name)[-len(wanted) :] == wanted}
         )
         if len(found) != 1:
-            much = f'{len(found)} runs end so' if found else 'no run ends so'
+            much = f'{len(found)} run names end with it' if found else 'no run name ends with it'
             raise self.wrong('run', f'one run of the campaign, got {self.run!r}: {much}')
         return found[0]
 

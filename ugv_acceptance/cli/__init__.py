@@ -49,7 +49,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 app = typer.Typer(
     name='ugv-acceptance',
     help='Acceptance monitoring of unmanned ground vehicles: torque and tip-over margins.',
-    epilog='Exit codes: 0 pass, 1 fail, 2 bad input, 3 inconclusive, 130 or 143 broken off.',
+    epilog='Exit codes: 0 pass, 1 fail, 2 bad input, 3 inconclusive, 130 or 143 interrupted.',
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )

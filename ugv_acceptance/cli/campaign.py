@@ -66,13 +66,13 @@ def lines(said: Json) -> list[tuple[str, str]]:
         ),
     ]
     if said['no_statement']:
-        again = 'the same command again judges what is missing'
+        again = 'run the same command again to judge the missing runs'
         return [*found, ('statement', f'{said["no_statement"]}; {again}')]
     found += [
         ('MTBF', mtbf_text(said['mtbf_h'], share)),
         (
             'success',
-            f'{interval_percent(said["success"])} at {share} (what is unclear is no success)',
+            f'{interval_percent(said["success"])} at {share} (only PASS counts as success)',
         ),
         ('trend', trend_text(said['trend'])),
     ]
@@ -160,7 +160,7 @@ def _group_text(group: Json) -> str:
 def print_effort(effort: 'Effort', runs: int, seconds: float) -> None:
     """Print how fast the runs were judged, and how many already had a result."""
     rate = 3600.0 / max(seconds, 1e-9)
-    text = f'    {effort.judged} of {runs} judged anew in {seconds:.1f} s'
+    text = f'    {effort.judged} of {runs} newly judged in {seconds:.1f} s'
     if effort.judged:
         text += f': {effort.judged * rate:.0f} bags/h, {effort.size / 1e9 * rate:.2f} GB/h'
     Console(highlight=False).print(text, soft_wrap=True)
@@ -172,7 +172,9 @@ EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 def campaign(
     places: Annotated[
         list[str],
-        typer.Argument(metavar='DIR|URL...', help='Folders, recordings, URLs that fsspec knows.'),
+        typer.Argument(
+            metavar='DIR|URL...', help='Folders, recordings, or URLs (those that fsspec supports).'
+        ),
     ],
     out: Annotated[
         Path, typer.Option('--out', '-o', help='Folder of results; run again to resume.')
@@ -181,26 +183,30 @@ def campaign(
     urdf: UrdfFile = None,
     criteria: CriteriaFile = None,
     failures: Annotated[
-        Path | None, typer.Option(help='Failure log a person wrote, YAML or CSV.')
+        Path | None, typer.Option(help='Failure log written by a person, YAML or CSV.')
     ] = None,
     confidence: Annotated[
-        float, typer.Option(min=0.5, max=0.999, help='Of bounds, tests and demonstrations.')
+        float,
+        typer.Option(
+            min=0.5, max=0.999, help='Confidence level of bounds, tests and demonstrations.'
+        ),
     ] = 0.8,
     require_mtbf: Annotated[
         float | None, typer.Option(help='MTBF (h) to demonstrate; decides the exit code.')
     ] = None,
     ended_by_failure: Annotated[
-        bool, typer.Option('--ended-by-failure', help='It was planned to end with a failure.')
+        bool,
+        typer.Option('--ended-by-failure', help='The campaign was planned to end with a failure.'),
     ] = False,
     compare: Annotated[
         list[str] | None,
-        typer.Option(help='NAME=PATTERN of runs, given twice: two robots, two firmwares.'),
+        typer.Option(help='NAME=PATTERN, given twice: two groups of runs to compare.'),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, help='Processes; all cores if left out.')
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(help='Address of a dask.distributed scheduler to work instead.')
+        str | None, typer.Option(help='Address of a dask.distributed scheduler to use instead.')
     ] = None,
     cluster_wait: Annotated[
         float,
@@ -210,12 +216,12 @@ def campaign(
 ) -> None:
     """Judge many runs and state what they show: MTBF, availability, success, trend.
 
-    Writes campaign.json, campaign.html and a result a run into --out. A run that is INCONCLUSIVE
-    or cannot be read is counted, never dropped. While a run was not judged (a worker died, a
-    scheduler or a network is gone) nothing is stated and the exit code is 3: the same command
-    again judges what is missing. With --require-mtbf the exit code is 0 where it is demonstrated,
-    1 where it is excluded, 3 where neither; else 0 where every run passed, 1 where one failed, 2
-    where one could not be read, 3 where one is inconclusive.
+    Writes campaign.json, campaign.html and one result for each run into --out. A run that is
+    INCONCLUSIVE or cannot be read is counted, never dropped. While a run was not judged (a worker
+    died, a scheduler or a network is gone) nothing is stated and the exit code is 3: run the same
+    command again to judge the missing runs. With --require-mtbf the exit code is 0 if the MTBF is
+    demonstrated, 1 if it is excluded, 3 otherwise; without it 0 if every run passed, 1 if one
+    failed, 2 if one could not be read, 3 if one is inconclusive.
 
     \b
     Examples:

@@ -122,14 +122,16 @@ def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
 
 def conclude(console: Console, seen: 'Raised', played: bool, result: dict[str, Any]) -> int:
     """Print the results of the live run and of the evaluation; return the exit code."""
-    console.rule('3. What came of it')
+    from ugv_acceptance.evaluation.alerts.messages import level_words
+
+    console.rule('3. The result')
     recorded = Counter((a['code'], a['subject'], a['level']) for a in result['alerts'])
     both, only_live, only_bag = seen & recorded, seen - recorded, recorded - seen
-    console.print(f'{both.total()} alerts came both live and from the recording.')
+    console.print(f'{both.total()} alerts were raised both live and from the recording.')
     for name, extra in (('live', only_live), ('from the recording', only_bag)):
         for code, subject, level in extra:
             why = ' (before it began and after it ended)' if code == 'INPUT_STALE' else ''
-            console.print(f'only {name}: {level} {code} {subject}{why}')
+            console.print(f'only {name}: {level_words(level)} {code} {subject}{why}')
     verdict = result['verdict']
     console.print(f'The verdict on the recording is [bold]{verdict}[/].')
     if verdict == 'FAIL' and Path(result['bag']['path'][0]).name.startswith(BAG):

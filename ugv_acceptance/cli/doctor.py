@@ -58,7 +58,7 @@ def doctor(
 ) -> None:
     """Check a set-up: ROS, topics, rates, QoS, joint names, IMU. One line each, with advice.
 
-    Let the robot stand still meanwhile. The exit code is 0 where all is OK or a warning, else 1.
+    Let the robot stand still meanwhile. The exit code is 0 if no check fails, else 1.
 
     \b
     Examples:

@@ -31,7 +31,9 @@ def evaluate(
     ] = None,
     compare_effort: Annotated[
         bool,
-        typer.Option('--compare-effort', help='Measured effort beside static torque at rest.'),
+        typer.Option(
+            '--compare-effort', help='Compare measured effort with static torque at rest.'
+        ),
     ] = False,
     criteria: CriteriaFile = None,
     init_criteria: Annotated[
@@ -39,7 +41,7 @@ def evaluate(
     ] = None,
     identity: Annotated[
         str | None,
-        typer.Option(help='operator=..,robot_serial=..,place=.. or a YAML file, for the report.'),
+        typer.Option(help='For the report: operator=..,robot_serial=..,place=.. or a YAML file.'),
     ] = None,
     report: Annotated[
         Path | None, typer.Option(help='Write a report to sign, one HTML file.')

@@ -21,29 +21,38 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
         typer.Option(help='File to write: .svg, .png, .csv or .npz; may be given again.'),
     ] = None,
     config: RobotFile = None,
-    x: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:180deg.')] = 'shoulder_joint',
-    y: Annotated[str, typer.Option(help='JOINT or JOINT=0deg:360deg.')] = 'elbow_joint',
-    posture: Annotated[str, typer.Option(help='joint=30deg,... of the joints not mapped.')] = '',
+    x: Annotated[
+        str, typer.Option(help='Joint of the horizontal axis: JOINT or JOINT=0deg:180deg.')
+    ] = 'shoulder_joint',
+    y: Annotated[
+        str, typer.Option(help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg.')
+    ] = 'elbow_joint',
+    posture: Annotated[str, typer.Option(help='Posture of the other joints: joint=30deg,...')] = '',
     orientation: Annotated[
-        str, typer.Option(help='level, right, left, nose-up, nose-down, nose-up-right, ...')
+        str,
+        typer.Option(
+            help='How the ground lies: level, right, left, nose-up, nose-down, nose-up-right, ...'
+        ),
     ] = 'level',
     slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',
     payload: PayloadMass = '',
     limit: Annotated[
-        str, typer.Option(help='joint="50 N m",... in place of configured limits.')
+        str, typer.Option(help='Torque limits instead of the configured ones: joint="50 N m",...')
     ] = '',
     caution: Annotated[
         str, typer.Option(help='Caution from here on: 80 (% of torque), 10deg, 4 (kg), 50 (N).')
     ] = '',
     failure: Annotated[str, typer.Option(help='Failure from here on: 100, 0deg, 2, 25.')] = '',
-    friction: Annotated[float, typer.Option(help='Of the tracks on the ground, for drag.')] = 0.7,
+    friction: Annotated[
+        float, typer.Option(help='Friction coefficient of the tracks on the ground, for drag.')
+    ] = 0.7,
     steps: Annotated[int, typer.Option(min=2, max=5001, help='Cells along each axis.')] = 361,
     from_bag: Annotated[
         list[Path] | None, typer.Option(help='Recorded run to draw over the map; may be split.')
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Map two joints: torque used, tilt left, payload or pull; at rest, on rigid ground.
+    """Draw a map over two joints: torque, tilt left, payload or pull; at rest, on rigid ground.
 
     \b
     Examples:

@@ -162,14 +162,19 @@ def _numbers(values: list[float]) -> list[str]:
 def model(
     config: ConfigFile = None,
     urdf: UrdfFile = None,
-    posture: Annotated[str, typer.Option(help='joint=30deg,...; joints left out are at 0.')] = '',
+    posture: Annotated[
+        str, typer.Option(help='Posture: joint=30deg,...; joints left out are at 0.')
+    ] = '',
     tilt: Annotated[
-        str, typer.Option(help='roll=10deg,pitch=5deg; positive pitch lowers the front.')
+        str,
+        typer.Option(
+            help='Tilt of the base: roll=10deg,pitch=5deg; positive pitch lowers the front.'
+        ),
     ] = '',
     payload: PayloadMass = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
-    """Print what the tool believes the robot is, and its margins in one posture.
+    """Print the robot as configured, and its margins in one posture.
 
     Links, masses, joints, limits, contact points, support polygon, tilt left to each side.
 

@@ -16,6 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
+from ugv_acceptance.evaluation.alerts.messages import level_words
 
 if TYPE_CHECKING:
     from ugv_acceptance.monitoring.diagnostics import Status
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 # How often each alert was raised, by code, subject and level.
 Raised = Counter[tuple[str, str, str]]
 
-LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 COLOURS = ('bold green', 'bold yellow', 'bold red', 'bold magenta')
 # Lines of alerts that stay in sight under the table.
 _SHOWN = 8
@@ -103,7 +103,7 @@ def count(raised: Raised, status: 'Status') -> None:
 
 def mark(level: int) -> str:
     """Return a level as coloured text of fixed width, readable without colour too."""
-    return f'[{COLOURS[level]}]{LEVELS[level]:<5}[/]'
+    return f'[{COLOURS[level]}]{level_words(level):<7}[/]'
 
 
 def table_of(monitor: 'Monitor') -> Table:
@@ -169,7 +169,9 @@ def monitor(
     every: Annotated[
         float, typer.Option(help='Seconds between lines where the output is no terminal.')
     ] = 5.0,
-    plain: Annotated[bool, typer.Option('--plain', help='Lines, also on a terminal.')] = False,
+    plain: Annotated[
+        bool, typer.Option('--plain', help='Print lines, even on a terminal.')
+    ] = False,
 ) -> None:
     """Watch a robot: margins, verdict and alerts as they come. Ctrl-C ends.
 

@@ -32,6 +32,6 @@ def ros_arguments(context: typer.Context) -> list[str]:
     """Return the arguments for ROS; a usage error for any that is not after --ros-args."""
     if context.args and context.args[0] != '--ros-args':
         raise typer.BadParameter(
-            f'got {context.args[0]!r}, which is no option; what is for ROS stands behind --ros-args'
+            f'{context.args[0]!r} is not an option; arguments for ROS come after --ros-args'
         )
     return list(context.args)

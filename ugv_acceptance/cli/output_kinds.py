@@ -157,25 +157,29 @@ _YAML = ('.yaml', '.yml')
 _HTML = ('.html', '.htm')
 _PAGE = rb'\s*<!DOCTYPE html>.*<title>%s: '
 
-RESULT = Kind('JSON', ('.json',), _is_result, 'and is no result of evaluate')
-MARGINS = Kind('CSV', ('.csv',), _starts(rb'time_s,stamp_ns,state,'), 'and is no table of margins')
-PARQUET = Kind('Parquet', ('.parquet',), _is_parquet, 'and is no table of margins')
-REPORT = Kind('HTML', _HTML, _starts(_PAGE % b'Acceptance report'), 'and is no acceptance report')
-PDF = Kind('PDF', ('.pdf',), _is_pdf, 'and is no acceptance report')
+RESULT = Kind('JSON', ('.json',), _is_result, 'and is not a result of evaluate')
+MARGINS = Kind(
+    'CSV', ('.csv',), _starts(rb'time_s,stamp_ns,state,'), 'and is not a table of margins'
+)
+PARQUET = Kind('Parquet', ('.parquet',), _is_parquet, 'and is not a table of margins')
+REPORT = Kind(
+    'HTML', _HTML, _starts(_PAGE % b'Acceptance report'), 'and is not an acceptance report'
+)
+PDF = Kind('PDF', ('.pdf',), _is_pdf, 'and is not an acceptance report')
 JUNIT = Kind(
     'JUnit XML',
     ('.xml',),
     _starts(rb'(<\?xml[^>]*>\s*)?<testsuites name="ugv_acceptance"'),
-    'and is no JUnit file of this program',
+    'and is not a JUnit file of this program',
 )
 CRITERIA = Kind(
-    'YAML', _YAML, _unedited('# Proposed from a run'), 'and is no proposal, or one that was edited'
+    'YAML', _YAML, _unedited('# Proposed from a run'), 'and is not a proposal, or was edited'
 )
 # A recording, even one with our judgement in it, is replaced only where that is asked for.
 ANNOTATED = Kind('MCAP', ('.mcap',), lambda _: False, 'and may be a recording')
-PLAN = Kind('YAML', _YAML, _unedited('# A test plan made by'), 'and is no plan, or an edited one')
-CARD = Kind('HTML', _HTML, _starts(_PAGE % b'Operator card'), 'and is no operator card')
-MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is no map', by_ending=True)
+PLAN = Kind('YAML', _YAML, _unedited('# A test plan made by'), 'and is not a plan, or was edited')
+CARD = Kind('HTML', _HTML, _starts(_PAGE % b'Operator card'), 'and is not an operator card')
+MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is not a map', by_ending=True)
 
 CAMPAIGN = FolderKind('campaign', ('campaign.json', 'campaign.html', 'runs/*.json'), _is_campaign)
 PAPER = FolderKind('paper', ('paper.json', 'paper.html', '*.svg'), _is_paper)

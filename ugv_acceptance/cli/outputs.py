@@ -79,7 +79,9 @@ def check_outputs(
         twice = next((other for other, seen in earlier if same(path, seen)), None)
         # Two may go to one pipe: it keeps nothing that could be lost.
         if twice is not None and (not is_stream(path) or path.is_file()):
-            raise _refused(option, path, f'expected a file of its own, got that of {twice}')
+            raise _refused(
+                option, path, f'expected a different file, this one is also the output of {twice}'
+            )
         earlier.append((option, path))
         try:
             check_writable(path)
@@ -109,15 +111,15 @@ def check_folder(
                 raise _refused(option, path, text)
     there = next(p for p in (_real(path), *_real(path).parents) if p.exists())
     if not there.is_dir():
-        raise _refused(option, path, f'cannot be written: {there} is no folder')
+        raise _refused(option, path, f'cannot be written: {there} is not a folder')
     if not os.access(there, os.W_OK):
         raise _refused(option, path, f'cannot be written: no permission in {there}')
     if not path.is_dir() or not any(path.iterdir()) or _is_ours(path, kind):
         return
     if not kind.may_fill:
-        raise _refused(option, path, 'expected a new or empty folder, it holds something')
+        raise _refused(option, path, 'expected a new or empty folder, it is not empty')
     if not overwrite:
-        text = f'it holds something and is no {kind.what}; only --overwrite adds to it'
+        text = f'it is not empty and is not a {kind.what}; only --overwrite adds to it'
         raise _refused(option, path, text)
 
 

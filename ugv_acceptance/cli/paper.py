@@ -22,15 +22,15 @@ def paper(
     ),
     config: RobotFile = None,
     simulate: Annotated[
-        bool, typer.Option(help='Run the arm in MuJoCo beside the closed form.')
+        bool, typer.Option(help='Also compute the arm in MuJoCo, beside the closed form.')
     ] = True,
     truth: Annotated[
         int,
-        typer.Option(help='Random cases in which MuJoCo decides what tips: 0.3 s each.'),
+        typer.Option(help='Random cases compared with tipping in MuJoCo, 0.3 s each.'),
     ] = 0,
     overwrite: Overwrite = False,
 ) -> None:
-    """Compute the paper again and write it as a page and as JSON; print the table of matches.
+    """Reproduce the paper's numbers as a page and as JSON; print which of them match.
 
     \b
     Examples:

@@ -41,7 +41,8 @@ def plan(
 ) -> None:
     """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
 
-    What would fail is marked for the simulation only. Without --out the steps are just listed.
+    Steps that would exceed a limit are marked for simulation only. Without --out the steps are
+    just listed.
 
     \b
     Examples:
@@ -89,6 +90,7 @@ def _print(made: 'Plan') -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from ugv_acceptance.evaluation.alerts.messages import pattern_words
     from ugv_acceptance.plan.order import duration
     from ugv_acceptance.report.format import time_text
 
@@ -106,7 +108,7 @@ def _print(made: 'Plan') -> None:
             f'{step.payload_kg:g} kg',
             '' if use is None else f'{use:.0%}',
             '' if tilt is None else f'{tilt:.1f} deg',
-            ', '.join(step.alerts.must),
+            ', '.join(map(pattern_words, step.alerts.must)),
         )
     console = Console(highlight=False)
     if not console.is_terminal:

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.progress import Progress, TextColumn
 from rich.table import Table
 
+from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.report.format import doubts_of, missing_text
 
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
@@ -122,7 +123,7 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
         f'evaluated {coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s '
         f'({coverage["fraction"]:.1%}); '
         + {'all': 'every chunk has a checksum', 'part': 'some chunks have no checksum'}.get(
-            bag['protected'], 'unprotected: no checksum would show a changed byte'
+            bag['protected'], 'no checksums: a changed byte would go unnoticed'
         ),
         soft_wrap=True,
     )
@@ -137,12 +138,12 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
             + (f' at {rate:.0f} Hz' if rate else '')
             + (f', {missing}' if missing else '')
             + _gaps(source)
-            + ('; none tells of a joint of this robot' if _foreign(key, source) else '')
+            + ('; none contains a joint of this robot' if _foreign(key, source) else '')
             + (f'; {escape(faults)}' if faults else ''),
             soft_wrap=True,
         )
     if bag['salvaged']:
-        console.print(f'  salvaged: {escape(bag["salvaged"])}', soft_wrap=True)
+        console.print(f'  damaged: {escape(bag["salvaged"])}', soft_wrap=True)
     for finding in bag['findings'][:5]:
         console.print(f'  {escape(finding)}', soft_wrap=True)
 
@@ -172,13 +173,14 @@ def _print_alerts(result: dict[str, Any], console: Console) -> None:
     console.print(f'{len(alerts)} alert{"s" * (len(alerts) > 1)}:')
     for alert in alerts[:_MOST_ALERTS]:
         end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f} s'
+        level = level_words(alert['level'])
         console.print(
-            f'  {alert["start_s"]:8.2f} to {end:>9}  {alert["level"]:5}  {alert["code"]:16}  '
+            f'  {alert["start_s"]:8.2f} to {end:>9}  {level:7}  {alert["code"]:16}  '
             f'{escape(alert["message"])}',
             soft_wrap=True,
         )
     if len(alerts) > _MOST_ALERTS:
-        console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE has all)')
+        console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE lists all)')
     most = max(_SEVERITY.index(alert['level']) for alert in alerts)
     worst = {a['code']: a['advice'] for a in alerts if _SEVERITY.index(a['level']) == most}
     for code, advice in list(worst.items())[:3]:
@@ -192,8 +194,8 @@ def _print_effort(result: dict[str, Any], console: Console) -> None:
         console.print('no measured effort at rest to compare')
         return
     console.print(
-        'measured effort beside static torque, at rest; a payload that is not declared appears as '
-        'their difference:',
+        'measured effort and static torque at rest; a payload that is not declared shows up as a '
+        'difference:',
         soft_wrap=True,
     )
     joints.sort(key=lambda joint: -max(abs(p['effort_per_kg']) for p in joint[1]))
@@ -205,7 +207,9 @@ def _print_effort(result: dict[str, Any], console: Console) -> None:
     ]
     for line in lines[:_MOST_EFFORTS]:
         console.print(line, soft_wrap=True)
-    console.print(f'  {sum(len(p) for _, p in joints)} stretches in all: --json FILE has them')
+    console.print(
+        f'  {sum(len(p) for _, p in joints)} intervals at rest in total: --json FILE lists them'
+    )
 
 
 def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
@@ -215,9 +219,9 @@ def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
         f'model {p["model"]:.1f}, difference {p["difference"]:+.1f} {p["unit"]}'
     )
     if p['saturated']:
-        return f'{text}: saturated, the effort stands at a limit'
+        return f'{text}: saturated: the effort stays at a limit'
     if payload is None:
-        return f'{text}: no payload would do that'
+        return f'{text}: no payload explains it'
     if payload < -_LIGHT:
-        return f'{text}: it pushes against something'
+        return f'{text}: the arm pushes against something'
     return f'{text} = {max(payload, 0.0):.2f} kg of payload'

@@ -11,21 +11,26 @@ from ugv_acceptance.cli.options import RobotFile
 def risk(
     config: RobotFile = None,
     posture: Annotated[
-        str, typer.Option(help='joint=30deg,...; left out: the arm anywhere in its range.')
+        str,
+        typer.Option(help='Posture: joint=30deg,...; if left out, the arm anywhere in its range.'),
     ] = '',
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            help='NAME=LOW..HIGH (even) or NAME=MEAN+-SD (normal), angles as 10deg, rates as '
+            help='NAME=LOW..HIGH (uniform) or NAME=MEAN+-SD (normal), angles as 10deg, rates as '
             '7deg/s; may be given again.'
         ),
     ] = None,
     mission: Annotated[
         Path | None, typer.Option(help='JSON with phases: name, posture, vary, times.')
     ] = None,
-    samples: Annotated[float, typer.Option(min=100, max=1e11, help='Such as 1e6.')] = 1e6,
+    samples: Annotated[
+        float, typer.Option(min=100, max=1e11, help='Number of samples, such as 1e6.')
+    ] = 1e6,
     seed: Annotated[int, typer.Option(min=0, help='The same seed gives the same numbers.')] = 0,
-    workers: Annotated[int, typer.Option(min=1, help='Processes, from 4e6 samples on.')] = 2,
+    workers: Annotated[
+        int, typer.Option(min=1, help='Number of processes; used from 4e6 samples on.')
+    ] = 2,
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
     """Estimate the probability that a joint saturates or the robot tips, by random sampling.

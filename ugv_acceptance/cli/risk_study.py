@@ -217,7 +217,7 @@ def words(name: str, spread: Spread) -> str:
     unit = ' deg' if turn and not name.endswith('.rate') else ' deg/s' if turn else ''
     if spread.kind == NORMAL:
         return f'normal, {low:.4g} +- {high:.4g}{unit}'
-    return f'even, {low:.4g} to {high:.4g}{unit}'
+    return f'uniform, {low:.4g} to {high:.4g}{unit}'
 
 
 def mission_lines(phases: Sequence[Phase], risks: Sequence[Risk]) -> list[str]:

@@ -39,17 +39,22 @@ def run(
         list[str] | None, typer.Option(help='Only this step or group; may be given several times.')
     ] = None,
     skip: Annotated[
-        list[str] | None, typer.Option(help='Not this step or group; may be given several times.')
+        list[str] | None,
+        typer.Option(help='Leave out this step or group; may be given several times.'),
     ] = None,
     config: ConfigFile = None,
     attempts: Annotated[
         int,
-        typer.Option(min=1, max=100, help='Times a step is tried that messages were missing in.'),
+        typer.Option(
+            min=1, max=100, help='How often a step is tried if messages were missing in it.'
+        ),
     ] = 5,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the simulated sensors.')] = 1,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help='A fault of the simulated robot as of simulate, angles as 30deg.'),
+        typer.Option(
+            help='A fault of the simulated robot, written as for simulate, angles as 30deg.'
+        ),
     ] = None,
 ) -> None:
     """Carry out a plan's steps: move, hold, record, and judge each by its recording.

@@ -93,9 +93,11 @@ class Steps:
 
 def raised(result: Mapping[str, Any]) -> list[str]:
     """Return the alerts raised during a step as one line; without alerts, no line."""
+    from ugv_acceptance.evaluation.alerts.messages import pattern_words
+
     begin, _, end = result['window_s']
     during = [a for a in result['alerts'] if begin <= a['start_s'] <= end]
-    told = dict.fromkeys('{level} {code} {subject}'.format(**a) for a in during)
+    told = dict.fromkeys(pattern_words('{level} {code} {subject}'.format(**a)) for a in during)
     return [f'raised: {", ".join(told)}'] if told else []
 
 
@@ -194,7 +196,7 @@ def execute(asked: Asked) -> int:
     if len(waiting) < len(chosen):
         console.print(f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
     interrupted = bool(waiting) and _do(asked, config, folder, Steps(console, plan, waiting))
-    with console.status('what the run has covered'):
+    with console.status('computing the coverage of the run'):
         result = folder.finish(config, coverage(config, folder))
     folder.note('interrupted' if interrupted else 'finished', verdict=result['verdict'])
     print_result(result, folder, console)

@@ -21,7 +21,9 @@ def simulate(
     ] = 'gentle',
     seconds: Annotated[
         float | None,
-        typer.Option('--seconds', '-s', help='Simulated seconds; as it comes if left out.'),
+        typer.Option(
+            '--seconds', '-s', help='Simulated seconds; by default the length of the scenario.'
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help='The same seed gives the same messages.')] = 1,
     bag: Annotated[
@@ -41,7 +43,7 @@ def simulate(
 ) -> None:
     """Simulate a run and record it as its robot would: joint_states, imu/data, payload.
 
-    The exit code is 0 once it is recorded, tipped over or not; `evaluate` judges the recording.
+    The exit code is 0 once a run is recorded, tipped over or not; `evaluate` judges the recording.
 
     \b
     Scenarios: gentle, overreach, fetch (fixed); work, tilt, swing, reach, grasp, snatch, dash,
@@ -125,7 +127,7 @@ def _print_list() -> None:
         (
             'faults',
             [
-                (name, f'{kind.words}; of: {kind.subject}' if kind.subject else kind.words)
+                (name, f'{kind.words}; subject: {kind.subject}' if kind.subject else kind.words)
                 for name, kind in KINDS.items()
             ],
         ),

@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 def speed(
     config: RobotFile = None,
     posture: Annotated[
-        str, typer.Option(help='joint=30deg,... held while each joint turns; else all postures.')
+        str,
+        typer.Option(
+            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
+        ),
     ] = '',
     payload: PayloadMass = '',
     reference: Annotated[

@@ -20,14 +20,12 @@ def verify(
     result_file: Annotated[
         Path, typer.Argument(metavar='RESULT', help='The JSON file that evaluate --json wrote.')
     ],
-    bag: Annotated[
-        list[Path] | None, typer.Option(help='The recording, where it is not where it was.')
-    ] = None,
+    bag: Annotated[list[Path] | None, typer.Option(help='The recording, if it was moved.')] = None,
     config: Annotated[
-        Path | None, typer.Option('--config', '-c', help="The robot's YAML file, likewise.")
+        Path | None, typer.Option('--config', '-c', help="The robot's YAML file, if it was moved.")
     ] = None,
-    urdf: Annotated[Path | None, typer.Option(help='The URDF, likewise.')] = None,
-    criteria: Annotated[Path | None, typer.Option(help='The criteria, likewise.')] = None,
+    urdf: Annotated[Path | None, typer.Option(help='The URDF, if it was moved.')] = None,
+    criteria: Annotated[Path | None, typer.Option(help='The criteria, if they were moved.')] = None,
 ) -> None:
     """Verify a result: everything is computed again; hashes, verdicts and numbers are compared.
 
@@ -92,8 +90,8 @@ def _near(path: str, folder: Path, option: str) -> Path:
         if place.exists():
             return place
     raise AcceptanceError(
-        f'{path}: expected it there (from {Path.cwd()}) or beside the result, found it at neither: '
-        f'say where it is with {option}'
+        f'{path}: expected this file (seen from {Path.cwd()}) or its name beside the result, '
+        f'found neither: give its path with {option}'
     )
 
 

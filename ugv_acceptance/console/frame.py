@@ -10,20 +10,20 @@ from functools import lru_cache
 from typing import Any
 
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
+from ugv_acceptance.evaluation.least_margins import with_most_used
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
-# The word for each level, and the page's sentence where nothing is wrong or nothing is known.
-WORDS = {OK: 'OK', WARN: 'CAUTION', ERROR: 'DANGER', STALE: 'NO DATA'}
+# What the page says where nothing is wrong or nothing is known.
 FINE = 'all margins kept'
 UNKNOWN = 'margins are not known'
-WAIT = 'do not move the robot on these numbers; see the inputs'
+WAIT = 'do not move the robot on these numbers; check the inputs'
 
 Plain = dict[str, Any]
 
@@ -59,7 +59,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
         'level': LEVELS[level],
-        'word': WORDS[level],
+        'word': level_words(level),
         'cause': cause,
         'advice': advice,
         'left': '' if level == STALE else _left(snapshot, settings),
@@ -92,11 +92,16 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
     """Return the smallest margins in a few words; '' where they are not known."""
     if not snapshot.known:
         return ''
-    side, angle = least_tilt(snapshot.angle)
-    degrees = math.degrees(angle)
-    if side:
-        ways = (f'{degrees:.1f} degrees of tilt left', f'{-degrees:.1f} degrees past tipping')
-        tilt = f'{ways[degrees < 0]} to the {side}'
+    parts = []
+    tilts = [(a, side) for side, a in zip(SIDES, snapshot.angle, strict=True) if math.isfinite(a)]
+    if tilts:
+        angle, side = min(tilts)
+        degrees = math.degrees(angle)
+        ways = (
+            f'{degrees:.1f} degrees of tilt left',
+            f'{-degrees:.1f} degrees past the tipping point',
+        )
+        parts.append(f'{ways[degrees < 0]} to the {side}')
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
     return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])
@@ -137,7 +142,7 @@ def _alert(row: AlertRow, now: int) -> Plain:
         'code': row.code,
         'subject': row.subject,
         'level': LEVELS[row.level],
-        'word': WORDS[row.level],
+        'word': level_words(row.level),
         'state': row.state,
         'active': row.end is None,
         'unseen': row.unseen,

@@ -116,5 +116,5 @@ def hints_of(values: Mapping[str, str]) -> tuple[str, ...]:
             hints.append(f'{end} at this rate')
     mass = values.get('payload_estimate_kg')
     if mass is not None:
-        hints.append(f'efforts tell of a payload of {mass} kg')
+        hints.append(f'measured efforts suggest a payload of {mass} kg')
     return tuple(hints)

@@ -13,7 +13,7 @@ LISTEN, BETWEEN = 0.05, 1.0
 
 def line_of(frame: Plain) -> str:
     """Return a frame as one line: level, word, cause, advice and remaining margins."""
-    parts = [f'{frame["level"]:<5}  {frame["word"]}: {frame["cause"]}']
+    parts = [f'{frame["word"]:<7}  {frame["cause"]}']
     parts += [f'DO: {frame["advice"]}'] * bool(frame['advice'])
     parts += [f'now: {frame["left"]}'] * bool(frame['left'])
     return '; '.join(parts)

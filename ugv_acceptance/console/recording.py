@@ -17,7 +17,7 @@ from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
-from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
@@ -197,6 +197,7 @@ class ShownRecording:
                 {
                     'code': a.rule.code,
                     'level': LEVELS[a.rule.level],
+                    'word': level_words(a.rule.level),
                     'text': describe(a, self.settings),
                     'from_s': (a.start - start) / 1e9,
                     'to_s': ((self.bag.end_ns if a.end is None else a.end) - start) / 1e9,

@@ -158,7 +158,7 @@ def margins_of(frame: Plain) -> Table:
     """Return torques and tilt left as a table; empty where the margins are not known."""
     table = Table('Margin', 'Now', 'Limit', '', box=None, padding=(0, 1))
     if frame['level'] == LEVELS[STALE]:
-        table.add_row(*(['NO DATA'] * 3))
+        table.add_row(*([frame['word']] * 3))
         return table
     for row in frame['tilt']:
         left = row['left_deg']

@@ -44,7 +44,7 @@ class Ahead:
 
 def end_words(subject: str, seconds: str, *, tips: bool) -> str:
     """Return what happens when a margin of a side (`tips`) or a joint is used up, and when."""
-    what = f'it tips to the {subject}' if tips else f'{subject} saturates'
+    what = f'the robot tips to the {subject}' if tips else f'{subject} saturates'
     return f'{what} in {seconds} s'
 
 

@@ -266,8 +266,8 @@ class Guard(Node):
                     self._recording.bag.flush()
         if self.brake.armed and self.dead() and not self.brake.stopped:
             silent = self._silent * LOOK
-            # It may come back a moment later: what it did not watch is lost all the same.
-            self.brake.stop(f'the monitor has said nothing for {silent:.1f} s', blind=True)
+            # It may be heard again a moment later: what it did not watch is lost all the same.
+            self.brake.stop(f'the monitor has published nothing for {silent:.1f} s', blind=True)
 
     # The world of a runner
 

@@ -56,7 +56,7 @@ def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iter
                         rows &= routes.paths(level, load).reachable
                     name = joint.removesuffix('_joint')
                     text = f'{name} torque {title}, limit {word} {limit:g} N m'
-                    purpose = f'the torque map says "{title}" at {load:g} kg: is it so?'
+                    purpose = f'the torque map says "{title}" at {load:g} kg: check it'
                     setup = Setup('torque boundary', load, where=where)
                     yield from _spread(arm, found, rows, points, setup, text, purpose)
 
@@ -77,7 +77,7 @@ def tip_boundary(
             load, tilt, found, rows = best
             setup = Setup('rollover boundary', load, (name, tilt), where, action)
             text = f'rollover {title}, {ORIENTATIONS[name].words}'
-            purpose = f'the rollover map says "{title}": is it so?'
+            purpose = f'the rollover map says "{title}": check it'
             yield from _spread(routes.arm, found, rows, points, setup, text, purpose)
 
 

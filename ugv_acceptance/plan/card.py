@@ -9,7 +9,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.messages import ALERTS
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, level_words, pattern_words
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
@@ -43,18 +44,18 @@ SHOWN = (
     'CLOCK',
 )
 LEVELS = (
-    ('OK', 'all margins kept', 'go on'),
+    (OK, 'all margins kept', 'go on'),
     (
-        'WARN',
-        'a margin is small or shrinks fast, or an input is odd',
+        WARN,
+        'a margin is small or shrinks fast, or an input looks wrong',
         'go on slowly, away from the limit',
     ),
     (
-        'ERROR',
+        ERROR,
         'a limit is passed, or an input cannot be used',
         'stop, unless this step expects it',
     ),
-    ('STALE', 'margins are not known', 'stop: nothing protects the robot now'),
+    (STALE, 'margins are not known', 'stop: nothing protects the robot now'),
 )
 # Lines of a step's preparation that say ground and load, which stand in their own rows.
 GROUND_AND_LOAD = 2
@@ -92,6 +93,7 @@ def card_of(plan: Plan, config: Config) -> str:
     environment = Environment(
         loader=PackageLoader('ugv_acceptance.plan'), autoescape=True, undefined=StrictUndefined
     )
+    environment.filters['pattern'] = pattern_words
     template = environment.get_template('card.html')
     arm = Arm(config.settings, roles_of(config.settings))
     order = sorted(plan.steps, key=lambda s: (s.where, _first(plan, s.group)))
@@ -104,7 +106,7 @@ def card_of(plan: Plan, config: Config) -> str:
         config=config,
         version=__version__,
         groups=groups,
-        levels=LEVELS,
+        levels=[(level_words(level), text, do) for level, text, do in LEVELS],
         meanings=[(code, ALERTS[code].meaning, ALERTS[code].to_do) for code in SHOWN],
         maps=safe_maps(arm, plan),
         length=time_text(duration(plan), digits=2),

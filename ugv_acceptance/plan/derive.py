@@ -104,7 +104,7 @@ def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
         ):
             if rows.any():
                 k = int(np.where(rows, use, -1.0).argmax())
-                purpose = f'{joint} carries as much as it ever does ({title}, {load:g} kg)'
+                purpose = f'the highest torque of {joint} ({title}, {load:g} kg)'
                 yield hold_step(
                     arm, Setup('worst postures', load), found, k, f'{joint}: {title}', purpose
                 )

@@ -107,8 +107,8 @@ def speed_steps(arm: Arm, home: Floats) -> Iterator[Step]:
                 id=f'{joint}-{words}',
                 group='speed',
                 title=f'{joint} at {share * speed:.0f} deg/s, {words} than the static limit',
-                purpose=f'the static model holds up to {speed:g} deg/s: the monitor must say when'
-                ' it does not',
+                purpose=f'the static model is valid up to {speed:g} deg/s: above that the monitor'
+                ' must warn',
                 action='sweep',
                 preparation=preparation(Setup('speed')),
                 posture_deg=posture_deg(arm, end),

@@ -90,7 +90,7 @@ class Step(_Part):
     limits: dict[str, Finite] = {}
     expected: dict[str, Finite] = {}
     alerts: Alerts = Alerts()
-    stop: str = 'stop at any ERROR or STALE alert that is not expected'
+    stop: str = 'stop at any DANGER or NO DATA alert that is not expected'
 
     @model_validator(mode='after')
     def _whole(self) -> 'Step':
@@ -183,4 +183,5 @@ HEAD = """\
 # A test plan made by `ugv-acceptance plan`; edit it as you like. Every run notes the plan's hash.
 # where: robot = run on the robot and in simulation; simulation = would fail, so only simulated.
 # alerts.must: have to be raised; alerts.must_not: must not be active while the posture is held.
-# A pattern is LEVEL, LEVEL CODE or LEVEL CODE SUBJECT, such as: ERROR TIP_OVER left"""
+# A pattern is LEVEL, LEVEL CODE or LEVEL CODE SUBJECT, such as: ERROR TIP_OVER left
+# LEVEL is WARN, ERROR or STALE; people read it as CAUTION, DANGER or NO DATA."""

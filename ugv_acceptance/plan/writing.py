@@ -11,8 +11,8 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
 
 SAFE_STOP = (
-    'stop and freeze the arm at any ERROR or STALE alert that is not expected, when the posture is'
-    ' not reached, or when anybody says stop'
+    'stop and freeze the arm at any DANGER or NO DATA alert that is not expected, when the posture'
+    ' is not reached, or when anybody says stop'
 )
 # Closer to a limit than this (share; deg), which side of it a measurement falls on is chance.
 NEAR_USE, NEAR_TILT = 0.03, 0.7

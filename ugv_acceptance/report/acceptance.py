@@ -8,6 +8,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import AcceptanceError, pip_install
+from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.report.format import (
@@ -53,7 +54,7 @@ CLOSING = {
     'PASS': 'This run met these criteria.',
     'FAIL': 'This run did not meet these criteria.',
     'INCONCLUSIVE': (
-        'This run did not meet these criteria: the data do not suffice to say that it did.'
+        'This run did not meet these criteria: the data are not sufficient to decide.'
     ),
 }
 
@@ -76,6 +77,7 @@ def acceptance_page(
     environment.filters.update(
         number=number_text,
         seconds=seconds_text,
+        level=level_words,
         worst=worst_text,
         limit=limit_text,
         bound=bound_text,
@@ -101,8 +103,9 @@ def acceptance_page(
 def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = run_chart(strips, result, settings)
     caption = (
-        'The whole run: the worst of each stretch of time. Solid line: limit; dotted line: warning '
-        'limit; dotted grey: no input. Bars are alerts: plain WARN, hatched ERROR, dotted STALE.'
+        'The whole run; each point is the worst value of a short interval. Solid line: limit; '
+        'dotted line: warning limit; dotted grey: no input. Bars are alerts: plain CAUTION, '
+        'hatched DANGER, dotted NO DATA.'
     )
     return Picture(svg_of(made, 'run'), caption) if made else None
 
@@ -111,8 +114,8 @@ def _map(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = track_map(strips, result, settings)
     caption = (
         "The run's track (blue, from the dot) over the map. Attitude, payload and the other joints "
-        'are as when the tilt left first broke its limit (or, where it never did, was least), so '
-        'the track may cross areas that were not there at other times.'
+        'are those of the moment when the tilt left first passed its limit (if it never did, when '
+        'it was least); at other times the areas were different.'
     )
     return Picture(svg_of(made, 'map'), caption) if made else None
 

@@ -39,7 +39,7 @@ def campaign_page(said: Json) -> str:
 def closing(said: Json) -> str:
     """Return the last sentence of the report: what the campaign shows."""
     if said['no_statement'] is not None:
-        return f'{said["no_statement"]}. The same command again judges what is missing.'
+        return f'{said["no_statement"]}. Run the same command again to judge the missing runs.'
     found = said['requirement']
     if found is None:
         return 'No reliability was required of this campaign; it states what was observed.'
@@ -47,7 +47,7 @@ def closing(said: Json) -> str:
     return {
         'PASS': f'This campaign met this criterion: {wanted}.',
         'FAIL': f'This campaign did not meet this criterion: {wanted}.',
-        'INCONCLUSIVE': f'This campaign did not meet this criterion: {wanted}; nor is it excluded.',
+        'INCONCLUSIVE': f'This campaign did not meet this criterion: {wanted}; it may still hold.',
     }[found['verdict']]
 
 

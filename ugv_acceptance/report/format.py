@@ -110,8 +110,9 @@ def doubts_of(result: Json) -> list[str]:
     if load is None or load['low'] < HEAVIER:
         return doubts
     text = (
-        f'efforts at rest tell of {load["value"]:.2f} kg more in the hand than declared (95 %: '
-        f'{load["low"]:.2f} to {load["high"]:.2f} kg): margins are smaller, or efforts are wrong'
+        f'measured efforts at rest suggest {load["value"]:.2f} kg more payload than declared '
+        f'(95 %: {load["low"]:.2f} to {load["high"]:.2f} kg): '
+        'true margins are smaller, or efforts are wrong'
     )
     return [*doubts, text]
 

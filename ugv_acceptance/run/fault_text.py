@@ -31,7 +31,7 @@ def fault_from(text: str, robot: Robot) -> Fault:
     allowed = {'joint': robot.joint_names, 'input': INPUTS}.get(kind.subject, ())
     if subject not in ('', *allowed) or (kind.subject == 'joint' and not subject):
         expected = ', '.join(allowed) or 'no subject'
-        raise BadConfig(f'fault {text!r}: expected {expected} behind the colon, got {subject!r}')
+        raise BadConfig(f'fault {text!r}: expected {expected} after the colon, got {subject!r}')
     amount = _amount(text, match['amount'], kind)
     if not kind.low <= amount <= kind.high:
         raise BadConfig(

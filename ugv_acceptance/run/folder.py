@@ -113,8 +113,8 @@ def open_folder(
     if path.exists() and not _unborn(path):
         if not resume:
             raise BadConfig(
-                f'{path}: expected a new or empty folder; --resume continues a run,'
-                ' --out names another folder'
+                f'{path}: expected a new or empty folder; use --resume to continue a run,'
+                ' or another --out'
             )
         _check_same(state, head)
         folder.note('resumed')

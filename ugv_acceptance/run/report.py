@@ -69,7 +69,7 @@ def counts_of(result: Mapping[str, Any]) -> str:
     steps, spared = len(result['steps']), len(result['steps']) - result['asked']
     text = f'{steps} steps: {counts}'
     if spared:
-        text += f'; {spared} would pass a limit, for the simulation only: they do not count'
+        text += f'; {spared} would exceed a limit and are for simulation only: they do not count'
     return text
 
 
@@ -86,11 +86,11 @@ def approaches(coverage: Mapping[str, Any]) -> list[str]:
 def _step_lines(step: dict[str, Any]) -> Sequence[str]:
     told, found = step.get('expected') or {}, step.get('measured') or {}
     numbers = [
-        f'tilt left {told["tilt_left_deg"]:.1f} expected, {found["tilt_left_deg"]:.1f} deg found'
+        f'tilt left {told["tilt_left_deg"]:.1f} expected, {found["tilt_left_deg"]:.1f} deg measured'
         for _ in ('tilt',)
         if told.get('tilt_left_deg', 0.0) > 0.0 and 'tilt_left_deg' in found
     ]
-    tried = [f'an attempt before: {"; ".join(e["reasons"])}' for e in step.get('earlier', ())]
+    tried = [f'earlier attempt: {"; ".join(e["reasons"])}' for e in step.get('earlier', ())]
     reasons = [f'    {reason}' for reason in (*step['reasons'], *numbers, *tried)]
     return [f'{step["verdict"]:<13}{step["id"]}: {step["title"]}', *reasons]
 

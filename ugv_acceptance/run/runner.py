@@ -20,14 +20,14 @@ from ugv_acceptance.run.actuation import SIM, Hands
 from ugv_acceptance.run.folder import RunFolder
 from ugv_acceptance.run.motions import REFUSED, Moves, holds
 from ugv_acceptance.run.step_verdict import INCONCLUSIVE, SKIPPED, Done, judge_step
-from ugv_acceptance.run.world import Brake, World
+from ugv_acceptance.run.world import ERROR, STALE, Brake, World, alert_words
 
 # Longest wait (s) for alerts to end; time (s) recorded after a stop.
 CALM, AFTER = 10.0, 1.0
 # Times a step is tried that showed nothing because messages were missing.
 ATTEMPTS = 5
 # Unwanted in every motion between steps.
-ALWAYS = ('ERROR', 'STALE')
+ALWAYS = (ERROR, STALE)
 # Speed (rad/s) of motions to and from home.
 HOME_SPEED = math.radians(35.0)
 
@@ -83,7 +83,7 @@ class Runner:
 
     def _refused(self, step: Step) -> str:
         if step.where == SIMULATION and self.hands.mode != SIM:
-            return 'would pass a limit: in simulation only'
+            return 'would exceed a limit: in simulation only'
         return ''
 
     def _finish(
@@ -130,7 +130,7 @@ class Runner:
         """Return an INCONCLUSIVE result where the monitor is silent, None where it watches."""
         if self.moves.until(lambda: not self.world.dead(), CALM) or self.asked():
             return None
-        self.over = 'the monitor says nothing'
+        self.over = 'the monitor publishes nothing'
         return {'verdict': INCONCLUSIVE, 'reasons': [self.over]}
 
     def _prepare(self, step: Step) -> str:
@@ -153,7 +153,8 @@ class Runner:
         self.brake.unwanted = step.alerts.must_not
         self.world.wait(0.2)
         calm = self.moves.until(lambda: not self.brake.trouble, CALM)
-        return '' if calm else f'active before it began: {", ".join(self.brake.trouble)}'
+        trouble = ', '.join(map(alert_words, self.brake.trouble))
+        return '' if calm else f'active before the step began: {trouble}'
 
     def _go_home(self) -> str:
         """Go home, straight where that is safe, else back as it came; return what was wrong."""
@@ -179,7 +180,7 @@ class Runner:
         begin = hold = self.world.stamp()
         self.brake.arm(step.alerts.must_not)
         for alert in self.brake.trouble:
-            self.brake.stop(f'{alert} is active')
+            self.brake.stop(f'{alert_words(alert)} is active', blind=alert[0] == STALE)
         speed = math.radians(step.speed_degps)
         sweeps = step.action == 'sweep'
         wrong = ''

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.alerts.messages import pattern_words
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.offline.evaluate import Options, evaluate
@@ -115,7 +116,7 @@ def decide(
     begin, hold, end = window
     alerts = list(alerts)
     missing = [
-        f'expected {pattern}, it was not raised'
+        f'expected {pattern_words(pattern)}: no such alert was raised'
         for pattern in step.alerts.must
         if not any(_matches(pattern, a) and _active(a, begin, end) for a in alerts)
     ]
@@ -139,11 +140,12 @@ def decide(
         return FAIL, [*missing, *wrong, *unknown]
     if unknown:
         return INCONCLUSIVE, [*missing, *unknown]
-    return PASS, ['every alert as expected']
+    return PASS, ['all alerts as expected']
 
 
 def _told(alert: Mapping[str, Any]) -> str:
-    return '{level} {code} {subject} was active: {message}'.format(**alert)
+    name = pattern_words('{level} {code} {subject}'.format(**alert))
+    return f'{name} was active: {alert["message"]}'
 
 
 def _matches(pattern: str, alert: Mapping[str, Any]) -> bool:
@@ -172,7 +174,7 @@ def stood(seen: Seen, done: Done) -> str:
     time, _, _, tilt = seen.joined()
     rows = tilt[(time >= done.begin) & (time <= done.end)]
     least = math.degrees(rows.min()) if rows.size else math.inf
-    return '' if least < -FALLEN else f'it did not tip over: {least:.1f} deg of tilt were left'
+    return '' if least < -FALLEN else f'the robot did not tip over: {least:.1f} deg of tilt left'
 
 
 def covered(seen: Seen, done: Done) -> float:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Protocol
 
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.alerts.messages import pattern_words
 from ugv_acceptance.plan.plan import matches
 
+ERROR, STALE = 'ERROR', 'STALE'
 # Level, code and subject of an alert that is active.
 Active = tuple[str, str, str]
 
@@ -42,24 +44,29 @@ class Brake:
         """Freeze all motion now; `blind`: because data is missing, as at a STALE alert."""
         self.freeze()
         if not self.stopped:
-            self.stopped, self.blind = reason, blind or reason.startswith('STALE')
+            self.stopped, self.blind = reason, blind
             self.on_stop(reason)
 
     def raised(self, alert: Active, text: str) -> None:
         """Take an alert that was raised, and freeze where it is unwanted; `text` describes it."""
         self.active.add(alert)
         if self.armed and self.stops(alert):
-            self.stop(f'{" ".join(alert)}: {text}')
+            self.stop(f'{alert_words(alert)}: {text}', blind=alert[0] == STALE)
 
     def stops(self, alert: Active) -> bool:
         """Return whether an alert stops the current step: ERROR or STALE, and not expected."""
         level = alert[0]
-        return level in {'ERROR', 'STALE'} and any(matches(p, *alert) for p in self.unwanted)
+        return level in {ERROR, STALE} and any(matches(p, *alert) for p in self.unwanted)
 
     @property
-    def trouble(self) -> list[str]:
-        """The active alerts that would stop the current step."""
-        return sorted(' '.join(alert) for alert in list(self.active) if self.stops(alert))
+    def trouble(self) -> list[Active]:
+        """The alerts that are active and would stop the step in hand."""
+        return sorted(alert for alert in list(self.active) if self.stops(alert))
+
+
+def alert_words(alert: Active) -> str:
+    """Return an alert as people read it: DANGER TIP_OVER left."""
+    return pattern_words(' '.join(alert))
 
 
 @dataclass(slots=True)

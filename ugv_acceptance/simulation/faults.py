@@ -37,13 +37,13 @@ KINDS: dict[str, Kind] = {
     'dead': Kind('no message comes at all', 'input'),
     'nan': Kind('positions, or orientation and acceleration, are NaN', 'input'),
     'dead-encoder': Kind('a joint is missing from the messages', 'joint'),
-    'frozen-encoder': Kind('a joint tells the same position whatever it does', 'joint'),
-    'effort-missing': Kind('joint states tell no efforts'),
+    'frozen-encoder': Kind('a joint reports the same position however it moves', 'joint'),
+    'effort-missing': Kind('joint states contain no efforts'),
     'imu-bias': Kind('the acceleration forward is {} m/s2 too large', '', 2.0, -50.0, 50.0),
     'wrong-mounting': Kind(
         'the IMU is mounted turned by {} deg about its z axis', '', 90.0, -360.0, 360.0, angle=True
     ),
-    'identity-orientation': Kind('the IMU tells an orientation it does not know: level'),
+    'identity-orientation': Kind('the IMU reports a level orientation, whatever its tilt'),
     'clock-jump': Kind('header stamps are off by {} s', 'input', -5.0, -1e8, 1e8),
     'second-publisher': Kind('another robot that stands still publishes as well', 'input'),
     'heavy-payload': Kind('the load is {} times as heavy as declared', '', 2.0, 0.0, 100.0),

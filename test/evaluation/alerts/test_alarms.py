@@ -234,7 +234,7 @@ def test_critical_alarms_and_lost_data_cannot_be_shelved() -> None:
     alarms = Alarms()
     for k, key in ((0, TIP), (2, ELBOW), (3, STALE_IMU)):
         raised(alarms, k)
-        with pytest.raises(AcceptanceError, match='only warnings can be shelved'):
+        with pytest.raises(AcceptanceError, match='only CAUTION can be shelved'):
             alarms.shelve(0, key, SECOND, 'Ada')
 
 

@@ -11,7 +11,7 @@ from ugv_acceptance.evaluation.settings import Limits
 
 TOLD = settings(limits=Limits((45.0, 30.0)))
 RAD = math.radians(1.0)
-WARNED = 'warning limit 10.0 degrees of tilt left'
+WARNED = 'warning limit: 10.0 degrees left'
 
 
 @pytest.mark.parametrize(
@@ -20,31 +20,31 @@ WARNED = 'warning limit 10.0 degrees of tilt left'
         ('TORQUE_LIMIT', 'lift', WARN, 36.0, 40.04, 'lift needs 40.0 N m; its limit is 45.0 N m'),
         ('TORQUE_LIMIT', 'slide', ERROR, 30.0, 31.0, 'slide needs 31.0 N; its limit is 30.0 N'),
         ('TIP_OVER', 'left', WARN, -10 * RAD, -8 * RAD,
-         f'8.0 degrees of tilt left before it tips to the left; {WARNED}'),
+         f'8.0 degrees of tilt left before the robot tips to the left; {WARNED}'),
         ('TIP_OVER', 'rear', ERROR, -5 * RAD, 3 * RAD,
-         '3.0 degrees past its tipping point to the rear; limit 5.0 degrees of tilt left'),
+         'the robot is 3.0 degrees past its tipping point to the rear; limit: 5.0 degrees left'),
         ('STATIC_MODEL', 'lift', WARN, 0.6, 0.75,
-         'lift moves at 0.75 rad/s; the static model holds to 0.60 rad/s'),
+         'lift moves at 0.75 rad/s; margins are valid only up to 0.60 rad/s'),
         ('STATIC_MODEL', 'slide', WARN, 0.1, 0.25,
-         'slide moves at 0.25 m/s; the static model holds to 0.10 m/s'),
+         'slide moves at 0.25 m/s; margins are valid only up to 0.10 m/s'),
         ('SLIDE', 'robot', WARN, -10 * RAD, -4 * RAD,
-         'the tracks slide before it tips: 4.0 degrees of slope left'),
+         'the tracks will slide before the robot tips: 4.0 degrees of slope left'),
         ('SLIDE', 'robot', WARN, -10 * RAD, 2 * RAD,
-         'the tracks slide before it tips: 0.0 degrees of slope left'),
+         'the tracks will slide before the robot tips: 0.0 degrees of slope left'),
         ('TIP_AHEAD', 'front', WARN, -1.5, -0.3,
-         'tips to the front within 1.5 s if it goes on like this'),
+         'the robot will tip to the front within 1.5 s if this motion continues'),
         ('TORQUE_AHEAD', 'lift', WARN, -2.0, -0.3,
-         'lift is at its limit within 2.0 s if it goes on like this'),
+         'lift will reach its limit within 2.0 s if this motion continues'),
         ('EFFORT_LIMIT', 'lift', WARN, 0.9, 44.0,
-         'the motor of lift gives 44.0 N m; its limit is 45.0 N m'),
+         'the measured effort of lift is 44.0 N m; its limit is 45.0 N m'),
         ('EFFORT_LIMIT', 'slide', WARN, 0.9, 29.0,
-         'the motor of slide gives 29.0 N; its limit is 30.0 N'),
+         'the measured effort of slide is 29.0 N; its limit is 30.0 N'),
         ('POSITION_LEAP', 'lift', ERROR, 20.0, 57.3,
-         'the position of lift changes by 57.3 rad/s, ten times faster than it can move'),
+         'implausible jump of lift: 57.3 rad/s, over ten times the speed it can move at'),
         ('POSITION_LEAP', 'slide', ERROR, 10.0, 12.0,
-         'the position of slide changes by 12.0 m/s, ten times faster than it can move'),
+         'implausible jump of slide: 12.0 m/s, over ten times the speed it can move at'),
         ('IMU_GRAVITY', 'imu', ERROR, 0.15, 0.9,
-         'at rest the acceleration differs from gravity by 90%'),
+         'at rest the measured acceleration differs from gravity by 90%'),
         ('IMU_INCONSISTENT', 'imu', ERROR, 0.1, 28.6 * RAD,
          'orientation and acceleration of the IMU disagree by 28.6 degrees at rest'),
         ('INPUT_STALE', 'imu', ERROR, 0.5, 1.0, 'no message from imu'),
@@ -60,9 +60,9 @@ def test_an_alert_is_one_sentence_with_its_numbers(
 @pytest.mark.parametrize(
     ('degrees', 'said'),
     [
-        (0.0, '0.0 degrees of tilt left before it tips'),
-        (0.06, '0.1 degrees of tilt left before it tips'),
-        (-0.06, '0.1 degrees past its tipping point'),
+        (0.0, '0.0 degrees of tilt left before the robot tips'),
+        (0.06, '0.1 degrees of tilt left before the robot tips'),
+        (-0.06, 'the robot is 0.1 degrees past its tipping point'),
     ],
 )
 def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
@@ -72,4 +72,4 @@ def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
 
 def test_what_helps_is_told_beside_what_happened() -> None:
     """Each alert code has its advice, whatever the subject."""
-    assert advice('INPUT_STALE').startswith('check that its driver runs')
+    assert advice('INPUT_STALE').startswith('check that its driver is running')

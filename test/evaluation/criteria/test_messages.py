@@ -13,6 +13,7 @@ from ugv_acceptance.evaluation.settings import Limits
 
 TOLD = settings(limits=Limits((50.0, 30.0)))
 RAD = math.radians(1.0)
+USED, LEFT = 'its utilisation must stay', 'the tilt left must stay above 5 deg'
 RUN = made(
     seconds(0.0, 2.5),
     until=seconds(2.5, 10.0),
@@ -27,13 +28,13 @@ RUN = made(
     ('demand', 'said'),
     [
         (Value('torque_utilisation', 'lift', below=True, limit=0.9),
-         'lift needs 60.0 N m at 0.00 s; its limit is 50.0 N m, must stay below 90%'),
+         f'lift needs 60.0 N m at 0.00 s; its limit is 50.0 N m: {USED} below 90%'),
         (Value('torque_utilisation', 'slide', below=True, limit=1.0),
-         'slide needs 36.0 N at 0.00 s; its limit is 30.0 N, must stay below 100%'),
+         f'slide needs 36.0 N at 0.00 s; its limit is 30.0 N: {USED} below 100%'),
         (Value('tip_angle', 'front', below=False, limit=5 * RAD),
-         '4.0 degrees of tilt left before it tips to the front at 0.00 s; must stay above 5 deg'),
+         f'at 0.00 s: 4.0 degrees of tilt left before the robot tips to the front; {LEFT}'),
         (Value('tip_angle', ANY, below=False, limit=5 * RAD),
-         '3.0 degrees past its tipping point to the right at 0.00 s; must stay above 5 deg'),
+         f'at 0.00 s: 3.0 degrees past the tipping point to the right; {LEFT}'),
         (Value('position', 'slide', below=True, limit=0.3),
          'position of slide was 0.39 m at 0.00 s; must stay below 0.3 m'),
         (Value('tilt', 'robot', below=True, limit=30 * RAD),
@@ -49,8 +50,8 @@ def test_a_violation_in_words(demand: Value, said: str) -> None:
 @pytest.mark.parametrize(
     ('demand', 'words'),
     [
-        (DataDemand('longest_gap', most=0.2), 'longest gap at most 0.2 s'),
-        (DataDemand('rate', 'imu', least=10.0), 'rate of imu at least 10 Hz'),
+        (DataDemand('longest_gap', most=0.2), 'longest gap: at most 0.2 s'),
+        (DataDemand('rate', 'imu', least=10.0), 'rate of imu: at least 10 Hz'),
     ],
 )
 def test_a_bound_that_is_not_given_is_not_told(demand: DataDemand, words: str) -> None:
@@ -62,7 +63,9 @@ def test_a_tilt_of_nothing_is_not_past_the_tipping_point() -> None:
     """A tilt left of 0 is not told as past the tipping point, which begins below 0."""
     level = made(seconds(0), until=seconds(10), angle=[(0.0, 1.0, 1.0, 1.0)])
     found = judge_value(*findings(TOLD, Value('tip_angle', ANY, below=False, limit=0.1), [level]))
-    assert found.reason.startswith('0.0 degrees of tilt left before it tips to the front')
+    assert found.reason.startswith(
+        'at 0.00 s: 0.0 degrees of tilt left before the robot tips to the front'
+    )
 
 
 def test_a_dwell_tells_how_long_it_was_kept() -> None:
@@ -70,6 +73,6 @@ def test_a_dwell_tells_how_long_it_was_kept() -> None:
     demand = Value('torque', 'lift', below=True, limit=30.0, dwell=8.0)
     found = judge_value(*findings(TOLD, demand, [RUN]))
     assert found.reason == (
-        'it: kept for 7.50 s; needed: static torque (magnitude) of lift below 30 N m '
-        'for 8 s at a stretch'
+        'it: held for 7.50 s; required: static torque (magnitude) of lift below 30 N m '
+        'for 8 s without a break'
     )

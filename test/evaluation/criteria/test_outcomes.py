@@ -99,7 +99,7 @@ def test_a_number_of_the_data_may_be_at_its_bound(least: float, most: float, ver
         'values': {'imu': 50.0},
     }
     if verdict != 'PASS':
-        assert found['reason'].startswith('it: imu 50 Hz; rate of imu at least ')
+        assert found['reason'].startswith('it: imu 50 Hz; rate of imu: at least ')
     both = judged(DataDemand('rate', least=least), data=data)['criteria']['results'][0]
     assert 'joint_states unknown' in both['reason']
     short = judged(DataDemand('coverage', least=0.99), data=data)['reasons'][0]

@@ -118,7 +118,7 @@ def test_what_is_never_known_or_never_holds_decides_nothing() -> None:
     """A value that is never known, is infinite, or holds for no time is INCONCLUSIVE."""
     unknown = made(seconds(0, 1), known=[False, False])
     found = judged(BELOW, unknown)
-    assert (found.verdict, found.reason) == ('INCONCLUSIVE', 'it: no value was known')
+    assert (found.verdict, found.reason) == ('INCONCLUSIVE', 'it: no value could be computed')
     assert (found.measured['worst'], found.measured['share_in_violation']) == (None, 0.0)
     free = judged(Value('torque_margin', 'slide', below=False, limit=0.0)).measured
     assert (free['worst'], free['worst_of'], free['at_s'], free['moment']) == (None,) * 4
@@ -159,10 +159,10 @@ def test_how_little_was_left_is_told_beside_the_bound() -> None:
     """A pass within its uncertainty tells what was left and the bound, with their unit."""
     level = made(seconds(0), until=seconds(10), torque=[(20.0, 0.0)])
     found = judged(replace(BELOW, limit=21.0), level, sources=[HEAVY])
-    assert found.reason == 'it: met by 1 N m, within the uncertainty of 2.45 N m'
+    assert found.reason == 'it: met by 1 N m, less than its uncertainty of 2.45 N m'
     share = Value('torque_utilisation', 'lift', below=True, limit=20.0 / 45.0 + 0.01)
     found = judged(share, level, sources=[HEAVY])
-    assert found.reason.startswith('it: met by 0.01, within the uncertainty of 0.0545')
+    assert found.reason.startswith('it: met by 0.01, less than its uncertainty of 0.0545')
 
 
 @pytest.mark.parametrize(
@@ -189,4 +189,4 @@ def test_alerts_of_the_same_margin_in_the_window_are_evidence(
     assert len(every.evidence) == (related or subject == 'slide')
     if related:
         until = 'the end' if end is None else f'{end:.2f} s'
-        assert found.evidence[0].startswith(f'WARN TORQUE_LIMIT from {start:.2f} s to {until}: ')
+        assert found.evidence[0].startswith(f'CAUTION TORQUE_LIMIT from {start:.2f} s to {until}: ')

@@ -162,14 +162,14 @@ def test_a_failure_shows_the_worst_moment_the_first_and_the_alerts_about_it() ->
     assert 0.5 <= measured['at_s'] < 1.5
     assert measured['moment']['joints']['slide']['position'] == pytest.approx(0.2)
     assert measured['first_violations_s'][0] == pytest.approx([0.5, 1.5], abs=0.03)
-    assert [line.split(' from')[0] for line in found['evidence']] == ['WARN TORQUE_LIMIT']
+    assert [line.split(' from')[0] for line in found['evidence']] == ['CAUTION TORQUE_LIMIT']
 
 
 def test_a_dwell_that_was_too_short_says_how_long_it_was() -> None:
     """Up from 0.8 s to 1.2 s where 1.2 s were asked for."""
     found = outcome(replace(TORQUE, dwell=1.2), moving((0.8, 1.2, UP)))
     assert found['measured']['longest_kept_s'] == pytest.approx(0.4, abs=0.03)
-    assert re.match(r'it: kept for 0\.\d+ s; needed: ', found['reason'])
+    assert re.match(r'it: held for 0\.\d+ s; required: ', found['reason'])
 
 
 def test_a_run_is_the_worst_of_its_criteria() -> None:
@@ -310,7 +310,7 @@ def test_a_robot_on_its_side_fails() -> None:
     ]
     found = judged(default_criteria(TOLD), run, T0 + 2 * S)
     assert found['verdict'] == 'FAIL'
-    assert 'past its tipping point to the right' in found['reasons'][0]
+    assert 'past the tipping point to the right' in found['reasons'][0]
 
 
 def test_the_hash_of_the_defaults_is_that_of_their_content() -> None:

@@ -61,7 +61,7 @@ def test_friction_needs_thirty_samples_both_ways(moving: int, told: bool) -> Non
     for sign in (1.0, -1.0):
         one = comparison._friction(replace(both, rate=sign * np.abs(both.rate)))
         assert one['friction'] is None
-        assert not told or one['friction_unknown'] == 'motion one way or at one speed alone'
+        assert not told or one['friction_unknown'] == 'motion in one direction or at one speed'
 
 
 @pytest.mark.parametrize('sign', [1.0, -1.0])
@@ -76,7 +76,7 @@ def test_a_force_that_drives_the_motion_is_no_friction(
         samples(80, lambda t, r: t + sign * (coulomb * np.sign(r) + viscous * r) + noise, moving=60)
     )
     assert (found['friction'] is None) == (sign < 0.0)
-    assert found['friction_unknown'] == ('' if sign > 0.0 else 'other forces outweigh it')
+    assert found['friction_unknown'] == ('' if sign > 0.0 else 'masked by other forces')
 
 
 @pytest.mark.parametrize(('count', 'told'), [(LEAST, True), (LEAST - 1, False)])

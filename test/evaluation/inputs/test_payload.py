@@ -41,21 +41,21 @@ BELOW = 'static torque (magnitude) of lift below 30 N m'
     ('demand', 'words'),
     [
         (value(), f'{BELOW} at all times'),
-        (value(dwell=2.5), f'{BELOW} for 2.5 s at a stretch'),
-        (value(time_in_violation=0.5), f'{BELOW} except for at most 0.5 s in all'),
+        (value(dwell=2.5), f'{BELOW} for 2.5 s without a break'),
+        (value(time_in_violation=0.5), f'{BELOW} except for at most 0.5 s in total'),
         (value(longest_violation=0.2, share_in_violation=0.05),
-         f'{BELOW} except for at most 0.2 s at a stretch and 5.0% of the time'),
+         f'{BELOW} except for at most 0.2 s at a time and 5.0% of the time'),
         (Value('tip_angle', ANY, below=False, limit=math.radians(5.0)), 'above 5 deg at all times'),
         (Value('torque_utilisation', 'lift', below=True, limit=0.8), 'below 80% at all times'),
         (Value('torque', 'slide', below=True, limit=30.0), 'of slide below 30 N at all times'),
         (AlertDemand(raised=True, code='TIP_OVER', of='left', level='WARN'),
-         'WARN TIP_OVER alert of left raised'),
+         'at least one CAUTION TIP_OVER alert of left'),
         (AlertDemand(raised=False), 'no alert'),
-        (AlertDemand(raised=False, level='ERROR'), 'no ERROR alert'),
-        (AlertDemand(raised=True), 'any alert raised'),
+        (AlertDemand(raised=False, level='ERROR'), 'no DANGER alert'),
+        (AlertDemand(raised=True), 'at least one alert'),
         (DataDemand('coverage', least=0.9), 'at least 90%'),
         (DataDemand('rate', of='imu', least=10.0, most=90.0),
-         'rate of imu at least 10 and at most 90 Hz'),
+         'rate of imu: at least 10 and at most 90 Hz'),
         (DataDemand('longest_gap', most=0.2), 'at most 0.2 s'),
         (MapDemand(('lift', 'slide'), ((0.0, 1.0), (0.0, 1.0)), (0.1, 0.1), 0.25),
          'at least 25% of the map of lift and slide visited'),
@@ -135,12 +135,12 @@ def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa:
     assert found.mass == pytest.approx(mass)
     assert found.declared == 1.0
     assert found.differs == differs
-    assert f'as if {mass:.1f} kg were in the hand, 1.0 kg are declared' in found.sentence
+    assert f'suggest a payload of {mass:.1f} kg, but 1.0 kg is declared' in found.sentence
 
 
 def test_less_than_nothing_is_told_as_nothing() -> None:
     """A slightly negative estimate is a payload of 0; a large one means that the arm leans."""
-    assert 'as if 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
+    assert 'a payload of 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
     assert weighed(need(0.0) - 0.6 * LIFT) is None
 
 

@@ -48,7 +48,7 @@ export class Alerts {
     const [tag, what, todo, small, buttons] = row.children;
     row.className = `${alert.level} ${alert.active ? 'active' : 'over'} ${alert.unseen ? 'unacknowledged' : ''}`;
     row.dataset.state = alert.state;
-    text(tag, alert.level === 'STALE' ? 'NO DATA' : alert.word);
+    text(tag, alert.word);
     text(what, alert.text);
     // What is over asks for its button alone.
     text(todo, alert.active ? alert.advice : '');

@@ -22,7 +22,7 @@ export class Playback {
     if (!this.timeline) return;
     $('seek').max = this.timeline.duration_s;
     $('jumps').replaceChildren(...this.timeline.alerts.map((alert) => {
-      const row = element('li'), button = element('button', '', `${fixed(alert.from_s)} s: ${alert.level === 'ERROR' ? 'DANGER' : alert.level === 'WARN' ? 'CAUTION' : 'NO DATA'}: ${alert.text}`);
+      const row = element('li'), button = element('button', '', `${fixed(alert.from_s)} s: ${alert.word}: ${alert.text}`);
       button.type = 'button';
       button.addEventListener('click', () => this.ask({ do: 'seek', to_s: alert.from_s }));
       row.append(button);

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 
 # Codes of alarms that stay, over and acknowledged, until a person resets them: the robot may lie on
@@ -149,7 +150,8 @@ class Alarms:
         if alarm is None:
             raise AcceptanceError(f'shelve: expected a known alarm, got {key[0]!r} of {key[1]!r}')
         if key[2] != WARN:
-            raise AcceptanceError(f'shelve: only warnings can be shelved, {key[0]} is critical')
+            level = level_words(key[2])
+            raise AcceptanceError(f'shelve: {key[0]} is {level}; only CAUTION can be shelved')
         if not 0 < length <= LONGEST_SHELVING:
             longest = LONGEST_SHELVING // 1_000_000_000
             raise AcceptanceError(

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
@@ -52,137 +52,152 @@ class AlertText:
     level: int | None = None
 
 
+# A level as people read it; machines (ROS, JSON, CSV, files of criteria and plans) read LEVELS.
+LEVELS_FOR_PEOPLE = dict(zip(LEVELS, ('OK', 'CAUTION', 'DANGER', 'NO DATA'), strict=True))
+
+
+def level_words(level: int | str) -> str:
+    """Return a level, by its number or its name in LEVELS, as people read it."""
+    return LEVELS_FOR_PEOPLE[LEVELS[level] if isinstance(level, int) else level]
+
+
+def pattern_words(pattern: str) -> str:
+    """Return LEVEL, LEVEL CODE or LEVEL CODE SUBJECT as people read it: DANGER TIP_OVER left."""
+    level, space, rest = pattern.partition(' ')
+    return level_words(level) + space + rest
+
+
 ALERTS = {
     'TORQUE_LIMIT': AlertText(
         '{subject} needs {peak:.1f} {unit}; its limit is {limit:.1f} {unit}',
         'bring the load closer to the joint, or set it down',
         FailureSource.EFFECTOR,
-        'The joint named carries nearly, or more than, what its motor can hold.',
+        'The load on the joint named is near, or above, what its motor can hold.',
     ),
     'TIP_OVER': AlertText(
-        '{tilt} to the {subject}; {kind} {limit:.1f} degrees of tilt left',
-        'lower the arm, bring it over the tracks, face the slope; if it stands well, check the IMU',
+        '{tilt} to the {subject}; {kind}: {limit:.1f} degrees left',
+        'lower the arm over the tracks, face the slope; if the robot stands well, check the IMU',
         FailureSource.INTERACTION,
-        'Little tilt is left before the robot tips to the side named.',
+        'The robot is close to tipping over to the side named.',
     ),
     'NO_SUPPORT': AlertText(
-        'the contact points give no support polygon, or nothing presses on the ground',
+        'no support polygon: the contact points span no area on the ground, or carry no load',
         'stop; check that the robot stands on its tracks',
         FailureSource.INTERACTION,
         'The robot does not stand on its contact points: it is tipping or hanging.',
     ),
     'STATIC_MODEL': AlertText(
-        '{subject} moves at {peak:.2f} {rate}; the static model holds to {limit:.2f} {rate}',
+        '{subject} moves at {peak:.2f} {rate}; margins are valid only up to {limit:.2f} {rate}',
         'move the joint more slowly',
         FailureSource.INTERACTION,
-        'The joint moves so fast that the margins shown are too good.',
+        'The joint moves too fast: the margins shown may be too large.',
     ),
     'SLIDE': AlertText(
-        'the tracks slide before it tips: {slope:.1f} degrees of slope left',
-        'stop; go back to where the slope is less, straight up or down it',
+        'the tracks will slide before the robot tips: {slope:.1f} degrees of slope left',
+        'stop; drive straight up or down the slope to where it is less steep',
         FailureSource.INTERACTION,
         'The robot is about to slide down the slope, before it tips.',
     ),
     'TIP_AHEAD': AlertText(
-        'tips to the {subject} within {seconds:.1f} s if it goes on like this',
-        'stop the motion that brings it there',
+        'the robot will tip to the {subject} within {seconds:.1f} s if this motion continues',
+        'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the robot tips to the side named within a second.',
     ),
     'TORQUE_AHEAD': AlertText(
-        '{subject} is at its limit within {seconds:.1f} s if it goes on like this',
-        'stop the motion that brings it there',
+        '{subject} will reach its limit within {seconds:.1f} s if this motion continues',
+        'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the joint named is at its limit within a second.',
     ),
     'EFFORT_LIMIT': AlertText(
-        'the motor of {subject} gives {peak:.1f} {unit}; its limit is {torque:.1f} {unit}',
+        'the measured effort of {subject} is {peak:.1f} {unit}; its limit is {torque:.1f} {unit}',
         'move the joint more slowly, bring the load closer, or set it down',
         FailureSource.EFFECTOR,
-        'The motor named gives nearly all it has, whatever the model says.',
+        'The motor named is near its torque limit, by its own measurement.',
     ),
     'MOTOR_WEAK': AlertText(
-        'the motor of {subject} gives no more, below its limit, while its posture needs more',
-        'set the load down; check the supply and the motor, or the limit in the configuration',
+        'the motor of {subject} saturates below its limit: its posture needs more than it delivers',
+        'set the load down; check power supply, motor, and the torque limit in the configuration',
         FailureSource.EFFECTOR,
-        'The motor named gives less than it should, and cannot hold its posture.',
+        'The motor named saturates below its limit and cannot hold its posture.',
     ),
     'ENCODER_FROZEN': AlertText(
-        '{subject} does not move at all while its effort changes',
-        'check its encoder; else something blocks the joint or pulls at it',
+        'the position of {subject} does not change at all while its effort does',
+        'check its encoder; if that works, something blocks the joint or pulls on it',
         FailureSource.SENSOR,
-        'A joint tells no motion while its effort changes: is its position true?',
+        'The reported position of a joint does not change: check its encoder.',
     ),
     'INPUT_STALE': AlertText(
         'no message from {subject}',
-        'check that its driver runs, its topic name and its quality of service',
+        'check that its driver is running, its topic name and its quality of service (QoS)',
         FailureSource.COMMUNICATIONS,
         'Messages of a sensor have stopped: no margin is known.',
     ),
     'INPUT_INCOMPLETE': AlertText(
-        'at least one joint of the robot is missing from {subject}, or is not refreshed',
-        'check the joint names in the configuration against the topic',
+        'at least one joint is missing from {subject}, or is no longer updated',
+        'compare the joint names in the configuration with those on the topic',
         FailureSource.SENSOR,
         'A joint is missing from the messages: no margin is known.',
     ),
     'INPUT_INVALID': AlertText(
-        '{subject} holds numbers that cannot be used',
-        'check for not-a-number, degrees for radians, raw counts, a quaternion that is no rotation',
+        '{subject} contains values that cannot be used',
+        'check for NaN, degrees instead of radians, raw encoder counts, an invalid quaternion',
         FailureSource.SENSOR,
         'A sensor sends numbers that cannot be true.',
     ),
     'CLOCK': AlertText(
-        'header stamps of {subject} are over a second from the time of receipt, jump or stand',
-        'check the clocks and use_sim_time',
+        'header stamps of {subject} are over 1 s off the time of receipt, jump, or stand still',
+        'synchronise the clocks; check use_sim_time',
         FailureSource.CONTROL_SYSTEM,
         'Clocks disagree: times of messages cannot be trusted.',
     ),
     'POSITION_LEAP': AlertText(
-        'the position of {subject} changes by {peak:.1f} {rate}, ten times faster than it can move',
-        'check its unit (rad, not degrees), its name, and that nobody else publishes it',
+        'implausible jump of {subject}: {peak:.1f} {rate}, over ten times the speed it can move at',
+        'check its unit (rad, not degrees), its name, and that only one node publishes it',
         FailureSource.SENSOR,
-        'A position jumps: wrong unit, or two robots tell of one joint.',
+        'A joint position jumps: wrong unit, or two sources publish it.',
     ),
     'IMU_FRAME': AlertText(
-        'messages of {subject} come from another frame than the configuration names',
-        'see that this is the IMU whose mounting is given; else mend topics.imu.frame_id',
+        'the frame_id of {subject} is not the one in the configuration',
+        'check that this is the IMU whose mounting is configured; if so, set topics.imu.frame_id',
         FailureSource.DESIGN,
-        'Another IMU than the one that was set up: tilt cannot be trusted.',
+        'The data are not from the IMU that was configured: tilt cannot be trusted.',
     ),
     'IMU_ORIENTATION': AlertText(
-        'the orientation of {subject} is no rotation, or level while its acceleration is not',
-        'mend its driver; if it has no orientation, it should say so (covariance -1, REP-145)',
+        'the orientation of {subject} is invalid, or level while its acceleration shows a tilt',
+        'fix its driver; an IMU without orientation must say so (covariance -1, REP-145)',
         FailureSource.SENSOR,
-        'The IMU tells an orientation it does not know.',
+        'The orientation of the IMU is wrong: the accelerometer is used instead.',
     ),
     'IMU_GRAVITY': AlertText(
-        'at rest the acceleration differs from gravity by {peak:.0%}',
-        'check its unit (m/s2, not g) and that gravity is not removed from it',
+        'at rest the measured acceleration differs from gravity by {peak:.0%}',
+        'check its unit (m/s2, not g), and that its driver does not subtract gravity',
         FailureSource.SENSOR,
-        'The IMU does not feel gravity as it should: tilt cannot be trusted.',
+        'The IMU does not measure gravity correctly: tilt cannot be trusted.',
     ),
     'IMU_INCONSISTENT': AlertText(
         'orientation and acceleration of the IMU disagree by {degrees:.1f} degrees at rest',
-        'check the IMU: its orientation may be a default, or its axes exchanged',
+        'check the IMU: its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
     'PAYLOAD_INVALID': AlertText(
-        'a declared payload cannot be used',
-        'give a mass in kg that is not negative, in the frame of the payload link',
+        'the declared payload cannot be used',
+        'declare a mass of 0 kg or more, in the frame of the payload link',
         FailureSource.INTERACTION,
         'The load that was declared cannot be used.',
     ),
     'LIMITS_RELAXED': AlertText(
         '{relaxed}',
-        'keep people away; set it back into its range as soon as the reason is gone',
+        'keep people away; restore the permitted limit as soon as the reason is gone',
         FailureSource.INTERACTION,
-        'Somebody made the limit named wider than is safe, and said why.',
+        'Somebody set the limit named outside its safe range, and gave a reason.',
     ),
     # What only a live node sees; {detail} says who or why.
     'SECOND_PUBLISHER': AlertText(
         '{subject} has {peak:.0f} publishers: {detail}',
-        "stop all but the robot's own driver; samples of two sources are mixed",
+        "stop all but the robot's own driver: data of two sources are mixed",
         FailureSource.CONTROL_SYSTEM,
         level=WARN,
     ),
@@ -206,31 +221,31 @@ ALERTS = {
     ),
     'MESSAGES_LOST': AlertText(
         '{peak:.0f} messages of {subject} were lost before the monitor could take them',
-        'raise the parameter depth, or free the processor',
+        'raise the parameter depth, or reduce the processor load',
         FailureSource.COMMUNICATIONS,
         level=WARN,
     ),
     'EFFORT_SIGN': AlertText(
-        'the effort of {subject} is the opposite of what its load needs',
-        'if nothing holds the arm up, set effort_sign of this joint in the configuration',
+        'the effort of {subject} has the opposite sign of what its load requires',
+        'if nothing supports the arm, set effort_sign of this joint in the configuration',
         FailureSource.DESIGN,
         level=WARN,
     ),
     'NO_CLOCK': AlertText(
-        'use_sim_time is true but nothing came on /clock',
+        'use_sim_time is true, but no message arrives on /clock',
         'start the simulation, or set use_sim_time to false',
         FailureSource.CONTROL_SYSTEM,
         level=WARN,
     ),
     'PAYLOAD_DIFFERS': AlertText(
         '{detail}',
-        'declare the load that is in the hand; else see what the arm touches',
+        'declare the payload that is carried; if it is right, check what the arm touches',
         FailureSource.INTERACTION,
         level=WARN,
     ),
     'MONITOR_FAULT': AlertText(
         'the monitor could not evaluate a message of {subject}: {detail}',
-        'report this with the log of the node: it is a fault of the program',
+        'internal error of the program: report it with the log of the node',
         FailureSource.CONTROL_SYSTEM,
         level=ERROR,
     ),
@@ -284,8 +299,8 @@ def _torque(subject: str, settings: Settings) -> float:
 def tilt_left(degrees: float) -> str:
     """Return in words how much tilt is left, or how far the robot is past its tipping point."""
     if degrees >= 0.0:
-        return f'{degrees:.1f} degrees of tilt left before it tips'
-    return f'{-degrees:.1f} degrees past its tipping point'
+        return f'{degrees:.1f} degrees of tilt left before the robot tips'
+    return f'the robot is {-degrees:.1f} degrees past its tipping point'
 
 
 def advice(code: str) -> str:

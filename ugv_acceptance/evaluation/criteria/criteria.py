@@ -151,12 +151,12 @@ def default_criteria(settings: Settings) -> CriteriaSet:
         Criterion(
             'tip-over',
             Value('tip_angle', ANY, below=False, limit=limits.tip_error),
-            'the robot keeps its tilt left before it tips',
+            'the tilt left before the robot tips stays above its limit',
         ),
         Criterion(
             'support',
             AlertDemand(raised=False, code='NO_SUPPORT', level='ERROR'),
-            'the robot stands on its support polygon',
+            'the robot has a support polygon under it',
         ),
         Criterion(
             'coverage',
@@ -166,9 +166,9 @@ def default_criteria(settings: Settings) -> CriteriaSet:
         Criterion(
             'duration',
             DataDemand('duration', least=LEAST_DURATION),
-            'the recording is long enough to show anything',
+            'the recording is long enough for a verdict',
         ),
-        Criterion('whole file', DataDemand('salvaged', most=0.0), 'no file breaks off'),
+        Criterion('whole file', DataDemand('salvaged', most=0.0), 'no file is truncated'),
         Criterion('all messages', DataDemand('lost_messages', most=0.0), 'no message is missing'),
     )
     text = json.dumps([_plain(c) for c in criteria], sort_keys=True)

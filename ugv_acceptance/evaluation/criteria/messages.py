@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -41,12 +41,12 @@ def _value_words(demand: Value, settings: Settings) -> str:
     of = '' if demand.of in (ANY, 'robot') else f' of {demand.of}'
     text = f'{SIGNALS[demand.signal].words}{of} {side} {number(demand.limit, demand, settings)}'
     if demand.dwell is not None:
-        return f'{text} for {demand.dwell:g} s at a stretch'
+        return f'{text} for {demand.dwell:g} s without a break'
     allowed = []
     if demand.time_in_violation is not None:
-        allowed.append(f'{demand.time_in_violation:g} s in all')
+        allowed.append(f'{demand.time_in_violation:g} s in total')
     if demand.longest_violation is not None:
-        allowed.append(f'{demand.longest_violation:g} s at a stretch')
+        allowed.append(f'{demand.longest_violation:g} s at a time')
     if demand.share_in_violation is not None:
         allowed.append(f'{demand.share_in_violation:.1%} of the time')
     return (
@@ -63,11 +63,11 @@ def number(value: float, demand: Value, settings: Settings) -> str:
 
 
 def _alert_words(demand: AlertDemand) -> str:
-    what = ' '.join(x for x in (demand.level, demand.code) if x) or 'any'
+    level = level_words(demand.level) if demand.level else None
+    what = ' '.join(x for x in (level, demand.code) if x) or 'any'
     of = f' of {demand.of}' if demand.of else ''
-    return (
-        f'{what} alert{of} raised' if demand.raised else f'no {what} alert{of}'.replace(' any', '')
-    )
+    count = 'at least one' if demand.raised else 'no'
+    return f'{count} {what} alert{of}'.replace(' any', '', 1)
 
 
 def _data_words(demand: DataDemand) -> str:
@@ -78,7 +78,7 @@ def _data_words(demand: DataDemand) -> str:
         if math.isfinite(bound)
     ]
     of = f' of {demand.of}' if demand.of else ''
-    return f'{quantity.words}{of} {" and ".join(bounds)} {quantity.unit}'.strip()
+    return f'{quantity.words}{of}: {" and ".join(bounds)} {quantity.unit}'.strip()
 
 
 def _map_words(demand: MapDemand) -> str:
@@ -91,7 +91,7 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
     if demand.dwell is not None:
         kept = measured['longest_kept_s']
         needed = _value_words(demand, settings)
-        return f'{measure.criterion.name}: kept for {kept:.2f} s; needed: {needed}'
+        return f'{measure.criterion.name}: held for {kept:.2f} s; required: {needed}'
     must = f'must stay {measured["must_be"]} {number(demand.limit, demand, settings)}'
     spent = f'{measured["time_in_violation_s"]:.2f} s in violation'
     at = f'at {measured["at_s"]:.2f} s'
@@ -100,14 +100,14 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
         _, unit = shown('torque', worst.subject, settings)
         return (
             f'{worst.subject} needs {worst.value * limit:.1f} {unit} {at}; its limit is '
-            f'{limit:.1f} {unit}, {must} ({spent})'
+            f'{limit:.1f} {unit}: its utilisation {must} ({spent})'
         )
     if demand.signal == 'tip_angle':
         degrees = math.degrees(worst.value)
-        where = f'of tilt left before it tips to the {worst.subject}'
+        where = f'of tilt left before the robot tips to the {worst.subject}'
         if degrees < 0.0:
-            where = f'past its tipping point to the {worst.subject}'
-        return f'{abs(degrees):.1f} degrees {where} {at}; {must} ({spent})'
+            where = f'past the tipping point to the {worst.subject}'
+        return f'{at}: {abs(degrees):.1f} degrees {where}; the tilt left {must} ({spent})'
     subject = '' if worst.subject == 'robot' else f' of {worst.subject}'
     words = SIGNALS[demand.signal].words
     return f'{words}{subject} was {number(worst.value, demand, settings)} {at}; {must} ({spent})'

@@ -50,7 +50,7 @@ def _tilt(rows: MarginRows, _: Settings) -> Floats:
 
 
 SIGNALS = {
-    'torque_utilisation': SignalKind(_utilisation, 'joints', ('',), '', 'torque / limit'),
+    'torque_utilisation': SignalKind(_utilisation, 'joints', ('',), '', 'torque utilisation'),
     'torque': SignalKind(
         lambda rows, _: np.abs(rows.torque),
         'joints',
@@ -81,13 +81,23 @@ SIGNALS = {
         lambda rows, _: rows.angle, 'sides', ('angle',), 'deg', 'tilt left', _DEGREES
     ),
     'tip_moment': SignalKind(
-        lambda rows, _: rows.moment, 'sides', ('torque',), 'N m', 'moment that holds', detail=True
+        lambda rows, _: rows.moment,
+        'sides',
+        ('torque',),
+        'N m',
+        'restoring moment about the edge',
+        detail=True,
     ),
     'tip_energy': SignalKind(
-        lambda rows, _: rows.energy, 'sides', ('',), 'J', 'energy to tip', detail=True
+        lambda rows, _: rows.energy, 'sides', ('',), 'J', 'energy needed to tip over', detail=True
     ),
     'zmp': SignalKind(
-        lambda rows, _: rows.zmp[:, None], 'robot', ('length',), 'm', 'ZMP inside', detail=True
+        lambda rows, _: rows.zmp[:, None],
+        'robot',
+        ('length',),
+        'm',
+        'distance of the ZMP inside the support polygon',
+        detail=True,
     ),
     'tilt': SignalKind(_tilt, 'robot', ('angle',), 'deg', 'tilt of the base', _DEGREES),
 }
@@ -161,11 +171,11 @@ DATA = {
     'protected': Quantity(
         lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum', share=True
     ),
-    'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'files that break off'),
+    'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'truncated files'),
     'lost_messages': Quantity(
-        lambda r: float(r['bag']['lost_messages']), 'messages that metadata.yaml tells of missing'
+        lambda r: float(r['bag']['lost_messages']), 'messages counted in metadata.yaml but missing'
     ),
-    'findings': Quantity(lambda r: float(len(r['bag']['findings'])), 'oddities of the file'),
+    'findings': Quantity(lambda r: float(len(r['bag']['findings'])), 'findings about the file'),
     'late_messages': Quantity(
         lambda r: float(r['inputs']['late_messages']), 'messages out of order'
     ),
@@ -174,7 +184,7 @@ DATA = {
     'gaps': Quantity(lambda i: float(i['gaps']), 'gaps', each_input=True),
     'longest_gap': Quantity(lambda i: i['longest_gap_s'], 'longest gap', 's', each_input=True),
     'malformed': Quantity(lambda i: float(i['malformed']), 'malformed messages', each_input=True),
-    'faults': Quantity(lambda i: float(len(i['faults'])), 'kinds of fault', each_input=True),
+    'faults': Quantity(lambda i: float(len(i['faults'])), 'kinds of input fault', each_input=True),
 }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
-from ugv_acceptance.evaluation.alerts.messages import describe
+from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
@@ -88,10 +88,9 @@ def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> s
 def alert_words(alert: Alert, findings: Findings) -> str:
     """Return an alert as a sentence with level, code, begin and end."""
     end = 'the end' if alert.end is None else f'{findings.seconds(alert.end):.2f} s'
-    return (
-        f'{LEVELS[alert.rule.level]} {alert.rule.code} from {findings.seconds(alert.start):.2f} s '
-        f'to {end}: {describe(alert, findings.settings)}'
-    )
+    name = f'{level_words(alert.rule.level)} {alert.rule.code}'
+    start = f'{findings.seconds(alert.start):.2f} s'
+    return f'{name} from {start} to {end}: {describe(alert, findings.settings)}'
 
 
 def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
@@ -102,7 +101,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     evidence = tuple(_related(measure, findings))
     short = short_of_data(measure.evaluated, criterion, findings)
     if not measure.samples:
-        return Outcome(INCONCLUSIVE, f'{criterion.name}: no value was known', measured)
+        return Outcome(INCONCLUSIVE, f'{criterion.name}: no value could be computed', measured)
     if not _met(measure):
         if measure.demand.dwell is not None and short:
             return Outcome(INCONCLUSIVE, short, measured, evidence)
@@ -114,10 +113,10 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     if measure.demand.always and measured['inside_bound'] and _decides(criterion, findings):
         bound = measured['uncertainty']
         text = (
-            f'{criterion.name}: met by {measured["distance"]:.3g} {measured["unit"]}, within the '
-            f'uncertainty of {bound["bound"]:.3g} {measured["unit"]}'
+            f'{criterion.name}: met by {measured["distance"]:.3g} {measured["unit"]}, less '
+            f'than its uncertainty of {bound["bound"]:.3g} {measured["unit"]}'
         )
-        return Outcome(INCONCLUSIVE, text.replace(' ,', ','), measured, evidence)
+        return Outcome(INCONCLUSIVE, text.replace(' ,', ',').strip(), measured, evidence)
     return Outcome(PASS, demand_words(criterion, findings.settings), measured, evidence)
 
 
@@ -278,7 +277,8 @@ def _judge_alert(criterion: Criterion, findings: Findings) -> Outcome:
         return Outcome(INCONCLUSIVE, short, measured)
     if demand.raised:
         text = (
-            f'{criterion.name}: {demand_words(criterion, findings.settings)}, but it did not come'
+            f'{criterion.name}: no such alert was raised; required: '
+            f'{demand_words(criterion, findings.settings)}'
         )
         return Outcome(FAIL, text, measured)
     return Outcome(PASS, demand_words(criterion, findings.settings), measured)
@@ -322,9 +322,9 @@ def _unmet_words(
             f'({demand.least:.0%} needed)'
         )
     if demand.quantity == 'salvaged':
-        return f'the recording breaks off: {data["bag"]["salvaged"]}'
+        return f'the recording is truncated: {data["bag"]["salvaged"]}'
     if demand.quantity == 'lost_messages':
-        return f'{data["bag"]["lost_messages"]} messages that metadata.yaml tells of are missing'
+        return f'{data["bag"]["lost_messages"]} messages counted in metadata.yaml are missing'
     unit = unit_of(demand.quantity)
     texts = {k: 'unknown' if x is None else f'{x:.4g} {unit}'.strip() for k, x in unmet.items()}
     numbers = ', '.join(f'{k} {text}'.removeprefix('run ') for k, text in texts.items())

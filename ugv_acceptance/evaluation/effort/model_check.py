@@ -233,11 +233,11 @@ def _friction(s: _Samples) -> Json:
     columns = np.column_stack((np.sign(rate), rate, np.ones(len(rate))))
     fit = least_squares(columns, s.difference[motion])
     if fit is None:
-        return {'friction': None, 'friction_unknown': 'motion one way or at one speed alone'}
+        return {'friction': None, 'friction_unknown': 'motion in one direction or at one speed'}
     found = {'coulomb': _interval(fit), 'viscous': _interval(fit, 1)}
     # Friction dissipates: a surely negative coefficient is inertia, or a load that moves the arm.
     if any(part is not None and part['high'] < -ROUNDING for part in found.values()):
-        return {'friction': None, 'friction_unknown': 'other forces outweigh it'}
+        return {'friction': None, 'friction_unknown': 'masked by other forces'}
     return {'friction': found, 'friction_unknown': ''}
 
 

@@ -189,8 +189,8 @@ class PayloadEstimate:
     def sentence(self) -> str:
         """The sentence for the operator."""
         return (
-            f'the motors work as if {max(self.mass, 0.0):.1f} kg were in the hand, '
-            f'{self.declared:.1f} kg are declared'
+            f'measured efforts suggest a payload of {max(self.mass, 0.0):.1f} kg, '
+            f'but {self.declared:.1f} kg is declared'
         )
 
 

@@ -94,7 +94,7 @@ def _rate(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
         yield Finding(WARN, name, text, f'raise the rate to at least {SLOWEST:g} Hz')
     elif worst > max(3 / rate, 0.1):
         yield Finding(
-            WARN, name, text, 'such gaps are STALE to the monitor: check load and network'
+            WARN, name, text, 'the monitor has NO DATA in such gaps: check load and network'
         )
     else:
         yield Finding(OK, name, text)
@@ -187,7 +187,7 @@ def _gravity(size: float, g: float) -> Finding:
         return Finding(FAIL, about, seen, 'it is in g: let the driver send m/s2 (REP-145)')
     if size <= 0.15 * g:
         return Finding(
-            FAIL, about, seen, 'gravity is removed: let the driver send raw acceleration'
+            FAIL, about, seen, 'gravity was subtracted: let the driver send raw acceleration'
         )
     return Finding(FAIL, about, seen, f'expected {g:.2f}: calibrate it, or check its unit')
 
