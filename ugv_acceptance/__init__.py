@@ -59,7 +59,7 @@ __all__ = [
 
 # Packages that only some commands need, by their names on PyPI. setup.py reads this table as text,
 # and those commands name them in their error messages: this package itself is not on PyPI, so
-# `pip install ugv_acceptance[console]` would not work.
+# there its name with an extra behind it would install nothing.
 EXTRAS: dict[str, tuple[str, ...]] = {
     # Older versions of s3fs lack `endpoint_url`; pip falls back to them beside a newer botocore.
     'cluster': ('dask', 'distributed', 'fsspec', 's3fs>=2023.1'),

@@ -1,4 +1,4 @@
-"""No output of a verb replaces an input, another output, or a file that we did not write."""
+"""What a verb writes never costs anybody a file: no input, no other output, nothing of others."""
 
 import inspect
 import json
@@ -150,7 +150,7 @@ def refused(name: str, *arguments: object, option: str = '', path: object = '') 
 
 @pytest.mark.parametrize('name', VERBS)
 def test_no_verb_has_an_output_that_is_not_asked_about_here(name: str) -> None:
-    """Every path option of every verb is an input or stands in this file's table of outputs."""
+    """Each option that is a path is read, or stands in a table of this file; it can overwrite."""
     hints = get_type_hints(verb(name))
     paths = {
         NAMES.get(k, f'--{k}')
@@ -172,7 +172,7 @@ def test_no_verb_has_an_output_that_is_not_asked_about_here(name: str) -> None:
 def test_an_output_is_never_an_input(
     place: Path, name: str, option: str, what: str, spelling: str
 ) -> None:
-    """An output is refused if it is an input by any spelling or link, even with --overwrite."""
+    """By no name, for no kind of input, not even with --overwrite."""
     arguments, inputs = GIVEN[name]
     source = place / inputs[what]
     alias = Path(f'alias{FILES[name, option]}')
@@ -198,7 +198,7 @@ def _long(option: str) -> str:
 def test_nothing_is_written_into_the_folder_of_a_recording(
     place: Path, name: str, option: str, bag: str
 ) -> None:
-    """No output is written into a recording's folder or below it, however it was named."""
+    """Whether the folder was named or a file in it; nor into a folder below it."""
     (place / 'run' / 'below').mkdir()
     arguments = [bag] if name == 'evaluate' else ['torque', '--from-bag', bag]
     for folder in ('run', 'run/below'):
@@ -219,7 +219,7 @@ def test_nothing_is_written_into_the_folder_of_a_recording(
 def test_two_outputs_are_never_one_file(
     place: Path, name: str, one: str, other: str, link: str
 ) -> None:
-    """Two outputs are refused if they are one file, also by a link to a file not yet there."""
+    """Neither by a link, nor one that leads to what will be there only afterwards."""
     endings = ('.svg', '.png') if name == 'map' else (FILES[name, one], FILES[name, other])
     first, second = (Path(f'out{n}{ending}') for n, ending in enumerate(endings))
     if link != 'to nothing yet':
@@ -230,7 +230,7 @@ def test_two_outputs_are_never_one_file(
         second.symlink_to(place / first)
     arguments = [*GIVEN[name][0], one, first, other, second, '--overwrite']
     before = contents(place)
-    with pytest.raises(AcceptanceError, match=f'expected a file of its own, got that of {_any()}'):
+    with pytest.raises(AcceptanceError, match=f'this one is also the output of {_any()}'):
         run(name, *arguments)
     assert contents(place) == before
 
@@ -240,16 +240,16 @@ def _any() -> str:
 
 
 def test_the_same_name_twice_is_refused(place: Path) -> None:
-    """Two outputs with one path are refused, also if it is spelt in two ways."""
+    """Spelt in two ways."""
     assert place.is_dir()
     text = refused('map', 'torque', '--out', 'a.svg', '--out', 'run/../a.svg', option='--out')
-    assert 'got that of --out' in text
+    assert 'this one is also the output of --out' in text
 
 
 @pytest.mark.parametrize(('name', 'option'), FILES)
 @pytest.mark.parametrize('content', [b'mine', b'{"version": 1}', b'<html></html>', b'# a: 1\n'])
 def test_a_file_of_others_stays(place: Path, name: str, option: str, content: bytes) -> None:
-    """A file we did not write is not replaced; the error names --overwrite."""
+    """Without --overwrite, which the error names."""
     target = Path(f'old{FILES[name, option]}')
     (place / target).write_bytes(content)
     arguments = GIVEN[name][0]
@@ -260,7 +260,7 @@ def test_a_file_of_others_stays(place: Path, name: str, option: str, content: by
 
 @pytest.mark.parametrize('ending', MAPS)
 def test_a_map_of_others_stays(place: Path, ending: str) -> None:
-    """A picture or table we did not write is not replaced by a map, in any format."""
+    """Whatever its format."""
     (place / f'old{ending}').write_bytes(b'mine')
     refused('map', 'torque', '--out', f'old{ending}', option='--out', path=f'old{ending}')
 
@@ -292,7 +292,7 @@ WRONG = {
 def test_an_ending_that_does_not_fit_is_told(
     place: Path, name: str, option: str, target: str, told: str
 ) -> None:
-    """A wrong ending is refused with those that fit, and the option for the format given."""
+    """With those that do, and the option for that format."""
     assert place.is_dir()
     assert set(WRONG) == set(FILES)
     text = refused(name, *GIVEN[name][0], option, target, option=_long(option), path=target)
@@ -312,7 +312,7 @@ def test_an_ending_that_does_not_fit_is_told(
     ],
 )
 def test_it_is_one_line_and_exit_code_2(place: Path, words: list[str]) -> None:
-    """A refused output prints one line, ends with 2 and leaves all files as they were."""
+    """As a person meets it: nothing but that line, and all files as they were."""
     before = contents(place)
     done = process(*words)
     assert done.returncode == 2
@@ -323,7 +323,7 @@ def test_it_is_one_line_and_exit_code_2(place: Path, words: list[str]) -> None:
 
 
 def test_what_evaluate_wrote_it_replaces(place: Path) -> None:
-    """The same `evaluate` twice replaces its own files of every kind, but no recording."""
+    """The same command twice: every kind of file is known again, but a recording is not risked."""
     pytest.importorskip('pyarrow', reason='extra table is not installed')
     pytest.importorskip('weasyprint', reason='extra pdf is not installed')
     options = [x for o, e in EVALUATE.items() if o != '--annotate' for x in (o, f'out{e}')]
@@ -338,7 +338,7 @@ def test_what_evaluate_wrote_it_replaces(place: Path) -> None:
 
 
 def test_results_of_several_and_of_unreadable_bags_are_known_again(place: Path) -> None:
-    """Results of several recordings, and of an unreadable one, are recognised as ours."""
+    """A list of results, and one that says only what is wrong with its recording."""
     (place / 'broken.mcap').write_bytes(b'no recording')
     for _ in range(2):
         assert (
@@ -350,7 +350,7 @@ def test_results_of_several_and_of_unreadable_bags_are_known_again(place: Path) 
 
 @pytest.mark.parametrize('ending', MAPS)
 def test_a_map_is_known_again(place: Path, ending: str) -> None:
-    """A map is recognised as ours in each format, and is not taken for a table of margins."""
+    """In each format; a map is no table of margins."""
     target = f'map{ending}'
     for steps in (5, 6):
         assert run('map', 'torque', '--steps', steps, '--out', target).exit_code == 0
@@ -360,7 +360,7 @@ def test_a_map_is_known_again(place: Path, ending: str) -> None:
 
 
 def test_another_kind_of_ours_is_a_file_of_others(place: Path) -> None:
-    """A file of ours is not replaced by another kind: a card by a report, say."""
+    """A card is no report; the result of a campaign is none of a recording."""
     assert run('plan', '--short', '--card', 'card.html').exit_code == 0
     refused('evaluate', 'run', '--report', 'card.html', option='--report', path='card.html')
     assert run('campaign', 'run', '--out', 'out', '--workers', '1').exit_code == 0
@@ -379,7 +379,7 @@ def test_another_kind_of_ours_is_a_file_of_others(place: Path) -> None:
     ],
 )
 def test_a_plan_that_somebody_edited_stays(place: Path, edit: Callable[[str], str]) -> None:
-    """A plan is replaced only if nobody edited it; a comment is an edit too."""
+    """One that nobody edited is replaced; a comment is an edit too."""
     plan = place / 'plan.yaml'
     for _ in range(2):
         assert run('plan', '--short', '-o', 'plan.yaml').exit_code == 0
@@ -392,7 +392,7 @@ def test_a_plan_that_somebody_edited_stays(place: Path, edit: Callable[[str], st
 
 
 def test_criteria_that_somebody_edited_stay(place: Path) -> None:
-    """Proposed criteria are replaced only if nobody edited them."""
+    """The proposal itself is replaced, and is a file of criteria."""
     words = ['evaluate', 'run', '--init-criteria', 'new.yaml']
     assert run(*words).exit_code == 0
     assert run(*words).exit_code == 0
@@ -405,20 +405,20 @@ def test_criteria_that_somebody_edited_stay(place: Path) -> None:
 
 
 def test_overwrite_replaces_what_is_no_input(place: Path) -> None:
-    """With --overwrite a file of others is replaced, unless it is an input."""
+    """Asked for in so many words."""
     (place / 'old.json').write_text('mine')
     assert run('evaluate', 'run', '--json', 'old.json', '--overwrite').exit_code == 0
     assert json.loads((place / 'old.json').read_text())['verdict'] == 'PASS'
 
 
 def test_an_empty_file_is_nothing_to_lose(place: Path) -> None:
-    """An empty file, as mktemp makes it, is replaced without --overwrite."""
+    """As mktemp leaves it."""
     (place / 'new.json').touch()
     assert run('evaluate', 'run', '--json', 'new.json').exit_code == 0
 
 
 def test_a_link_is_followed(place: Path) -> None:
-    """An output that is a symbolic link writes the file it leads to; the link stays a link."""
+    """The link stays a link, and the file it leads to is asked about."""
     (place / 'far').mkdir()
     (place / 'latest.json').symlink_to('far/result.json')
     for _ in range(2):
@@ -432,7 +432,7 @@ def test_a_link_is_followed(place: Path) -> None:
     'option', ['--json', '--csv', '--parquet', '--annotate', '--init-criteria']
 )
 def test_a_file_beside_the_output_stays(place: Path, option: str) -> None:
-    """Writing an output touches no other file, not even one named like it with .part."""
+    """Even one whose name is that of the output and .part, such as half of a download."""
     if option == '--parquet':
         pytest.importorskip('pyarrow', reason='extra table is not installed')
     target = f'new{EVALUATE[option]}'
@@ -457,7 +457,7 @@ def test_a_file_beside_the_output_stays(place: Path, option: str) -> None:
     ],
 )
 def test_a_folder_of_others_is_not_filled(place: Path, name: str, words: list[str]) -> None:
-    """A folder, file or place below a file of others is refused before anything is done."""
+    """Nor emptied: it is refused before anything is done; so is a file, and a place below one."""
     (place / 'theirs').mkdir()
     (place / 'theirs' / 'notes.txt').write_text('mine')
     before = contents(place)
@@ -479,7 +479,7 @@ def test_a_folder_of_others_is_not_filled(place: Path, name: str, words: list[st
 def test_a_folder_never_takes_the_place_of_an_input(
     place: Path, name: str, words: list[str], config: str
 ) -> None:
-    """An output folder is never an input's folder, not even with --overwrite."""
+    """Not even with --overwrite."""
     (place / config).parent.mkdir(parents=True)
     (place / 'robot.yaml').rename(place / config)
     shutil.move(place / 'packbot.urdf', (place / config).parent)
@@ -489,7 +489,7 @@ def test_a_folder_never_takes_the_place_of_an_input(
 
 
 def test_a_campaign_is_not_written_into_a_recording(place: Path) -> None:
-    """A campaign's folder may lie beside recordings, but not inside or in place of one."""
+    """Nor in the place of one; beside the recordings of a folder it may be."""
     for target in ('run', 'run/campaign'):
         words = ['.', '--out', target, '--overwrite', '--workers', '1']
         assert 'the recording' in refused('campaign', *words, option='--out', path=target)
@@ -498,7 +498,7 @@ def test_a_campaign_is_not_written_into_a_recording(place: Path) -> None:
 
 
 def test_a_campaign_goes_on_in_its_own_folder(place: Path) -> None:
-    """A campaign continues in its own folder, complete or not, but not in one of recordings."""
+    """One that is whole, and one that was ended before its statement; not one of recordings."""
     words = ['flat', '--out', 'out', '--workers', '1']
     assert run('campaign', *words).exit_code == 0
     assert run('campaign', *words).exit_code == 0
@@ -513,7 +513,7 @@ def test_a_campaign_goes_on_in_its_own_folder(place: Path) -> None:
 
 
 def test_a_plan_in_the_folder_of_a_run_stays(place: Path) -> None:
-    """A folder that holds only a plan is not taken for an interrupted run."""
+    """A folder with nothing but a plan is no run that was begun."""
     (place / 'plans').mkdir()
     shutil.copy(place / 'mine.yaml', place / 'plans' / 'plan.yaml')
     before = contents(place)
@@ -526,7 +526,7 @@ def test_a_plan_in_the_folder_of_a_run_stays(place: Path) -> None:
 
 
 def test_devices_and_pipes_are_written_as_they_are(place: Path) -> None:
-    """An output that is a device or pipe is written directly, whatever its ending."""
+    """Nothing is in their place afterwards, and no ending is asked for."""
     words = [
         'evaluate',
         'run',
@@ -551,14 +551,14 @@ def test_devices_and_pipes_are_written_as_they_are(place: Path) -> None:
 
 
 def test_a_map_needs_an_ending(place: Path) -> None:
-    """A map is refused for a pipe, because only an ending says its format."""
+    """A pipe has none that would say which format is meant."""
     assert place.is_dir()
     words = ('torque', '--out', '/dev/null')
     assert 'expected .svg, .png' in refused('map', *words, option='--out', path='/dev/null')
 
 
 def test_a_table_and_a_recording_go_through_a_pipe(place: Path) -> None:
-    """A table and an annotated recording can be written to a pipe, as by a shell's >(command)."""
+    """As a shell's >(command) hands one over."""
     reading, writing = os.pipe()
     with os.fdopen(reading, 'rb') as source, (place / 'got').open('wb') as target:
         child = subprocess.Popen(['cat'], stdin=source, stdout=target)
@@ -572,8 +572,8 @@ def test_a_table_and_a_recording_go_through_a_pipe(place: Path) -> None:
 
 
 def test_standard_output_that_is_a_file_is_one_output_like_others(place: Path) -> None:
-    """Two outputs that lead to one file through standard output are refused."""
+    """Two outputs that a shell leads to one file would spoil each other."""
     with (place / 'all.txt').open('wb') as file:
         done = process('plan', '--short', '-o', '/dev/stdout', '--card', '/dev/stdout', stdout=file)
     assert done.returncode == 2
-    assert 'got that of --out' in done.stderr
+    assert 'this one is also the output of --out' in done.stderr

@@ -309,7 +309,7 @@ def test_what_is_not_found_is_asked_for(
     told[lost[0]][lost[1]] = [gone] if option == '--bag' else gone
     (tmp_path / 'result.json').write_text(json.dumps(told), 'utf-8')
     error = str(run(VERIFY, tmp_path / 'result.json').exception)
-    assert error.startswith(f'{gone}: expected it there')
+    assert error.startswith(f'{gone}: expected this file')
     assert error.endswith(f'give its path with {option}')
     assert '\n' not in error
 

@@ -13,7 +13,7 @@ from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import with_most_used
+from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
@@ -92,16 +92,14 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
     """Return the smallest margins in a few words; '' where they are not known."""
     if not snapshot.known:
         return ''
-    parts = []
-    tilts = [(a, side) for side, a in zip(SIDES, snapshot.angle, strict=True) if math.isfinite(a)]
-    if tilts:
-        angle, side = min(tilts)
-        degrees = math.degrees(angle)
+    side, angle = least_tilt(snapshot.angle)
+    degrees = math.degrees(angle)
+    if side:
         ways = (
             f'{degrees:.1f} degrees of tilt left',
             f'{-degrees:.1f} degrees past the tipping point',
         )
-        parts.append(f'{ways[degrees < 0]} to the {side}')
+        tilt = f'{ways[degrees < 0]} to the {side}'
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
     return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])
