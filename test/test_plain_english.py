@@ -60,7 +60,8 @@ def texts_of(path: Path) -> Iterator[str]:
     }
     for node in ast.walk(tree):
         if isinstance(node, ast.JoinedStr):
-            yield ''.join(v.value if isinstance(v, ast.Constant) else '{}' for v in node.values)
+            parts = (v.value if isinstance(v, ast.Constant) else '{}' for v in node.values)
+            yield ''.join(map(str, parts))
         elif (
             isinstance(node, ast.Constant)
             and isinstance(node.value, str)

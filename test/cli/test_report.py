@@ -239,7 +239,7 @@ def test_hostile_names_are_escaped_everywhere(tmp_path: Path) -> None:
 
 
 def test_parquet_has_the_margins_of_the_csv(papers: Path) -> None:
-    """Parquet has the rows and torques of the CSV, in SI units."""
+    """The same rows and torques, in SI."""
     table = pq.read_table(papers / 'packbot_gap.parquet')
     with (papers / 'packbot_gap.csv').open() as lines:
         rows = list(csv.DictReader(lines))
@@ -309,13 +309,13 @@ def test_what_is_not_found_is_asked_for(
     told[lost[0]][lost[1]] = [gone] if option == '--bag' else gone
     (tmp_path / 'result.json').write_text(json.dumps(told), 'utf-8')
     error = str(run(VERIFY, tmp_path / 'result.json').exception)
-    assert error.startswith(f'{gone}: expected this file')
+    assert error.startswith(f'{gone}: expected this file (seen from')
     assert error.endswith(f'give its path with {option}')
     assert '\n' not in error
 
 
 def test_another_recording_has_another_hash(papers: Path) -> None:
-    """`verify` finds that the recording is not the one that was judged."""
+    """What was judged then is not what lies there now."""
     bag = SHIPPED / 'packbot_pass'
     done = run(VERIFY, papers / 'packbot_fail.json', '--bag', bag)
     assert done.exit_code == 1
@@ -333,7 +333,7 @@ def test_another_recording_has_another_hash(papers: Path) -> None:
     ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    """A file that is no result of ours is refused by `verify` with one line."""
+    """With one line that says what was expected."""
     path = tmp_path / 'r.json'
     path.write_text(text, 'utf-8')
     done = run(VERIFY, path)

@@ -133,14 +133,14 @@ def records(run: Started) -> bool:
 DONE = dict.fromkeys(SIGNALS, 0)
 BROKEN_OFF = {number: 128 + number for number in SIGNALS}
 TOLD_TO = {
-    'monitor': (('monitor', '--plain'), says('STALE'), DONE),
+    'monitor': (('monitor', '--plain'), says('NO DATA'), DONE),
     'console': (('console', '--port', '0'), says('Console on'), DONE),
     'console BAG': (('console', BAG, '--port', '0'), says('Console on'), DONE),
     'watch': (('watch',), says('NO DATA'), DONE),
     'watch BAG': (('watch', BAG), says('OK'), DONE),
     'foxglove': (('foxglove', '--port', '0'), says('Foxglove WebSocket'), DONE),
     'replay': (('replay', BAG, '--loop'), on_the_net, DONE),
-    'demo': (('demo', '--rate', '0.2'), says('STALE'), BROKEN_OFF),
+    'demo': (('demo', '--rate', '0.2'), says('NO DATA'), BROKEN_OFF),
     'doctor': (('doctor', '--seconds', '600'), on_the_net, BROKEN_OFF),
     # What was recorded until then is judged and filed: inconclusive.
     'run': (('run', '--sim'), on_the_net, dict.fromkeys(SIGNALS, 3)),

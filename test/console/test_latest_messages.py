@@ -113,11 +113,17 @@ def test_silence_is_judged_by_the_period_heard() -> None:
     [
         ({}, ()),
         ({'tip_of': 'front'}, ()),
-        ({'tip_in_s': '1.2', 'tip_of': 'front'}, ('the robot tips to the front in 1.2 s at this rate',)),
+        (
+            {'tip_in_s': '1.2', 'tip_of': 'front'},
+            ('the robot tips to the front in 1.2 s at this rate',),
+        ),
         ({'tip_in_s': '1.2'}, ('the robot tips to the ? in 1.2 s at this rate',)),
         (
             {'payload_estimate_kg': '3.5', 'saturation_in_s': '0.7', 'saturation_of': 'elbow'},
-            ('elbow saturates in 0.7 s at this rate', 'measured efforts suggest a payload of 3.5 kg'),
+            (
+                'elbow saturates in 0.7 s at this rate',
+                'measured efforts suggest a payload of 3.5 kg',
+            ),
         ),
     ],
 )
