@@ -33,7 +33,8 @@ PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
 # Files of tests that `make colcon` leaves to `make pytest`.
-ONCE := $(foreach name,angles cluster kills operator outputs page_of_ restarted run_verb soak termination,'--ignore-glob=*test_$(name)*')
+ONCE := $(foreach name,angles cluster console_inputs kills levels operator outputs page_of_ plain_english recipe relaxed \
+    restarted run_verb soak termination,'--ignore-glob=*test_$(name)*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:

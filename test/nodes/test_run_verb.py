@@ -164,7 +164,7 @@ def test_the_run_stops_when_the_monitor_dies(tmp_path: Path) -> None:
     )
     with running(plan, out) as process:
         until(lambda: moved(recording(out, 'long', 60_000)))
-        os.kill(children(process)['monitor'], signal.SIGKILL)
+        os.kill(children(process)['monitor.node'], signal.SIGKILL)
         code, text = finished(process)
     assert code == 3, text
     assert 'the monitor has said nothing' in text
