@@ -167,7 +167,7 @@ def test_the_run_stops_when_the_monitor_dies(tmp_path: Path) -> None:
         os.kill(children(process)['monitor.node'], signal.SIGKILL)
         code, text = finished(process)
     assert code == 3, text
-    assert 'the monitor has said nothing' in text
+    assert 'the monitor has published nothing' in text
     assert json.loads((out / 'result.json').read_text())['verdict'] == 'INCONCLUSIVE'
     shoulder = positions(out / 'steps' / 'long')
     last = shoulder[-50:]
