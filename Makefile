@@ -34,7 +34,8 @@ REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
 # Files of tests that `make colcon` leaves to `make pytest`.
 ONCE := $(foreach name,angles cluster console_inputs kills levels operator outputs page_of_ plain_english recipe relaxed \
-    restarted run_verb soak termination,'--ignore-glob=*test_$(name)*')
+    restarted run_verb soak termination,'--ignore-glob=*test_$(name)*') \
+    $(foreach folder,bench hardening simulation,'--ignore-glob=*test/$(folder)/*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:
