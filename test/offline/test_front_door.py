@@ -232,7 +232,7 @@ def test_the_page_for_python_is_true(
     assert len(blocks) > 3
     names: dict[str, object] = {}
     for k, block in enumerate(blocks):
-        exec(compile(block, f'docs/python.md, block {k + 1}', 'exec'), names)  # noqa: S102 - ours
+        exec(compile(block, f'<docs/python.md, block {k + 1}>', 'exec'), names)  # noqa: S102 - ours
         if k == 0:
             assert capsys.readouterr().out == shown[0]
 
