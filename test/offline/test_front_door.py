@@ -19,6 +19,8 @@ from offline.typed_use import both
 from typer.testing import CliRunner
 
 import ugv_acceptance as ugv
+from ugv_acceptance.bag.raw import messages
+from ugv_acceptance.bag.writer import BagWriter, Qos
 
 RUNS = {'packbot_pass': 'PASS', 'packbot_fail': 'FAIL', 'packbot_gap': 'INCONCLUSIVE'}
 WITH_EXAMPLES = ('bag.recording', 'config.loading', 'offline.evaluate', 'monitoring.live_evaluator')
@@ -177,6 +179,24 @@ def test_a_robot_fed_from_python_raises_the_alerts_of_the_recording(
     assert sorted(told) == sorted(
         (a.code, a.subject, a.level, round(a.start_s, 6)) for a in expected
     )
+
+
+def test_topics_that_a_user_names_are_those_judged(repository: Path, tmp_path: Path) -> None:
+    """The names given to `open_recording` go before those of the configuration."""
+    source = ugv.open_recording(repository / 'bags' / 'packbot_pass')
+    kinds = {name: source.topics[name].type for name in source.topics}
+    with BagWriter(tmp_path / 'two') as writer:
+        for name, kind in kinds.items():
+            writer.add_topic(name, kind, Qos())
+        writer.add_topic('/other/imu', kinds['/imu/data'], Qos())
+        for logged in messages(source.bag, kinds):
+            writer.write(logged.topic, logged.log_time, logged.data)
+            if logged.topic == '/imu/data':
+                writer.write('/other/imu', logged.log_time, logged.data)
+    names = ('joint_states', 'other/imu', 'payload')
+    named = ugv.evaluate(ugv.open_recording(tmp_path / 'two', names=names))
+    assert named.judgement.topics.imu == '/other/imu'
+    assert ugv.evaluate(tmp_path / 'two').judgement.topics.imu == '/imu/data'
 
 
 def test_silence_takes_the_margins_away() -> None:

@@ -19,6 +19,8 @@ from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import Bag, Topic, Topics, choose_topics, open_bag
 
 Paths = Path | str | Sequence[Path | str]
+# The topics of joint states, IMU and payload where nobody names others.
+NAMES = ('joint_states', 'imu/data', 'payload')
 Message = JointStateSample | ImuSample | PayloadSample | BadSample
 
 
@@ -51,7 +53,7 @@ class Recording:
     """
 
     bag: Bag = field(repr=False)
-    names: tuple[str, str, str] = ('joint_states', 'imu/data', 'payload')
+    names: tuple[str, str, str] | None = None
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -81,7 +83,7 @@ class Recording:
 
     def chosen(self, *, imu_required: bool = True) -> Topics:
         """Return the topics to read; BadBag if the choice is ambiguous."""
-        return choose_topics(self.bag, *self.names, imu_required=imu_required)
+        return choose_topics(self.bag, *(self.names or NAMES), imu_required=imu_required)
 
     def __iter__(self) -> Iterator[Sample]:
         """Yield every joint state, IMU and payload message in the order in which it was logged."""
@@ -121,5 +123,4 @@ def open_recording(path: Paths, *, names: tuple[str, str, str] | None = None) ->
     >>> sorted(ugv.open_recording('bags/packbot_pass').topics)
     ['/imu/data', '/joint_states', '/payload']
     """
-    bag = open_bag(path)
-    return Recording(bag) if names is None else Recording(bag, names)
+    return Recording(open_bag(path), names)

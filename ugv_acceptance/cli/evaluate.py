@@ -1,16 +1,13 @@
 """`ugv-acceptance evaluate`: judges recorded runs and prints the verdict with its reasons."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
-
-if TYPE_CHECKING:
-    pass
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 BAD_INPUT = 2

@@ -113,7 +113,7 @@ def evaluate(
     robot = config if isinstance(config, Config) else load(config)
     settings = _carrying(robot, payload)
     opened = recording if isinstance(recording, Recording) else open_recording(recording)
-    opened = replace(opened, names=robot.topics.names)
+    opened = replace(opened, names=opened.names or robot.topics.names)
     demanded = _criteria(criteria, settings)
     effort = EffortComparison(settings)
     if options.compare_effort:
