@@ -21,7 +21,8 @@ class Rule:
 
     A value is bad from `value >= on` until `value < off`. The alert is raised when it has been bad
     for `on_delay` and cleared when it has been good for `off_delay` (ns). NaN changes nothing.
-    `source` says to which messages the values belong: pair, joints or imu.
+    `source` says to which messages the values belong: pair, joints or imu. An alert makes the
+    margins of the `reach` (ns) before its start doubtful as well: so long it took to confirm it.
     """
 
     code: str
@@ -32,6 +33,7 @@ class Rule:
     on_delay: int
     off_delay: int
     source: str = 'pair'
+    reach: int = 0
 
 
 @dataclass(slots=True)
