@@ -12,7 +12,7 @@ from rich.progress import Progress, TextColumn
 from rich.table import Table
 
 from ugv_acceptance.evaluation.alerts.messages import level_words
-from ugv_acceptance.report.format import doubts_of, missing_text
+from ugv_acceptance.report.format import doubts_of, missing_text, not_checked_lines
 
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
@@ -68,6 +68,11 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    unchecked = not_checked_lines(result)
+    if unchecked:
+        console.print('    [bold]NOT CHECKED:[/]')
+    for line in unchecked:
+        console.print(f'      {escape(line)}', soft_wrap=True)
     for doubt in doubts_of(result):
         console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
     if result['criteria']['path'] is not None:

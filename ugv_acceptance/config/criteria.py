@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import Document, read_document
-from ugv_acceptance.config.schema import Name, NotNegative, Positive, Section
+from ugv_acceptance.config.schema import Name, NotNegative, Positive, Reason, Section
 from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -26,6 +26,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.quantities import DATA, INPUTS, SIGNALS, subjects_of
+from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Joint
 
@@ -92,6 +93,7 @@ class CriteriaFile(Section):
     name: Name
     uncertainty: Method = 'rss'
     coverage: Share = 0.95
+    waive: dict[str, Reason] = Field(default={})
     criteria: dict[str, CriterionSection]
 
 
@@ -150,14 +152,32 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
     file = checked(document, CriteriaFile)
     if not file.criteria:
         raise BadConfig(f'{document.where(("criteria",))}: expected at least one criterion')
+    for name in file.waive:
+        _check_safeguard(document, name)
     criteria = tuple(
         _criterion(_Reading(document, name, settings), section)
         for name, section in file.criteria.items()
     )
     sha256 = hashlib.sha256(content).hexdigest()
     return CriteriaSet(
-        file.name, file.version, criteria, sha256, str(path), file.coverage, file.uncertainty
+        file.name,
+        file.version,
+        criteria,
+        sha256,
+        str(path),
+        file.coverage,
+        file.uncertainty,
+        tuple(file.waive.items()),
     )
+
+
+def _check_safeguard(document: Document, name: str) -> None:
+    """Raise BadConfig if a waiver names no safeguard."""
+    if name not in SAFEGUARDS:
+        near = get_close_matches(name, SAFEGUARDS, 1, 0.5)
+        hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(SAFEGUARDS)}'
+        where = document.where(('waive', name))
+        raise BadConfig(f'{where}: expected the name of a safeguard, got {shown(name)}; {hint}')
 
 
 def _criterion(reading: _Reading, section: CriterionSection) -> Criterion:

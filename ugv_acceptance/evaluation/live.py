@@ -60,6 +60,7 @@ class LiveEvaluator:
     _stance: Stance | None = None
     _gravity: Vector = NOWHERE
     _began: int | None = None
+    _known_until: int | None = None
 
     def __post_init__(self) -> None:
         self.watch = RuleSet(self.settings)
@@ -163,11 +164,11 @@ class LiveEvaluator:
                 signals.stale.set(due, 1.0)
         self.watch.relax(now if self._began is None else self._began)
         self._began = None
+        if now > self._alive_until():
+            self._lose(now)
         self.watch.predict()
         for signal in self.watch.signals():
             signal.advance(now)
-        if not self._alive(now):
-            self.margins = None
 
     @property
     def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -198,20 +199,29 @@ class LiveEvaluator:
             clock.step(now, wrong)
         fresh.message(now)
 
-    def _alive(self, now: int) -> bool:
+    def _alive_until(self) -> int:
+        """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
         joints, imu = self._fresh
         seen = min(self._joints.seen)
         if seen == NEVER or imu.last is None:
-            return False
-        return now <= seen + joints.limit and now <= imu.last + imu.limit
+            return NEVER
+        return min(seen + joints.limit, imu.last + imu.limit)
+
+    def _lose(self, now: int) -> None:
+        """Take that margins are unknown at `now` (ns): since they were stale, or from now on."""
+        self.margins = None
+        if self._known_until is not None:
+            self.watch.lose(min(now, self._known_until))
+            self._known_until = None
 
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
-        posture, gravity = self._posture, self._gravity
-        self.margins = None
-        if posture is None or self._stance is None or gravity[0] != gravity[0]:
+        posture, gravity, until = self._posture, self._gravity, self._alive_until()
+        unknown = posture is None or self._stance is None or gravity[0] != gravity[0]
+        if unknown or now > until or (self._known_until is not None and now > self._known_until):
+            self._lose(now)
+        if posture is None or self._stance is None or unknown or now > until:
             return None
-        if not self._alive(now):
-            return None
+        self._known_until = until
         torque: Any = torque_of(posture, gravity)
         stability = stability_of(self._stance, gravity)
         self._watch(now, torque, stability)

@@ -20,6 +20,7 @@ from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.row_selection import ALL, Rows, pick
 from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
@@ -58,7 +59,8 @@ class RecordedEvaluator:
     """Takes the batches of a recording in order; `watch.log` holds the alerts at the end.
 
     Moments, energies and ZMP are computed only with `detail`. `fresh` are the timeouts and `gaps`
-    the periods of silence (ns) of joint states and IMU.
+    the periods of silence (ns) of joint states and IMU, `first_payload` is the first payload that
+    was declared, and when (ns).
     """
 
     settings: Settings
@@ -71,6 +73,8 @@ class RecordedEvaluator:
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
     gaps: tuple[list[Gap], list[Gap]] = field(default_factory=lambda: ([], []))
+    first_payload: tuple[int, Payload] | None = None
+    _known_until: int | None = None
 
     def __post_init__(self) -> None:
         self.watch = RuleSet(self.settings)
@@ -99,6 +103,8 @@ class RecordedEvaluator:
 
     def finish(self, now: int) -> None:
         """Finish at the recording's end, `now` (ns): judge what becomes due until then."""
+        if self._known_until is not None and now > self._known_until:
+            self.watch.lose(self._known_until)
         inputs = (self.watch.joints, self.watch.imu)
         for fresh, signals, gaps in zip(self.fresh, inputs, self.gaps, strict=True):
             due = fresh.deadline
@@ -164,6 +170,7 @@ class RecordedEvaluator:
             self.watch.payload.step(when, 0.0 if payload else 1.0)
             if payload:
                 self._payload.declare(when, payload)
+                self.first_payload = self.first_payload or (when, payload)
 
     def _margins(self, newest: _Newest) -> MarginRows:
         """Return the margins of every message of the batch (not of the preceding rows)."""
@@ -252,7 +259,9 @@ class RecordedEvaluator:
 
     def _watch_pairs(self, rows: MarginRows) -> None:
         all_known = rows.known.all()
+        lost = self._lost(rows)
         time = rows.time if all_known else rows.time[rows.known]
+        time = _with(time, lost, lost.time)
         values_of = (*rows.torque.T, *rows.angle.T)
         signals = (*self.watch.torque, *self.watch.tip)
         for k, (values, (warn, error)) in enumerate(zip(values_of, signals, strict=True)):
@@ -260,15 +269,43 @@ class RecordedEvaluator:
                 continue
             some = values if all_known else values[rows.known]
             worse = np.abs(some) if k < len(self.watch.torque) else -some
+            worse = _with(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
         state = rows.state if all_known else rows.state[rows.known]
-        feed(self.watch.support, time, state >= NO_CONTACT)
+        feed(self.watch.support, time, _with(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
         if self.watch.slide.on < np.inf:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
-            feed(self.watch.slide, time, slides_first(tuple(gravity.T), least, friction))
+            slope = slides_first(tuple(gravity.T), least, friction)
+            feed(self.watch.slide, time, _with(slope, lost))
         self.watch.predict_rows(rows)
+
+    def _lost(self, rows: MarginRows) -> '_Lost':
+        """Return when margins became unknown that were known before."""
+        if not len(rows.time):
+            return _Lost(np.empty(0, np.intp), rows.time)
+        before, known, until = self._known_until, rows.known, rows.until
+        self._known_until = int(until[-1]) if known[-1] else None
+        ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
+        place, time = np.cumsum(known)[ends], until[ends]
+        if before is not None and (rows.time[0] > before or not known[0]):
+            first = min(before, int(rows.time[0]))
+            place, time = np.append(0, place), np.append(first, time)
+        return _Lost(place, time)
+
+
+@dataclass(frozen=True, slots=True)
+class _Lost:
+    """When margins became unknown: `time` (k,) in ns, and before which known row, `place` (k,)."""
+
+    place: NDArray[np.intp]
+    time: Times
+
+
+def _with(values: NDArray[Any], lost: _Lost, inserted: Times | float = -np.inf) -> NDArray[Any]:
+    """Return values of known rows with one inserted wherever margins became unknown."""
+    return np.insert(values, lost.place, inserted) if len(lost.place) else values
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

@@ -94,7 +94,9 @@ class Delays:
 class Settings:
     """Everything an evaluation needs besides the messages; `joints` follows `robot.joint_names`.
 
-    `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is.
+    `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is. With
+    `payload_known` the robot's payload is that carried until another is declared; without it, it is
+    only assumed.
     """
 
     robot: Robot
@@ -103,3 +105,4 @@ class Settings:
     limits: Limits
     delays: Delays = Delays()
     unsafe: str = ''
+    payload_known: bool = False

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.messages import advice, describe
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
+from ugv_acceptance.evaluation.criteria.criteria import LONGEST_UNSEEN
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.spans import UnseenStretches
 from ugv_acceptance.model.stability import SIDES, STATES
 
 # The window (ns) in which alerts are counted.
@@ -106,10 +108,11 @@ class Summary:
 
     `load` holds the largest |torque| of each joint (N m; N), `tip` the largest of minus the tilt
     left (rad) to each of SIDES, `*_violation` the time beyond the ERROR limit, `states` the number
-    of messages in each stability state.
+    of messages in each stability state, `unseen` the stretches without margins since `start`.
     """
 
     settings: Settings
+    start: int = 0
     evaluated: int = 0
     messages: int = 0
     load: list[Extreme] = field(init=False)
@@ -117,18 +120,21 @@ class Summary:
     tip: list[Extreme] = field(init=False)
     tip_violation: int = 0
     states: dict[str, int] = field(default_factory=dict)
+    unseen: UnseenStretches = field(init=False)
     _open: tuple[int, int, list[bool], bool] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.settings.robot.joint_names)
         self.load, self.load_violation = [Extreme() for _ in range(n)], [0] * n
         self.tip = [Extreme() for _ in SIDES]
+        self.unseen = UnseenStretches(self.start, round(LONGEST_UNSEEN * 1e9))
 
     def add(self, rows: MarginRows) -> None:
         """Take the margins of the next part of the recording."""
         if not len(rows.time):
             return
         self._close(int(rows.time[0]))
+        self.unseen.add(rows)
         known = rows.known
         limits = self.settings.limits
         load = np.abs(rows.torque.T)
@@ -156,6 +162,7 @@ class Summary:
     def finish(self, now: int) -> None:
         """Finish at the end of the recording, `now` (ns)."""
         self._close(now)
+        self.unseen.finish(now)
 
     def _close(self, now: int) -> None:
         """Count the last row's time, now that the next message or the end (`now`, ns) is known."""
@@ -191,6 +198,7 @@ def result_of(
             'duration_s': seconds,
             'fraction': summary.evaluated / duration if duration > 0 else 0.0,
             'messages_judged': summary.messages,
+            **_unseen_result(summary, start),
         },
         'torque': {
             name: _torque_result(summary, j, start)
@@ -203,6 +211,16 @@ def result_of(
             for alert in ordered(alerts)
         ],
         'alarm_rates': rates_result([alert.start for alert in alerts], start, duration),
+    }
+
+
+def _unseen_result(summary: Summary, start: int) -> dict[str, Any]:
+    spans = summary.unseen.spans
+    return {
+        'longest_unseen_s': summary.unseen.longest / 1e9,
+        'unseen_stretches': spans.count,
+        'unseen_total_s': spans.total / 1e9,
+        'unseen_s': [[(a - start) / 1e9, (b - start) / 1e9] for a, b in spans.first],
     }
 
 

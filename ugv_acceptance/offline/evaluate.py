@@ -5,7 +5,7 @@ The command line, campaigns, maps, the console and Python programs all use `eval
 
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,20 @@ from ugv_acceptance.config import Config, load
 from ugv_acceptance.config.criteria import load_criteria
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
-from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, default_criteria
+from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
+from ugv_acceptance.evaluation.criteria.criteria import (
+    INCONCLUSIVE,
+    CriteriaSet,
+    default_criteria,
+)
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
+from ugv_acceptance.evaluation.criteria.safeguards import with_objection
+from ugv_acceptance.evaluation.criteria.statement import Examination, Objection
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
+from ugv_acceptance.evaluation.holding_back import HeldMargins
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import limits_hash, relaxed
@@ -39,7 +47,7 @@ from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
-RESULT_VERSION = 1
+RESULT_VERSION = 2
 
 # Messages evaluated at a time, so that the arrays of a kernel stay in the processor's cache.
 STRETCH = 16384
@@ -118,7 +126,9 @@ def evaluate(
     effort = EffortComparison(settings)
     if options.compare_effort:
         options = replace(options, takers=(effort.add, *options.takers))
-    result, judgement = judge(opened, settings, demanded, sources_from(robot), options)
+    sources = sources_from(robot)
+    result, judgement = judge(opened, settings, demanded, sources, options)
+    result |= _both_loads(opened, judgement, demanded, sources, result)
     result |= _circumstances(opened, robot, identity)
     if payload is not None:
         carried = settings.robot.payload
@@ -127,6 +137,35 @@ def evaluate(
     if options.compare_effort:
         result['effort'] = effort.result(opened.start_ns)
     return Evaluation(opened, robot, result, judgement)
+
+
+def _both_loads(
+    opened: Recording,
+    judged: Judgement,
+    criteria: CriteriaSet | None,
+    sources: tuple[Source, ...],
+    result: Json,
+) -> Json:
+    """Return the changes to a result if the verdict depends on a load told only later.
+
+    The run is judged again as if the first payload that was declared had been carried all along.
+    """
+    first, settings = judged.evaluator.first_payload, judged.settings
+    if first is None or settings.payload_known or first[1] == settings.robot.payload:
+        return {}
+    if unknown_load(settings, first, judged.measurement) or first[0] <= judged.measurement.start:
+        return {}
+    carried = replace(settings, robot=replace(settings.robot, payload=first[1]))
+    other, _ = judge(opened, carried, criteria, sources)
+    if other['verdict'] == result['verdict']:
+        return {}
+    seconds = (first[0] - judged.measurement.start) / 1e9
+    reason = (
+        f'the load was told only after {seconds:.2f} s: with {settings.robot.payload.mass:g} kg '
+        f'until then (the configuration) {result["verdict"]}, with {first[1].mass:g} kg (told '
+        f'first) {other["verdict"]}; declare it from the start, or set payload.known'
+    )
+    return with_objection(result, Objection('payload', INCONCLUSIVE, reason))
 
 
 def _carrying(config: Config, payload: Payload | float | None) -> Settings:
@@ -141,7 +180,8 @@ def _carrying(config: Config, payload: Payload | float | None) -> Settings:
         raise BadConfig(
             f'payload: expected kg from 0 on, for a robot with a payload link, got {payload!r}'
         )
-    return replace(settings, robot=replace(settings.robot, payload=known))
+    robot = replace(settings.robot, payload=known)
+    return replace(settings, robot=robot, payload_known=True)
 
 
 def _criteria(criteria: CriteriaSet | Path | str | None, settings: Settings) -> CriteriaSet | None:
@@ -167,36 +207,92 @@ def judge(
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
     evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
-    summary, check = Summary(settings), ModelCheck(settings)
-    measurements = [limits] if asked is limits else [limits, asked]
-    told = AlertAdvice(settings, evaluator.watch.log, limits.payloads.at)
-    takers = [
-        summary.add, check.add, told.add, *(e.add for e in measurements), *options.takers
-    ]  # fmt: skip
+    reading = _Reading(settings, evaluator, limits, asked, options)
+    batches = bag.batches(topics, workers=options.readers)
     evaluator.start(bag.start_ns)
-    reading = bag.batches(topics, workers=options.readers)
-    for batch in _stretches(reading):
-        for measurement in measurements:
-            measurement.payloads.take(batch.payload)
-        rows = evaluator.batch(batch)
-        for take in takers:
-            take(rows)
-        if len(rows.time):
-            options.progress(int(rows.time[-1]))
+    for batch in _stretches(batches):
+        reading.take(batch)
     evaluator.finish(bag.end_ns)
-    for finish in (summary.finish, *(e.finish for e in measurements)):
-        finish(bag.end_ns)
+    reading.finish(bag.end_ns)
     log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
     data = {
-        **result_of(summary, log, bag.start_ns, length, told.sentences()),
-        'bag': _bag_result(bag, topics, reading.facts),
-        'inputs': _inputs_result(evaluator, topics, reading.facts, bag.start_ns),
-        'model_check': check.result(),
+        **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
+        'bag': _bag_result(bag, topics, batches.facts),
+        'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
+        'model_check': reading.check.result(),
     }
-    findings = Findings(asked, ordered(log), data, Bounds(settings, sources))
+    statements = [e.statement(*span) for e in reading.examinations]
+    statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
+    for statement in statements:
+        data |= statement.result
+    findings = Findings(
+        asked, ordered(log), data, Bounds(settings, sources), statements, reading.held.doubtful
+    )
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
-    return result, Judgement(settings, topics, evaluator, reading.facts, asked)
+    return result, Judgement(settings, topics, evaluator, batches.facts, asked)
+
+
+def _examinations(settings: Settings, evaluator: RecordedEvaluator) -> tuple[Examination, ...]:
+    """Return what looks at a run beside its criteria."""
+    del settings, evaluator
+    return ()
+
+
+@dataclass(slots=True)
+class _Reading:
+    """Gives each part of a recording's margins to all that needs them, while it is read.
+
+    What decides gets them held back: without the margins that a later contradiction reaches.
+    """
+
+    settings: Settings
+    evaluator: RecordedEvaluator
+    limits: CriteriaMeasurement
+    asked: CriteriaMeasurement
+    options: Options
+    summary: Summary = field(init=False)
+    check: ModelCheck = field(init=False)
+    told: AlertAdvice = field(init=False)
+    held: HeldMargins = field(init=False)
+    examinations: tuple[Examination, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.summary = Summary(self.settings, self.limits.start)
+        self.check = ModelCheck(self.settings)
+        self.examinations = _examinations(self.settings, self.evaluator)
+        log = self.evaluator.watch.log
+        self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
+        self.held = HeldMargins(log)
+
+    def take(self, batch: Batch) -> None:
+        """Take the messages of the next part of the recording."""
+        for measurement in self._measurements:
+            measurement.payloads.take(batch.payload)
+        rows = self.evaluator.batch(batch)
+        for take in (self.told.add, *self.options.takers):
+            take(rows)
+        self.held.distrust(unknown_load(self.settings, self.evaluator.first_payload, self.limits))
+        for believed in self.held.add(rows):
+            self._judge(believed)
+        if len(rows.time):
+            self.options.progress(int(rows.time[-1]))
+
+    def finish(self, now: int) -> None:
+        """Finish at the end of the recording, `now` (ns)."""
+        for believed in self.held.finish():
+            self._judge(believed)
+        for finish in (self.summary.finish, *(e.finish for e in self._measurements)):
+            finish(now)
+
+    @property
+    def _measurements(self) -> list[CriteriaMeasurement]:
+        return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
+
+    def _judge(self, rows: MarginRows) -> None:
+        takers = (self.summary, self.check, *self._measurements, *self.examinations)
+        for taker in takers:
+            taker.add(rows)
 
 
 def _circumstances(

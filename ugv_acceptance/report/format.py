@@ -117,6 +117,16 @@ def doubts_of(result: Json) -> list[str]:
     return [*doubts, text]
 
 
+def not_checked_lines(result: Json) -> list[str]:
+    """Return what no number of the run tells, one line each."""
+    return [_unchecked(one) for one in result['not_checked']]
+
+
+def _unchecked(one: Json) -> str:
+    seconds = f' ({one["seconds"]:.1f} s)' if one['seconds'] is not None else ''
+    return f'{one["what"]}{seconds}: {one["why"]}'
+
+
 def interval_text(found: Json | None, unit: str = '') -> str:
     """Return a fitted number with its 95 % confidence interval."""
     if found is None:

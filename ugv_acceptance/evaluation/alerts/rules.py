@@ -154,6 +154,13 @@ class RuleSet:
         found = [signal.alert for signal in self.signals() if signal.alert is not None]
         return sorted(found, key=lambda alert: -alert.rule.level)
 
+    def lose(self, when: int) -> None:
+        """Take that margins are unknown from `when` (ns) on: nothing is raised or held by them."""
+        of_margins = [s for pair in (*self.torque, *self.tip) for s in pair]
+        for signal in (*of_margins, self.support, self.slide):
+            if not signal.quiet:
+                signal.clear(when)
+
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]

@@ -19,6 +19,8 @@ RSS, WORST_CASE, IGNORED = 'rss', 'worst_case', 'ignored'
 LEAST_COVERAGE = 0.95
 # A shorter recording (s) cannot show that an input is silent or that an IMU contradicts itself.
 LEAST_DURATION = 1.0
+# A stretch (s) without margins that is longer than this is one in which nobody saw what happened.
+LONGEST_UNSEEN = 0.5
 ANY = 'any'
 
 Window = tuple[float, float]
@@ -118,7 +120,8 @@ class Criterion:
 class CriteriaSet:
     """A set of criteria judged together; `sha256` is of its file, or of the defaults as JSON.
 
-    `coverage` is the share of each window that must be evaluated for a PASS.
+    `coverage` is the share of each window that must be evaluated for a PASS, `waive` the names of
+    safeguards that are not to hold, with the reason.
     """
 
     name: str
@@ -128,6 +131,7 @@ class CriteriaSet:
     path: str | None = None
     coverage: float = LEAST_COVERAGE
     uncertainty: str = RSS
+    waive: tuple[tuple[str, str], ...] = ()
 
     def uncertainty_of(self, criterion: Criterion) -> str:
         """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""

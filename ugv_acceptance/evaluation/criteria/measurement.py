@@ -19,57 +19,9 @@ from ugv_acceptance.evaluation.criteria.quantities import SIGNALS, columns_of, s
 from ugv_acceptance.evaluation.inputs.payload import PayloadLog
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.spans import Spans
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.type_aliases import Floats, Times
-
-Span = tuple[int, int]
-
-# Number of time spans kept as evidence.
-MOST = 20
-
-
-@dataclass(slots=True)
-class Spans:
-    """Sums up time spans (ns) given in order, and joins those that touch; memory is bounded.
-
-    `first` are the first MOST spans, `longest` the longest one.
-    """
-
-    total: int = 0
-    count: int = 0
-    longest: Span = (0, 0)
-    first: list[Span] = field(default_factory=list)
-    _open: Span | None = None
-
-    def add(self, start: Times, end: Times) -> None:
-        """Take spans (n,) in order of time that do not overlap."""
-        if not len(start):
-            return
-        self.total += int((end - start).sum())
-        breaks = np.flatnonzero(start[1:] > end[:-1]) + 1
-        begins = start[np.concatenate(([0], breaks))].tolist()
-        ends = end[np.concatenate((breaks - 1, [len(end) - 1]))].tolist()
-        if self._open is not None and begins[0] <= self._open[1]:
-            begins[0] = self._open[0]
-        else:
-            self.close()
-        for span in zip(begins[:-1], ends[:-1], strict=True):
-            self._note(span)
-        self._open = (begins[-1], ends[-1])
-
-    def close(self) -> None:
-        """Finish: no span follows, so that the last one is complete."""
-        if self._open is not None:
-            self._note(self._open)
-        self._open = None
-
-    def _note(self, span: Span) -> None:
-        self.count += 1
-        if len(self.first) < MOST:
-            self.first.append(span)
-        if span[1] - span[0] > self.longest[1] - self.longest[0]:
-            self.longest = span
-
 
 # Number of worst rows, from different parts of the recording, whose uncertainty is computed.
 CANDIDATES = 4

@@ -167,6 +167,9 @@ DATA = {
     'coverage': Quantity(
         lambda r: r['coverage']['fraction'], 'share of the recording evaluated', share=True
     ),
+    'longest_unseen': Quantity(
+        lambda r: r['coverage']['longest_unseen_s'], 'longest stretch without margins', 's'
+    ),
     'duration': Quantity(lambda r: r['coverage']['duration_s'], 'length of the recording', 's'),
     'protected': Quantity(
         lambda r: _shares(r['bag']['protected']), 'share of chunks with a checksum', share=True

@@ -4,11 +4,12 @@ A violation is a FAIL however little was evaluated; a PASS needs enough data, an
 than the bound of its uncertainty.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
+from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
@@ -34,7 +35,16 @@ from ugv_acceptance.evaluation.criteria.messages import (
     violation_words,
 )
 from ugv_acceptance.evaluation.criteria.quantities import measured_of, shown, unit_of
+from ugv_acceptance.evaluation.criteria.safeguards import (
+    Safeguarded,
+    reasons_of,
+    safeguarded,
+    safeguards_result,
+    waived_words,
+)
+from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, moment_json
+from ugv_acceptance.evaluation.holding_back import Span, drawn_in_doubt
 from ugv_acceptance.evaluation.permitted_limits import relaxed_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Json
@@ -44,13 +54,17 @@ from ugv_acceptance.type_aliases import Json
 class Findings:
     """What verdicts are made from: measurements, alerts, numbers about the data, uncertainty.
 
-    `data` is the part of the result that `quantities.DATA` reads.
+    `data` is the part of the result that `quantities.DATA` reads, `statements` are those of the
+    examinations of the run. Alerts of the robot that rest on margins of the `doubtful` spans (ns)
+    decide nothing.
     """
 
     measurement: CriteriaMeasurement
     alerts: Sequence[Alert]
     data: Json
     bounds: Bounds
+    statements: Sequence[Statement] = ()
+    doubtful: Sequence[Span] = ()
 
     @property
     def settings(self) -> Settings:
@@ -60,6 +74,10 @@ class Findings:
     def seconds(self, time: int) -> float:
         """Return a log time (ns) as seconds since the start of the recording."""
         return (time - self.measurement.start) / 1e9
+
+    def in_doubt(self, alert: Alert) -> bool:
+        """Return whether an alert of the robot rests on margins that are contradicted."""
+        return alert.rule.code in FAILURES and drawn_in_doubt(alert, self.doubtful)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +95,12 @@ def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> s
     measurement = findings.measurement
     start, end = measurement.span_of(criterion.window)
     share, needed = evaluated / (end - start) if end > start else 0.0, measurement.criteria.coverage
-    if share >= needed and end > start:
+    outside = start >= measurement.end
+    if share >= needed and end > start and not outside:
         return None
     what = 'the recording'
+    if outside and criterion.window is not None:
+        return f'{criterion.name}: its window begins at {criterion.window[0]:g} s, after the end'
     if criterion.window is not None:
         what = f'{criterion.window[0]:g} to {criterion.window[1]:g} s'
     return f'only {share:.1%} of {what} could be evaluated ({needed:.0%} needed)'
@@ -207,10 +228,14 @@ def judge_criteria(findings: Findings) -> Json:
     """Return the verdict of the run, its reasons and every criterion's outcome, for JSON."""
     criteria = findings.measurement.criteria
     outcomes = [(c, _outcome(c, findings)) for c in criteria.criteria]
-    word, reasons = _overall([outcome for _, outcome in outcomes], findings)
+    held = safeguarded(
+        criteria, findings.settings, findings.alerts, findings.data, findings.statements
+    )
+    word, reasons = _overall(outcomes, held, findings)
+    waived = waived_words(criteria)
     return {
         'verdict': word,
-        'reasons': reasons,
+        'reasons': [*([waived] if waived else []), *reasons],
         'criteria': {
             'name': criteria.name,
             'version': criteria.version,
@@ -220,20 +245,37 @@ def judge_criteria(findings: Findings) -> Json:
             'coverage': criteria.coverage,
             'results': [_json(c, outcome, findings) for c, outcome in outcomes],
         },
+        'safeguards': safeguards_result(held, criteria),
+        'not_checked': [not_checked_json(one) for one in _not_checked(findings)],
     }
 
 
-def _overall(outcomes: Sequence[Outcome], findings: Findings) -> tuple[str, list[str]]:
+def _overall(
+    outcomes: Sequence[tuple[Criterion, Outcome]], held: Safeguarded, findings: Findings
+) -> tuple[str, list[str]]:
     for word in (FAIL, INCONCLUSIVE):
-        reasons = list(dict.fromkeys(o.reason for o in outcomes if o.verdict == word))
+        of = [(c.demand, o.reason) for c, o in outcomes if o.verdict == word]
+        values = [demand for demand, _ in of if isinstance(demand, Value)]
+        reasons = [*(reason for _, reason in of), *reasons_of(held, word, values)]
+        reasons = list(dict.fromkeys(reasons))
         if reasons and word == INCONCLUSIVE:
             reasons += missing_reasons(findings.alerts, findings.settings)
         if reasons:
-            return word, reasons
+            return word, list(dict.fromkeys(reasons))
     share = findings.data['coverage']['fraction']
     text = 'all margins kept' if findings.measurement.criteria.path is None else 'all criteria met'
     wider = relaxed_words(findings.settings)
     return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
+
+
+def _not_checked(findings: Findings) -> Iterable[NotChecked]:
+    for statement in findings.statements:
+        yield from statement.not_checked
+
+
+def not_checked_json(one: NotChecked) -> Json:
+    """Return what was not checked, and why, for JSON."""
+    return {'what': one.what, 'why': one.why, 'seconds': one.seconds}
 
 
 def _json(criterion: Criterion, outcome: Outcome, findings: Findings) -> Json:
@@ -261,7 +303,7 @@ def _judge_alert(criterion: Criterion, findings: Findings) -> Outcome:
     assert isinstance(demand, AlertDemand)  # noqa: S101 - by its kind
     assert isinstance(measure, KnownTime)  # noqa: S101 - the same
     start, end = measure.span
-    matching = [a for a in findings.alerts if _matches(a, demand)]
+    matching = [a for a in findings.alerts if _matches(a, demand) and not findings.in_doubt(a)]
     if demand.raised:
         found = [a for a in matching if start <= a.start <= end]
     else:

@@ -6,7 +6,7 @@ import hypothesis
 import numpy as np
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.criteria.measurement import MOST, Spans
+from ugv_acceptance.evaluation.spans import MOST, Spans
 
 # Lengths of gaps and spans in turn; a gap of 0 lets two spans touch.
 steps = st.lists(st.tuples(st.integers(0, 3), st.integers(1, 4)), max_size=60)
