@@ -288,7 +288,8 @@ class RecordedEvaluator:
         before, known, until = self._known_until, rows.known, rows.until
         self._known_until = int(until[-1]) if known[-1] else None
         ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
-        place, time = np.cumsum(known)[ends], until[ends]
+        place = np.cumsum(known, dtype=np.intp)[ends]
+        time = until[ends]
         if before is not None and (rows.time[0] > before or not known[0]):
             first = min(before, int(rows.time[0]))
             place, time = np.append(0, place), np.append(first, time)

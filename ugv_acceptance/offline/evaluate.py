@@ -290,9 +290,9 @@ class _Reading:
         return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
 
     def _judge(self, rows: MarginRows) -> None:
-        takers = (self.summary, self.check, *self._measurements, *self.examinations)
-        for taker in takers:
-            taker.add(rows)
+        parts = (self.summary.add, self.check.add, *(e.add for e in self._measurements))
+        for take in (*parts, *(e.add for e in self.examinations)):
+            take(rows)
 
 
 def _circumstances(
