@@ -256,6 +256,7 @@ class _Reading:
     told: AlertAdvice = field(init=False)
     held: HeldMargins = field(init=False)
     examinations: tuple[Examination, ...] = field(init=False)
+    _load_told: bool = False
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
@@ -272,7 +273,7 @@ class _Reading:
         rows = self.evaluator.batch(batch)
         for take in (self.told.add, *self.options.takers):
             take(rows)
-        self.held.distrust(unknown_load(self.settings, self.evaluator.first_payload, self.limits))
+        self._distrust_first_load(rows)
         for believed in self.held.add(rows):
             self._judge(believed)
         if len(rows.time):
@@ -284,6 +285,16 @@ class _Reading:
             self._judge(believed)
         for finish in (self.summary.finish, *(e.finish for e in self._measurements)):
             finish(now)
+
+    def _distrust_first_load(self, rows: MarginRows) -> None:
+        """Distrust the margins before a load that was told at once: they rest on another one."""
+        span = unknown_load(self.settings, self.evaluator.first_payload, self.limits)
+        if span is None or self._load_told:
+            return
+        used = rows.pairs.joints.time[rows.pairs.of_joints] >= span[1]
+        self._load_told = bool(used.any())
+        until = int(rows.time[used.argmax()]) if self._load_told else span[1]
+        self.held.distrust((span[0], until))
 
     @property
     def _measurements(self) -> list[CriteriaMeasurement]:
