@@ -36,9 +36,11 @@ def write(folder: Path, told: float, mass: float, seconds: float = 6.0) -> Path:
     return folder
 
 
-def judged(folder: Path, config: Path, told: float, mass: float, **more: float) -> Evaluation:
+def judged(
+    folder: Path, config: Path, told: float, mass: float, payload: float | None = None
+) -> Evaluation:
     """Return the evaluation of such a run."""
-    return ugv.evaluate(write(folder, told, mass), config=config, **more)
+    return ugv.evaluate(write(folder, told, mass), config=config, payload=payload)
 
 
 @pytest.fixture

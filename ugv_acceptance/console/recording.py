@@ -23,8 +23,9 @@ from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.offline.evaluate import Options, evaluate
+from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.offline.evaluation import Evaluation
+from ugv_acceptance.offline.judge import Options
 from ugv_acceptance.type_aliases import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
