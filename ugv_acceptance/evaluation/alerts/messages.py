@@ -183,10 +183,10 @@ ALERTS = {
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
     'PAYLOAD_INVALID': AlertText(
-        'the declared payload cannot be used',
+        'the declared payload cannot be used: {detail}',
         'declare a mass of 0 kg or more, in the frame of the payload link',
         FailureSource.INTERACTION,
-        'The load that was declared cannot be used.',
+        'The load that was declared cannot be used: no margin is known until a good one comes.',
     ),
     'LIMITS_RELAXED': AlertText(
         '{relaxed}',
@@ -279,6 +279,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
         relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
+        detail=alert.detail,
     )
 
 

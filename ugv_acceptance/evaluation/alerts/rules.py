@@ -80,6 +80,12 @@ class RuleSet:
             for name, signal in self.relaxed.items():
                 signal.step(now, 1.0 if name in found else 0.0)
 
+    def declared(self, now: int, fault: str) -> None:
+        """Take a declared payload at `now` (ns); `fault` says why it cannot be used; '': it can."""
+        if fault:
+            self.payload.detail = fault
+        self.payload.step(now, 1.0 if fault else 0.0)
+
     def predict(self) -> None:
         """Judge the live samples kept for the prediction; call it before time passes."""
         self.prediction.judge(self.settings.limits.torque)
