@@ -70,7 +70,7 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
     model = read_urdf(urdf_bytes, str(urdf_at))
     build = Build(document, file, model, list(model.warnings))
     settings = settings_from(build)
-    topics = topics_from(build)
+    topics = topics_from(build, settings)
     _check_strength(build, settings)
     return Config(
         file.robot.name,

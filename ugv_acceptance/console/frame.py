@@ -13,7 +13,11 @@ from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
+from ugv_acceptance.evaluation.least_margins import (
+    TILT_NOT_CHECKED,
+    least_tilt,
+    with_most_used,
+)
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
@@ -100,6 +104,8 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
             f'{-degrees:.1f} degrees past the tipping point',
         )
         tilt = f'{ways[degrees < 0]} to the {side}'
+    elif not settings.hears_imu:
+        tilt = TILT_NOT_CHECKED
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
     return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])

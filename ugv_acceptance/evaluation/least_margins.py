@@ -7,6 +7,9 @@ from typing import SupportsFloat
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
+# What stands in place of the tilt left where nobody measures it.
+TILT_NOT_CHECKED = 'tip-over not checked (no IMU: the base was declared level)'
+
 
 def least_tilt(angles: Iterable[SupportsFloat]) -> tuple[str, float]:
     """Return the side to which least tilt is left, and how much (rad); ('', NaN): none is known.

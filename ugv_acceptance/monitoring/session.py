@@ -104,7 +104,11 @@ class Session:
         self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
         self.trends = Trends(self.settings)
         self.advisory = Advisory(self.evaluator, self.trends, self.on_problem)
-        self.counts = {name: InputCount() for name in INPUTS}
+        unheard = {
+            'joint_states': not self.settings.hears_joints,
+            'imu': not self.settings.hears_imu,
+        }
+        self.counts = {name: InputCount() for name in INPUTS if not unheard.get(name)}
         self.evaluator.start(self.clock.now())
         decode, evaluator = joint_state_decoder().one, self.evaluator
         take = self._evaluating('joint_states', decode, JOINT_FIELDS, evaluator.joint_state)
