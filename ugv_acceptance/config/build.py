@@ -96,6 +96,17 @@ def _check_ranges(build: Build, settings: Settings) -> None:
         raise build.refuse(wrong.path, wrong.refusal)
     for found in relaxed(settings):
         build.warn(found.path, f'relaxed: {found.words}; reason: {settings.unsafe}')
+    error, tip = settings.limits.torque_error, math.degrees(settings.limits.tip_error)
+    if error > 1.0:
+        build.warn(
+            ('limits', 'torque_error'), f'a joint counts as within its limit up to {error:.0%} of it'
+        )
+    if tip <= 0.0:
+        build.warn(
+            ('limits', 'tip_error'),
+            'a robot counts as standing until it is '
+            + (f'{-tip:g} degrees past its tipping point' if tip else 'past its tipping point'),
+        )
 
 
 def _check_inputs(build: Build, settings: Settings) -> None:

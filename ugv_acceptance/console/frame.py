@@ -12,6 +12,7 @@ from typing import Any
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.least_margins import (
     TILT_NOT_CHECKED,
@@ -24,8 +25,7 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
-# What the page says where nothing is wrong or nothing is known.
-FINE = 'all margins kept'
+# What the page says where nothing is known.
 UNKNOWN = 'margins are not known'
 WAIT = 'do not move the robot on these numbers; check the inputs'
 
@@ -59,6 +59,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
     cause, advice = _cause(snapshot, level)
+    cause = cause or kept_words(settings)
     return {
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
@@ -127,6 +128,7 @@ def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
 
 
 def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
+    """Return what the level comes from, and what to do; '' where nothing is wrong."""
     active = [row for row in _by_urgency(snapshot.alerts) if row.end is None]
     over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None]
     if active and not (level == STALE and snapshot.problem):
@@ -137,7 +139,7 @@ def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
     if over and level != OK:
         do = 'reset it' if 'reset' in over[0].offers else 'acknowledge it'
         return f'{over[0].state}: {over[0].text}', f'{do} when the robot stands well again'
-    return FINE, ''
+    return '', ''
 
 
 def _alert(row: AlertRow, now: int) -> Plain:

@@ -39,4 +39,5 @@ def most_used(torque: Iterable[SupportsFloat], settings: Settings) -> tuple[str,
 def with_most_used(tilt: str, torque: Iterable[SupportsFloat], settings: Settings) -> str:
     """Return words on the tilt left, and behind them the joint that uses most of its limit."""
     joint, use = most_used(torque, settings)
-    return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
+    used = f'{joint} at {use:.0%} of its limit' if joint else ''
+    return ', '.join(words for words in (tilt, used) if words)

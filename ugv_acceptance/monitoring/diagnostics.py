@@ -10,6 +10,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
@@ -55,13 +56,14 @@ def verdict_of(session: Session) -> Status:
         return Status(STALE, '', text, values | known)
     if alarm_tracker.waiting:
         return _over(session, alarm_tracker.waiting[-1], left, values | known)
-    return Status(OK, '', f'all margins kept: {left}', values | known)
+    return Status(OK, '', f'{kept_words(session.settings)}: {left}', values | known)
 
 
 def _left(margins: Margins, settings: Settings) -> str:
     side, angle = least_tilt(margins.stability.angle)
     tilt = _tilt_words(side, angle) if side else 'no tilt margin'
-    tilt = tilt if settings.hears_imu else TILT_NOT_CHECKED
+    if not settings.hears_imu:
+        return with_most_used('', margins.torque, settings)
     return with_most_used(tilt, margins.torque, settings)
 
 

@@ -24,6 +24,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 from ugv_acceptance.evaluation.criteria.safeguards import with_objection
 from ugv_acceptance.evaluation.criteria.statement import Objection
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
+from ugv_acceptance.evaluation.criteria.verdict import not_checked_json
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
@@ -31,6 +32,7 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.offline.acknowledgements import add_acknowledgements
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
+from ugv_acceptance.offline.not_read import not_read
 from ugv_acceptance.type_aliases import Json
 
 
@@ -91,6 +93,7 @@ def evaluate(
     result, judgement = judge(opened, settings, demanded, sources, options)
     result |= _both_loads(opened, judgement, demanded, sources, result)
     result |= _circumstances(opened, robot, identity)
+    result['not_checked'] += [not_checked_json(one) for one in not_read(opened, robot)]
     if payload is not None:
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}

@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     default_criteria,
 )
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
+from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
@@ -70,7 +71,7 @@ def judge(
     The result holds what follows from margins, alerts and data, without robot, software and
     identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
     """
-    bag, topics = recording.bag, recording.chosen()
+    bag, topics = recording.bag, recording.chosen(imu_required=False)
     span = bag.start_ns, bag.end_ns
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
@@ -90,6 +91,8 @@ def judge(
         'model_check': reading.check.result(),
     }
     statements = [e.statement(*span) for e in reading.examinations]
+    absent = absent_imu(settings, topics.imu)
+    statements.append(absent)
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
@@ -98,6 +101,9 @@ def judge(
     )
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
+    # The cause goes before what follows from it.
+    causes = [objection.reason for objection in absent.objections]
+    result['reasons'].sort(key=lambda reason: reason not in causes)
     return result, Judgement(settings, topics, evaluator, batches.facts, asked)
 
 

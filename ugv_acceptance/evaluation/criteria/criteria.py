@@ -150,8 +150,7 @@ def default_criteria(settings: Settings) -> CriteriaSet:
         for name, limit in zip(robot.joint_names, limits.torque, strict=True)
         if math.isfinite(limit)
     ]
-    criteria = (
-        *torque,
+    stands = (
         Criterion(
             'tip-over',
             Value('tip_angle', ANY, below=False, limit=limits.tip_error),
@@ -162,6 +161,10 @@ def default_criteria(settings: Settings) -> CriteriaSet:
             AlertDemand(raised=False, code='NO_SUPPORT', level='ERROR'),
             'the robot has a support polygon under it',
         ),
+    )
+    criteria = (
+        *torque,
+        *(stands if settings.hears_imu else ()),
         Criterion(
             'coverage',
             DataDemand('coverage', least=LEAST_COVERAGE),
