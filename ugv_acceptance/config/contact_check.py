@@ -15,6 +15,10 @@ from ugv_acceptance.type_aliases import Floats
 
 # How far (m) a contact point may lie outside: tracks and tyres are often drawn without treads.
 SLACK = 0.05
+# How far (m) a mesh reaches from its link's origin at most, in diagonals of all other geometry.
+AS_LARGE = 0.75
+# Lowest and highest corner (3,) of an extent along the axes, m.
+Box = tuple[Floats, Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,49 +52,63 @@ def compared(robot: Robot, shapes: Sequence[Shape]) -> Compared:
         body, point = in_body(tree, contact.link, contact.position)
         axes = slice(2) if body == 0 else slice(3)
         at = np.array(point, dtype=np.float64)
-        boxes, unread = _boxes(tree, pose, shapes, body, float(at[2]))
-        off = _off(at[axes], [(low[axes], high[axes]) for low, high in boxes])
-        if off <= SLACK:
-            continue
-        if unread or not boxes:
+        boxes = _boxes(tree, pose, shapes, body, float(at[2]))
+        if boxes is None:
             unknown.append(contact)
-        else:
+        elif (off := _off(at[axes], [(low[axes], high[axes]) for low, high in boxes])) > SLACK:
             outside.append((contact, off))
     return Compared(tuple(outside), tuple(unknown))
 
 
-def _off(point: Floats, boxes: Sequence[tuple[Floats, Floats]]) -> float:
+def _off(point: Floats, boxes: Sequence[Box]) -> float:
     """Return how far (m) a point lies outside the extent of all boxes together."""
-    if not boxes:
-        return float('inf')
-    low = np.min([low for low, _ in boxes], axis=0)
-    high = np.max([high for _, high in boxes], axis=0)
+    low, high = _together(boxes)
     away = np.maximum(np.maximum(low - point, point - high), 0.0)
     return float(np.linalg.norm(away))
 
 
+def _together(boxes: Sequence[Box]) -> Box:
+    low = np.min([low for low, _ in boxes], axis=0)
+    high = np.max([high for _, high in boxes], axis=0)
+    return low, high
+
+
 def _boxes(
     tree: Tree, pose: Pose, shapes: Sequence[Shape], body: int, height: float
-) -> tuple[list[tuple[Floats, Floats]], bool]:
-    """Return the extents to compare a contact of `body` with, and whether some cannot be read.
+) -> list[Box] | None:
+    """Return the extents to compare a contact of `body` with; None if too little is known of them.
 
     They are its body's own, in its axes; for the base also what reaches down to the contact's
-    `height` (m), such as a wheel that turns on a joint of its own.
+    `height` (m), such as a wheel that turns on a joint of its own. A mesh is taken as at most
+    about as large as the rest of a robot whose wheels or tracks are known.
     """
-    found, unread = [], False
-    for place, low, high in _placed(tree, pose, shapes, body):
-        own = place == body
-        if low is None or high is None:
-            unread = unread or own or (body == 0 and tree.bodies[place].parent == 0)
-        elif own or (body == 0 and low[2] <= height + SLACK):
-            found.append((low, high))
-    return found, unread
+    placed = list(_placed(tree, pose, shapes, body))
+    found = [
+        (centre - half, centre + half)
+        for place, centre, half in placed
+        if half is not None and (place == body or centre[2] - half[2] <= height + SLACK)
+    ]
+    meshes = [
+        centre
+        for place, centre, half in placed
+        if half is None and (place == body or tree.bodies[place].parent == 0)
+    ]
+    if not found or (meshes and body != 0):
+        return None
+    if meshes and not any(low[2] <= height + SLACK for low, _ in found):
+        return None
+    low, high = _together(found)
+    reach = AS_LARGE * np.linalg.norm(high - low)
+    return found + [(centre - reach, centre + reach) for centre in meshes]
 
 
 def _placed(
     tree: Tree, pose: Pose, shapes: Sequence[Shape], body: int
-) -> Iterator[tuple[int, Floats | None, Floats | None]]:
-    """Yield the body of each shape, and the shape's extent in the axes of `body` (or of the base)."""
+) -> Iterator[tuple[int, Floats, Floats | None]]:
+    """Yield body, centre and half extent of each shape in the axes of `body` (for the base: all).
+
+    The half extent (m) is None for a shape that is not read.
+    """
     for shape in shapes:
         place, turn, xyz = tree.frames[shape.link]
         if body not in (0, place):
@@ -100,12 +118,9 @@ def _placed(
             outer = np.array(pose.rotation[place], dtype=np.float64)
             origin = np.array(pose.origin[place], dtype=np.float64) + outer @ origin
             rotation = outer @ rotation
-        if shape.size is None:
-            yield place, None, None
-            continue
         centre = origin + rotation @ np.array(shape.xyz)
-        half = _half(shape, rotation @ np.array(shape.rotation))
-        yield place, centre - half, centre + half
+        half = None if shape.size is None else _half(shape, rotation @ np.array(shape.rotation))
+        yield place, centre, half
 
 
 def _half(shape: Shape, rotation: Floats) -> Floats:
