@@ -11,6 +11,7 @@ from typing import Any
 
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
+from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
@@ -113,7 +114,9 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
 
 
 def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
-    """Return rows by urgency: active, severe, unseen and new first; tip-over before motors.
+    """Return rows by urgency: active, severe, unseen and new first.
+
+    A contradiction of the IMU comes before tip-over, and tip-over before motors.
 
     A caution is left out while the danger of the same code and subject is active.
     """
@@ -121,8 +124,8 @@ def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
     rows = [row for row in rows if row.level != WARN or (row.code, row.subject) not in worse]
 
     def key(row: AlertRow) -> tuple[object, ...]:
-        tips = row.code in {'TIP_OVER', 'NO_SUPPORT'}
-        return (row.end is not None, -row.level, not tips, not row.unseen, -row.start, row.key)
+        first = -urgency(row.code, row.level)
+        return (row.end is not None, -row.level, first, not row.unseen, -row.start, row.key)
 
     return sorted(rows, key=key)
 

@@ -9,6 +9,7 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
+from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
@@ -125,9 +126,9 @@ def _named(alert: Alert) -> dict[str, object]:
     return {'code': rule.code, 'subject': rule.subject, 'class': suspect_of(rule.code)}
 
 
-def _severity(alert: Alert) -> tuple[int, bool]:
-    """Return the sort key of an alert: its level, and at equal level tip-over before others."""
-    return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
+def _severity(alert: Alert) -> tuple[int, int]:
+    """Return the sort key of an alert: its level, and its urgency at that level."""
+    return alert.rule.level, urgency(alert.rule.code, alert.rule.level)
 
 
 def alert_status(change: Change, session: Session) -> Status:

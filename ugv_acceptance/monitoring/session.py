@@ -13,11 +13,13 @@ from typing import Any
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import limits_hash
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
+from ugv_acceptance.monitoring.certainty import CODE, Certainty
 from ugv_acceptance.monitoring.faults import Faults
 from ugv_acceptance.monitoring.receipt_clock import Clock, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.trends import Trends
@@ -74,7 +76,8 @@ class Session:
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
     stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
-    dates what comes in, `stamps` converts header stamps to its time. `take_joint_state`, `take_imu`
+    dates what comes in, `stamps` converts header stamps to its time. `sources` are the sources of
+    uncertainty: a margin that is kept by less than its bound is told. `take_joint_state`, `take_imu`
     and `take_payload` take a serialised message and never raise.
     """
 
@@ -84,6 +87,7 @@ class Session:
     on_problem: Callable[[str], None]
     clock: Clock = field(default_factory=ReceiptClock)
     stamps: StampShift = field(default_factory=StampShift)
+    sources: tuple[Source, ...] = ()
     evaluator: LiveEvaluator = field(init=False)
     faults: Faults = field(init=False)
     alarm_tracker: AlarmTracker = field(init=False)
@@ -93,6 +97,7 @@ class Session:
     take_payload: Callable[[bytes], None] = field(init=False)
     trends: Trends = field(init=False)
     advisory: Advisory = field(init=False)
+    certainty: Certainty = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
     limits_hash: str = field(init=False)
     _known: bool = False
@@ -108,6 +113,7 @@ class Session:
             'joint_states': not self.settings.hears_joints,
             'imu': not self.settings.hears_imu,
         }
+        self.certainty = Certainty(self.settings, self.sources)
         self.counts = {name: InputCount() for name in INPUTS if not unheard.get(name)}
         self.evaluator.start(self.clock.now())
         decode, evaluator = joint_state_decoder().one, self.evaluator
@@ -131,8 +137,19 @@ class Session:
         """Let time pass: judge silence and delays, and clear faults that are over."""
         now = self.clock.now()
         self.evaluator.tick(now)
+        if self.sources and now >= self.certainty.due:
+            self._doubt(now)
         self.faults.advance(now)
         self._look()
+
+    def _doubt(self, now: int) -> None:
+        """Report the margins that are kept by less than their uncertainty."""
+        before = self.certainty.told
+        self.certainty.look(now, self.evaluator.margins, self.evaluator.payload)
+        for subject in before.keys() - self.certainty.told.keys():
+            self.faults.clear(now, CODE, subject)
+        for subject, doubt in self.certainty.told.items():
+            self.faults.set(now, CODE, subject, 1.0, doubt.sentence)
 
     def feel(self) -> None:
         """Check the declared payload against the measured efforts; to be called once a second."""
@@ -152,7 +169,7 @@ class Session:
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; learnt periods and active alerts stay."""
-        self.settings = self.trends.settings = settings
+        self.settings = self.trends.settings = self.certainty.settings = settings
         self.limits_hash = limits_hash(settings)
         self.evaluator.adopt(settings)
         self.tick()

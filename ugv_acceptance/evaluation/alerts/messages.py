@@ -243,6 +243,12 @@ ALERTS = {
         FailureSource.INTERACTION,
         level=WARN,
     ),
+    'MARGIN_UNCERTAIN': AlertText(
+        '{detail}',
+        'treat this margin as used up: bring the load closer, lower the arm, face the slope',
+        FailureSource.INTERACTION,
+        level=WARN,
+    ),
     'MONITOR_FAULT': AlertText(
         'the monitor could not evaluate a message of {subject}: {detail}',
         'internal error of the program: report it with the log of the node',

@@ -18,6 +18,16 @@ STRANGE = 0.15
 LEAP = 10.0
 
 
+def urgency(code: str, level: int) -> int:
+    """Return how urgent an alert is among those of its level: the larger, the sooner it is told.
+
+    What contradicts the IMU comes before a tip-over that was drawn from it, and that before others.
+    """
+    if code.startswith('IMU_') and level > WARN:
+        return 2
+    return 1 if code in ('TIP_OVER', 'NO_SUPPORT') else 0
+
+
 @dataclass(slots=True)
 class RuleSet:
     """The signals of all alert rules of a robot; `log` receives every alert that is raised.
