@@ -1,4 +1,4 @@
-"""What a configuration says that no robot can be: it is warned of by field, and right ones are not."""
+"""What a configuration says that no robot can be is warned of by field; what is right is not."""
 
 import re
 from pathlib import Path
@@ -10,6 +10,10 @@ from ugv_acceptance.config import Config, load
 
 UNSAFE = 'unsafe_limits: "bench test, robot tied down"\n'
 BOX = '<collision><geometry><box size="2 2 0.2"/></geometry></collision>'
+ROD = (
+    '<collision><origin xyz="{x} 0 0" rpy="1.5707963 0 0"/>'
+    '<geometry><cylinder radius="0" length="2"/></geometry></collision>'
+)
 SHARED = Path(__file__).parents[2].parent / 'shared' / 'robots'
 
 
@@ -47,9 +51,7 @@ def test_no_tilt_in_reserve_is_warned_of(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('joint', ['lift', 'slide'])
-def test_a_joint_that_carries_much_without_a_limit_is_warned_of(
-    tmp_path: Path, joint: str
-) -> None:
+def test_a_joint_that_carries_much_without_a_limit_is_warned_of(tmp_path: Path, joint: str) -> None:
     """`limit: null` on a joint that carries the arm says so, with the torque it carries."""
     yaml = re.sub(rf'  {joint}:\n    limit_n(m?): \d+', rf'  {joint}:\n    limit_n\1: null', YAML)
     (found,) = of(config_of(tmp_path, yaml), f'joints.{joint}.limit')
@@ -87,14 +89,10 @@ def test_contacts_within_the_robot_are_no_warning(tmp_path: Path) -> None:
     'shape',
     [
         BOX,
-        '<collision><origin rpy="0 0 1.5707963"/><geometry><box size="2 2 0.2"/></geometry>'
-        '</collision>',
+        BOX.replace('<geometry>', '<origin rpy="0 0 1.5707963"/><geometry>'),
         '<collision><geometry><cylinder radius="1" length="3"/></geometry></collision>',
         '<collision><origin xyz="0 0 0.5"/><geometry><sphere radius="1"/></geometry></collision>',
-        '<collision><origin xyz="1 0 0" rpy="1.5707963 0 0"/><geometry>'
-        '<cylinder radius="0" length="2"/></geometry></collision>'
-        '<collision><origin xyz="-1 0 0" rpy="1.5707963 0 0"/><geometry>'
-        '<cylinder radius="0" length="2"/></geometry></collision>',
+        ROD.format(x=1) + ROD.format(x=-1),
     ],
 )
 def test_contacts_wider_than_the_robot_are_warned_of(
@@ -117,7 +115,9 @@ def on_wheels(kind: str, shape: str) -> str:
     wheels = ''.join(
         WHEELS.format(n=n, kind=kind, x=x, y=y, shape=shape) for n, (x, y) in at.items()
     )
-    body = '<collision><origin xyz="0 0 0.4"/><geometry><box size="1 1 0.2"/></geometry></collision>'
+    body = (
+        '<collision><origin xyz="0 0 0.4"/><geometry><box size="1 1 0.2"/></geometry></collision>'
+    )
     return with_shape(body).replace('</robot>', f'{wheels}</robot>')
 
 
@@ -143,7 +143,9 @@ def test_wheels_are_part_of_what_a_robot_stands_on(
 
 def test_an_arm_stretched_out_makes_no_robot_wider(tmp_path: Path) -> None:
     """The arm's geometry above the ground does not excuse a contact point under its hand."""
-    arm = '<collision><origin xyz="1 0 0.5"/><geometry><box size="4 0.1 0.1"/></geometry></collision>'
+    arm = (
+        '<collision><origin xyz="1 0 0.5"/><geometry><box size="4 0.1 0.1"/></geometry></collision>'
+    )
     urdf = with_shape(BOX).replace('<link name="arm">', f'<link name="arm">{arm}', 1)
     yaml = YAML.replace('[1, 1, 0]', '[2, 0, 0]')
     assert len(of(config_of(tmp_path, yaml, urdf), 'contacts.a.position')) == 1

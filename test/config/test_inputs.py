@@ -27,7 +27,7 @@ def test_a_robot_may_have_no_imu(tmp_path: Path) -> None:
 
 
 def test_a_robot_may_have_no_joint_states(tmp_path: Path) -> None:
-    """A null topic of joint states with all joints held is read: the posture is the declared one."""
+    """A null topic of joint states with all joints held is read: the posture is declared."""
     config = config_of(tmp_path, ROVER + NO_JOINTS)
     assert (config.settings.hears_imu, config.settings.hears_joints) == (True, False)
     assert list(config.topics.used) == ['imu', 'payload']
@@ -69,9 +69,7 @@ def test_by_default_both_inputs_are_used(tmp_path: Path) -> None:
         (YAML.replace('mass_kg: 1}', 'mass_kg: 1, known: "yes"}'), r'payload\.known: expected'),
     ],
 )
-def test_half_a_declaration_is_refused_by_its_field(
-    tmp_path: Path, yaml: str, words: str
-) -> None:
+def test_half_a_declaration_is_refused_by_its_field(tmp_path: Path, yaml: str, words: str) -> None:
     """What contradicts itself is refused with file, line, field, and what was expected."""
     with pytest.raises(BadConfig, match=rf'two\.yaml:\d+: {words}'):
         config_of(tmp_path, yaml)

@@ -142,7 +142,7 @@ def test_nothing_is_demanded_that_nobody_measures() -> None:
 
 
 def test_joints_that_carry_weight_without_a_limit_are_named() -> None:
-    """A joint without limit that carries torque in any attitude is not checked; a wheel carries none."""
+    """A joint without limit that carries torque in some attitude is named; a wheel is not."""
     body = robot()
     wheel = Joint('wheel', 'continuous', 'base', 'tyre', (0.0, 0.4, 0.1), axis=(0.0, 1.0, 0.0))
     mast = Joint('mast', 'continuous', 'base', 'pole', (0.0, 0.0, 0.4), axis=(0.0, 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""Margins that are kept by less than their uncertainty, and what leads the verdict when sensors differ."""
+"""Margins kept by less than their uncertainty, and what leads the verdict when sensors differ."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -23,8 +23,6 @@ from ugv_acceptance.monitoring.session import Session
 CONFIG = load()
 SETTINGS, SOURCES = CONFIG.settings, sources_from(CONFIG)
 S, MS = 1_000_000_000, 1_000_000
-# The arm stretched forward and up: about 60 degrees left to the front, and 40.
-SAFE, NEAR = (0.0, 1.4, -0.5, 2.0), (0.0, 0.9, 0.0, 2.0)
 
 
 @dataclass(slots=True)
@@ -139,9 +137,7 @@ def test_a_margin_at_its_bound_raises_one_alert_and_no_storm() -> None:
     """A posture that swings about the border for a minute gives one alert, not one a swing."""
     inside = in_doubt()
     robot = Robot()
-    shoulder = next(
-        s for s in np.arange(inside[1], 1.5, 0.005).tolist() if at_border(robot, s)
-    )
+    shoulder = next(s for s in np.arange(inside[1], 1.5, 0.005).tolist() if at_border(robot, s))
     for k in range(60):
         robot.stand(1.0, (0.0, shoulder + (0.01 if k % 2 else -0.01), 0.0, 2.0))
     assert len([a for a in robot.alerts() if a.rule.subject == 'front']) == 1

@@ -99,7 +99,8 @@ def _check_ranges(build: Build, settings: Settings) -> None:
     error, tip = settings.limits.torque_error, math.degrees(settings.limits.tip_error)
     if error > 1.0:
         build.warn(
-            ('limits', 'torque_error'), f'a joint counts as within its limit up to {error:.0%} of it'
+            ('limits', 'torque_error'),
+            f'a joint counts as within its limit up to {error:.0%} of it',
         )
     if tip <= 0.0:
         build.warn(

@@ -194,6 +194,6 @@ def _check_contacts(build: Build, settings: Settings) -> tuple[str, ...]:
     for contact, off in found.outside:
         build.warn(
             ('contacts', contact.name, 'position'),
-            f'{off:.2f} m outside of the collision geometry of the URDF: does the robot stand there?',
+            f'{off:.2f} m outside of the collision geometry of the URDF: can it stand there?',
         )
     return tuple(contact.name for contact in found.unknown)

@@ -46,7 +46,7 @@ class Topics:
 
     @property
     def names(self) -> tuple[str | None, str | None, str]:
-        """The names of the topics of joint states, IMU and payload; None: that input is not used."""
+        """The names of the topics of joint states, IMU and payload; None: it is not used."""
         joints, imu = (t.name if t.used else None for t in (self.joint_states, self.imu))
         return joints, imu, self.payload.name
 
@@ -73,10 +73,10 @@ def topics_from(build: Build, settings: Settings) -> Topics:
                 ('topics', key, 'name'),
                 f'expected a topic of its own, got {section.name}, which another input has too',
             )
-    return Topics(**{k: _topic(build, k, section, used[k]) for k, section in sections.items()})
+    return Topics(**{k: _topic(build, k, s, used=used[k]) for k, s in sections.items()})
 
 
-def _topic(build: Build, key: str, section: TopicSection, used: bool) -> Topic:
+def _topic(build: Build, key: str, section: TopicSection, *, used: bool) -> Topic:
     kind = section.type or TYPES[key]
     if kind != TYPES[key]:
         raise build.refuse(('topics', key, 'type'), f'expected {TYPES[key]}, got {kind}')

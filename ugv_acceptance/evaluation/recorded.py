@@ -198,7 +198,8 @@ class RecordedEvaluator:
         from_joints = order < len(joints.time) - 1
         of_joints, of_imu = np.cumsum(from_joints), np.cumsum(~from_joints)
         if not self.settings.hears_joints:  # only IMU messages bring margins
-            order, of_joints, of_imu = (a[~from_joints] for a in (order, of_joints, of_imu))
+            order, of_joints = order[~from_joints], of_joints[~from_joints]
+            of_imu = of_imu[~from_joints]
         time = time[order]
         pairs = Pairs(joints, imu, of_joints, of_imu)
         j, i = pairs.of_joints, pairs.of_imu

@@ -76,18 +76,14 @@ class Certainty:
             if math.isfinite(limit):
                 unit = robot.joint(name).units.effort
                 left = limits.torque_error * limit - abs(tau)
-                yield name, left, bound, (
-                    f'{name} has {left:.1f} {unit} left to its limit, known to +/- {bound:.1f} '
-                    f'{unit} only'
-                )
+                words = f'{name} has {left:.1f} {unit} left to its limit'
+                yield name, left, bound, f'{words}, known to +/- {bound:.1f} {unit}'
         for side, tilt, bound in zip(SIDES, margins.stability.angle, angle.tolist(), strict=True):
             left = float(tilt) - limits.tip_error
             if math.isfinite(left):
-                yield side, left, bound, (
-                    f'{math.degrees(tilt):.1f} degrees of tilt left to the {side}, known to +/- '
-                    f'{math.degrees(bound):.1f} degrees only; limit: '
-                    f'{math.degrees(limits.tip_error):.1f}'
-                )
+                degrees, size, least = np.degrees((float(tilt), bound, limits.tip_error)).tolist()
+                words = f'{degrees:.1f} degrees of tilt left to the {side} (limit: {least:.1f})'
+                yield side, left, bound, f'{words}, known to +/- {size:.1f} degrees'
 
     def _compute(self, margins: Margins, payload: Payload) -> None:
         """Compute the bounds of torques (j,) and angles (4,) again if the robot has moved."""

@@ -76,9 +76,9 @@ class Session:
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
     stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
-    dates what comes in, `stamps` converts header stamps to its time. `sources` are the sources of
-    uncertainty: a margin that is kept by less than its bound is told. `take_joint_state`, `take_imu`
-    and `take_payload` take a serialised message and never raise.
+    dates what comes in, `stamps` converts header stamps to its time; `sources` are of uncertainty:
+    a margin that is kept by less than its bound is told. `take_joint_state`, `take_imu` and
+    `take_payload` take a serialised message and never raise.
     """
 
     settings: Settings
@@ -92,6 +92,7 @@ class Session:
     faults: Faults = field(init=False)
     alarm_tracker: AlarmTracker = field(init=False)
     counts: dict[str, InputCount] = field(init=False)
+    _counts: dict[str, InputCount] = field(init=False)
     take_joint_state: Callable[[bytes], None] = field(init=False)
     take_imu: Callable[[bytes], None] = field(init=False)
     take_payload: Callable[[bytes], None] = field(init=False)
@@ -109,12 +110,10 @@ class Session:
         self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
         self.trends = Trends(self.settings)
         self.advisory = Advisory(self.evaluator, self.trends, self.on_problem)
-        unheard = {
-            'joint_states': not self.settings.hears_joints,
-            'imu': not self.settings.hears_imu,
-        }
         self.certainty = Certainty(self.settings, self.sources)
-        self.counts = {name: InputCount() for name in INPUTS if not unheard.get(name)}
+        heard = {'joint_states': self.settings.hears_joints, 'imu': self.settings.hears_imu}
+        self._counts = {name: InputCount() for name in INPUTS}
+        self.counts = {n: count for n, count in self._counts.items() if heard.get(n, True)}
         self.evaluator.start(self.clock.now())
         decode, evaluator = joint_state_decoder().one, self.evaluator
         take = self._evaluating('joint_states', decode, JOINT_FIELDS, evaluator.joint_state)
@@ -188,7 +187,7 @@ class Session:
         evaluate: Callable[..., Margins | None],
     ) -> Callable[[bytes], None]:
         """Return a function that decodes a message of input `name` and evaluates its `fields`."""
-        count, alarm_tracker, stamps = self.counts[name], self.alarm_tracker, self.stamps
+        count, alarm_tracker, stamps = self._counts[name], self.alarm_tracker, self.stamps
         receipt, see = self.clock.now, self.trends.see
 
         def take(data: bytes) -> None:
@@ -241,7 +240,7 @@ class Session:
         self._look()
 
     def _malformed(self, name: str, error: BadSample) -> None:
-        count = self.counts[name]
+        count = self._counts[name]
         count.malformed += 1
         count.reason = str(error)
         now = self.clock.now()

@@ -79,7 +79,8 @@ def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
         yield NotChecked('degrees of tilt left', 'no criterion demands any')
     elif ANY not in sides and len(sides) < 4:
         yield NotChecked('degrees of tilt left', f'criteria demand them only to the {_of(sides)}')
-    if settings.hears_joints and not any(v.signal in ('torque', 'torque_margin', 'torque_utilisation') for v in values):
+    of_torque = [v for v in values if v.signal.startswith('torque')]
+    if settings.hears_joints and not of_torque:
         yield NotChecked('margin of torques', 'no criterion demands any')
 
 
