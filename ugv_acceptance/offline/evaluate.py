@@ -93,7 +93,8 @@ def evaluate(
     result, judgement = judge(opened, settings, demanded, sources, options)
     result |= _both_loads(opened, judgement, demanded, sources, result)
     result |= _circumstances(opened, robot, identity)
-    result['not_checked'] += [not_checked_json(one) for one in not_read(opened, robot)]
+    unread = [not_checked_json(one) for one in not_read(opened, robot)]
+    result['not_checked'] = [*result['not_checked'], *unread]
     if payload is not None:
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
