@@ -196,7 +196,8 @@ class RecordedEvaluator:
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
         from_joints = order < len(joints.time) - 1
-        of_joints, of_imu = np.cumsum(from_joints), np.cumsum(~from_joints)
+        of_joints = np.cumsum(from_joints, dtype=np.intp)
+        of_imu = np.cumsum(~from_joints, dtype=np.intp)
         if not self.settings.hears_joints:  # only IMU messages bring margins
             order, of_joints = order[~from_joints], of_joints[~from_joints]
             of_imu = of_imu[~from_joints]
