@@ -122,14 +122,25 @@ def wander(
 ) -> Scene:
     """Return the scene with an arm that visits poses within `reach` (rad) of its own, at `rate`."""
     subject, seconds = scene.subject, len(scene.q) / JOINTS_HZ
+    low, high = travel(scene)
     knots = [(0.0, np.array(subject.calm)), (first, np.array(subject.calm))]
     while knots[-1][0] < seconds and subject.arm:
         pose = np.array(subject.calm)
         pose[list(subject.arm)] += rng.uniform(-reach, reach, len(subject.arm))
+        pose = np.clip(pose, low, high)
         takes = float(np.abs(pose - knots[-1][1]).max()) * np.pi / 2.0 / rate
         arrived = knots[-1][0] + takes
         knots += [(arrived, pose), (arrived + rng.uniform(2.0, 5.0), pose)]
     return replace(scene, q=through(scene.joint_time, knots))
+
+
+def travel(scene: Scene) -> tuple[Floats, Floats]:
+    """Return the least and the most position of each joint (rad, m), a little inside its range."""
+    robot = scene.config.settings.robot
+    ends = np.array([robot.joint(name).travel(1.0) for name in robot.joint_names])
+    endless = [robot.joint(name).kind == 'continuous' for name in robot.joint_names]
+    ends[endless] = (-1e3, 1e3)
+    return ends[:, 0] + 0.02, ends[:, 1] - 0.02
 
 
 def through(time: Floats, knots: Sequence[tuple[float, Floats]]) -> Floats:

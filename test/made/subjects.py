@@ -1,7 +1,7 @@
 """The robots whose recordings are made: PackBot, and wheeled ones configured from their URDFs.
 
-The robots of others are read from ../shared/robots. Where that folder is absent a small robot of
-test/robots.py stands in for them, which `subjects` says.
+The robots of others are read from ../shared/robots. Where that folder is absent the tracked robot
+of test/robots.py stands in for them.
 """
 
 import math
@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 import yaml
+from robots import tracked
 from scipy.spatial.transform import Rotation
 
-from ugv_acceptance.config import Config, load
+from ugv_acceptance.model.robot import Robot
 
 ROOT = Path(__file__).parents[2]
 ROBOTS = ROOT.parent / 'shared' / 'robots'
@@ -29,8 +30,8 @@ class Wheeled:
     """What a URDF does not tell: its IMU's link, arm, the link that carries, poses of the arm.
 
     `parts` are words in the names of the links that stand on the ground. `calm` is a folded pose of
-    the arm and `reach` one that loads `weak` most, in degrees; without an arm the wheels are the
-    joints of the messages.
+    the arm and `reach` one that loads `weak` most, in degrees; `limit` (N m) is that of `weak`
+    where the URDF's needs a load that tips the robot. Without an arm the wheels are the joints.
     """
 
     imu: str
@@ -40,6 +41,7 @@ class Wheeled:
     calm: tuple[float, ...] = ()
     reach: tuple[float, ...] = ()
     weak: str = ''
+    limit: float | None = None
 
 
 WHEELED = {
@@ -55,33 +57,35 @@ WHEELED = {
             *('ur5_wrist_1_joint', 'ur5_wrist_2_joint', 'ur5_wrist_3_joint'),
         ),
         hand='ur5_tool0',
-        calm=(0.0, -100.0, 130.0, -60.0, 0.0, 0.0),
+        calm=(180.0, -80.0, 140.0, 0.0, 0.0, 0.0),
         reach=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         weak='ur5_shoulder_lift_joint',
+        limit=90.0,
     ),
     'tb3_manip': Wheeled(
         'imu_link',
         ('wheel', 'caster'),
         ('joint1', 'joint2', 'joint3', 'joint4'),
         'end_effector_link',
-        (0.0, -60.0, 40.0, 20.0),
+        (0.0, -90.0, 60.0, -80.0),
         (0.0, 80.0, -50.0, -30.0),
         'joint2',
     ),
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """A robot: its configuration as data, its URDF, and how its arm is moved.
 
-    `arm` are columns of the joints that move, `calm` and `reach` poses (rad) of all joints, `weak`
-    the column of the joint that is overloaded (None without an arm), `mounting` the IMU's axes.
+    `urdf` is its path or its text. `arm` are columns of the joints that move, `calm` and `reach`
+    poses (rad) of all joints, `weak` the column of the joint that is overloaded (None without an
+    arm), `mounting` the IMU's axes.
     """
 
     name: str
     document: Mapping[str, Any]
-    urdf: Path
+    urdf: Path | str
     arm: tuple[int, ...]
     calm: tuple[float, ...]
     reach: tuple[float, ...]
@@ -91,7 +95,10 @@ class Subject:
 
     def config(self, folder: Path, changes: Mapping[str, Any] | None = None) -> Path:
         """Write the configuration with changes (`limits.tip_error_deg: 5`, None: left out)."""
-        document = deepcopy(dict(self.document)) | {'urdf': str(self.urdf)}
+        urdf = self.urdf if isinstance(self.urdf, Path) else folder / 'robot.urdf'
+        if isinstance(self.urdf, str):
+            urdf.write_text(self.urdf, encoding='utf-8')
+        document = deepcopy(dict(self.document)) | {'urdf': str(urdf)}
         for key, value in (changes or {}).items():
             *way, last = key.split('.') if key not in document else [key]
             place = document
@@ -118,6 +125,47 @@ def packbot() -> Subject:
     )
 
 
+def stand_in() -> Subject:
+    """Return the tracked robot of test/robots.py, for where ../shared/robots is absent."""
+    robot = tracked()
+    document = {
+        'robot': {'name': robot.name},
+        'topics': {'payload': {'name': 'payload', 'frame_id': robot.payload_link}},
+        'joints': {n: {'limit_nm': 60.0 if n == 'shoulder' else None} for n in robot.joint_names},
+        'contacts': {
+            c.name: {'link': c.link, 'position_m': list(c.position)} for c in robot.contacts
+        },
+        'payload': {'link': robot.payload_link, 'mass_kg': 0.0},
+        'imu': {'position_m': [0.0, 0.0, 0.1]},
+    }
+    calm, reach = (0.0, 2.0, -2.5, math.pi), (0.0, 0.0, 0.0, math.pi)
+    arm, turn = (0, 1, 2), Rotation.identity()
+    return Subject(robot.name, document, urdf_of(robot), arm, calm, reach, 1, turn, (0.0, 0.0, 0.1))
+
+
+def urdf_of(robot: Robot) -> str:
+    """Return a robot as a URDF; its joints' axes turn with the joint, their frames do not."""
+    parts = [f'<robot name="{robot.name}">']
+    for link in robot.links:
+        (a, b, c), (_, d, e), (_, _, f) = link.inertia
+        cog = ' '.join(map(str, link.cog))
+        parts.append(
+            f'<link name="{link.name}"><inertial><origin xyz="{cog}"/><mass value="{link.mass}"/>'
+            f'<inertia ixx="{a}" ixy="{b}" ixz="{c}" iyy="{d}" iyz="{e}" izz="{f}"/>'
+            '</inertial></link>'
+        )
+    for joint in robot.joints:
+        place, axis = (' '.join(map(str, v)) for v in (joint.xyz, joint.axis))
+        parts.append(
+            f'<joint name="{joint.name}" type="continuous"><parent link="{joint.parent}"/>'
+            f'<child link="{joint.child}"/><origin xyz="{place}"/><axis xyz="{axis}"/></joint>'
+            if joint.kind != 'fixed'
+            else f'<joint name="{joint.name}" type="fixed"><parent link="{joint.parent}"/>'
+            f'<child link="{joint.child}"/><origin xyz="{place}"/></joint>'
+        )
+    return '\n'.join([*parts, '</robot>'])
+
+
 def wheeled(name: str) -> Subject:
     """Return a robot of ../shared/robots, on points below the axes of its wheels."""
     facts, urdf = WHEELED[name], ROBOTS / name / f'{name}.urdf'
@@ -139,7 +187,9 @@ def wheeled(name: str) -> Subject:
             'joint_states': {'name': 'joint_states'},
             'imu': {'name': 'imu/data', 'frame_id': facts.imu},
         },
-        'joints': {n: {} for n in names},
+        'joints': {
+            n: {'limit_nm': facts.limit} if facts.limit and n == facts.weak else {} for n in names
+        },
         'imu': {
             'mounting_rpy_deg': [float(x) for x in turn.as_euler('xyz', degrees=True)],
             'position_m': [round(float(x), 4) for x in at],
@@ -203,11 +253,5 @@ def subjects() -> dict[str, Subject]:
     """Return every robot that can be configured here, by name."""
     found = {PACKBOT: packbot()}
     if ROBOTS.is_dir():
-        found |= {name: wheeled(name) for name in WHEELED}
-    return found
-
-
-@cache
-def loaded(path: Path) -> Config:
-    """Return a configuration, read once a process."""
-    return load(path)
+        return found | {name: wheeled(name) for name in WHEELED}
+    return found | {'tracked': stand_in()}
