@@ -31,6 +31,9 @@ def main() -> None:
     parser.add_argument('--each', type=int, default=1, help='with --short: so many of each kind')
     parser.add_argument('--out', type=Path, default=RESULTS, help='file of results (JSON lines)')
     parser.add_argument('--workers', type=int, default=2, help='processes')
+    parser.add_argument(
+        '--write', action='store_true', help='put the table into docs/error_rate.md'
+    )
     parser.add_argument('--show', type=int, default=20, help='wrong verdicts that are listed')
     asked = parser.parse_args()
     plan, console = Plan(), Console(soft_wrap=True, highlight=False)
@@ -47,6 +50,10 @@ def main() -> None:
         raise SystemExit(OTHER) from None
     for text in measure.table(lines):
         console.print(text, markup=False)
+    if asked.write:
+        page = ROOT / 'docs' / 'error_rate.md'
+        text = measure.published(page.read_text(encoding='utf-8'), lines)
+        page.write_text(text, encoding='utf-8')
     bad = [line for line in lines if line['wrong']]
     for line in bad[: asked.show]:
         console.print(

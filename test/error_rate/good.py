@@ -125,7 +125,10 @@ def no_joint_states(draw: Draw) -> Made:
     scene, names = calm(draw), draw.config().settings.robot.joint_names
     scene = replace(scene, q=np.tile(scene.q[0], (len(scene.q), 1)))
     held = dict(zip(names, scene.q[0].tolist(), strict=True))
-    config = draw.config({'topics.joint_states': None, 'joints': None, 'held': held})
+    changes = {'topics.joint_states': None, 'joints': None, 'held': held}
+    known = draw.subject.document.get('uncertainty', {})
+    sure = {key: value for key, value in known.items() if not key.endswith('.offset_deg')}
+    config = draw.config(changes | ({'uncertainty': sure} if sure else {}))
     _, imu = sensed(scene, draw.rng)
     return Made([*told(scene, scene.load.mass), imu], WELL, config)
 

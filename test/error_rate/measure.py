@@ -20,12 +20,14 @@ from ugv_acceptance import AcceptanceError
 from ugv_acceptance.processes import Workers
 
 WRONG_PASS, WRONG_FAIL, NOT_PASSED, NOT_FAILED = 'wrong PASS', 'wrong FAIL', 'not passed', 'missed'
+# Marks in docs/error_rate.md, between which the table stands.
+MARK_BEGIN, MARK_END = '<!-- table -->', '<!-- end of the table -->'
 # Runs given to the workers ahead of those that are done.
 AHEAD = 8
 
 
 class OtherResultsError(Exception):
-    """A file holds results of another plan or of other code."""
+    """A file holds results of another plan, program or maker of runs."""
 
 
 def wrong(kind: Kind, verdict: str, *, pardoned: bool) -> str:
@@ -88,8 +90,12 @@ def _plan() -> Plan:
 
 
 def head() -> dict[str, str]:
-    """Return the first line of a file of results: hashes of the plan and of the code."""
-    return {'plan_sha256': _plan().sha256, 'code_sha256': code_hash()}
+    """Return the first line of a file of results: hashes of plan, program, and maker of runs."""
+    return {
+        'kinds_sha256': _plan().sha256,
+        'program_sha256': code_hash('ugv_acceptance'),
+        'maker_sha256': code_hash('test/made', 'test/error_rate'),
+    }
 
 
 def lines_of(path: Path) -> list[dict[str, Any]]:
@@ -99,7 +105,7 @@ def lines_of(path: Path) -> list[dict[str, Any]]:
     texts = path.read_text(encoding='utf-8').splitlines()
     found = [line for line in map(_line, texts) if line]
     if found and found[0] != head():
-        msg = f'{path}: expected results of this plan and this code; move the file away'
+        msg = f'{path}: expected results of this plan, program and maker of runs; move it away'
         raise OtherResultsError(msg)
     return found[1:]
 
@@ -200,6 +206,15 @@ def table(lines: Sequence[dict[str, Any]]) -> list[str]:
     return [*rows, '', *summary(lines)]
 
 
+def published(page: str, lines: Sequence[dict[str, Any]]) -> str:
+    """Return a page of the documentation with the table of these lines between its two marks."""
+    before, rest = page.split(MARK_BEGIN)
+    after = rest.split(MARK_END)[1]
+    named = '\n'.join(f'{key.replace("_", " ")}: `{value}`  ' for key, value in head().items())
+    text = '\n'.join(['', f'{len(lines)} runs.', '', named, '', *table(lines), '', ''])
+    return before + MARK_BEGIN + text + MARK_END + after
+
+
 def summary(lines: Sequence[dict[str, Any]]) -> list[str]:
     """Return the rates that the goals are about, each with its exact upper 95 % bound."""
     plan = _plan()
@@ -215,7 +230,8 @@ def summary(lines: Sequence[dict[str, Any]]) -> list[str]:
         own = [x for x in lines if x['kind'] not in left_out and half in (None, x['half'])]
         bad = sum(bool(x['wrong']) if not fault else x['wrong'] == fault for x in own)
         if own:
-            found.append(f'{len(own)} {what}: {bad} {did} (at most {upper(bad, len(own)):.2%})')
+            rate = f'{bad} {did} (upper 95 % bound {upper(bad, len(own)):.2%})'
+            found.append(f'- {len(own)} {what}: {rate}')
     broke = sum(x['wrong'] == 'broke off' for x in lines)
     robots = sorted({x.get('robot', '') for x in lines} - {''})
-    return [*found, f'broke off: {broke}', f'robots: {", ".join(robots)}']
+    return [*found, f'- broke off: {broke}', f'- robots: {", ".join(robots)}']

@@ -132,9 +132,13 @@ def short_of(plan: Plan, each: int) -> list[int]:
     return sorted(2 * k + odd for odd, count in enumerate(halves) for k in range(count * each))
 
 
-def code_hash() -> str:
-    """Return a hash of the package's sources: results of other code are not mixed with these."""
+def code_hash(*folders: str) -> str:
+    """Return a hash of the sources in folders of this checkout.
+
+    Results of another program, or of runs that were made otherwise, are not mixed with these.
+    """
     whole = hashlib.sha256()
-    for path in sorted((ROOT / 'ugv_acceptance').rglob('*.py')):
-        whole.update(path.read_bytes())
+    for folder in folders:
+        for path in sorted((ROOT / folder).rglob('*.py')):
+            whole.update(path.read_bytes())
     return whole.hexdigest()

@@ -9,7 +9,7 @@ from error_rate import measure
 from error_rate.plan import GOOD, Plan
 from made.judged import FAIL, INCONCLUSIVE, PASS
 from made.run import messages_of
-from made.subjects import PACKBOT, ROBOTS, stand_in, subjects
+from made.subjects import PACKBOT, ROBOTS, ROOT, stand_in, subjects
 from made.truth import torques
 from robots import tracked
 
@@ -89,9 +89,24 @@ def test_a_measurement_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_results_of_other_code_or_another_plan_are_not_mixed_in(tmp_path: Path) -> None:
     """A file whose first line has other hashes is refused."""
     file = tmp_path / 'results.jsonl'
-    file.write_text(json.dumps(measure.head() | {'code_sha256': 'other'}) + '\n', encoding='utf-8')
-    with pytest.raises(measure.OtherResultsError, match=r'move the file away'):
+    file.write_text(
+        json.dumps(measure.head() | {'program_sha256': 'other'}) + '\n', encoding='utf-8'
+    )
+    with pytest.raises(measure.OtherResultsError, match=r'move it away'):
         measure.lines_of(file)
+
+
+def test_the_table_stands_between_its_marks_in_the_documentation(tmp_path: Path) -> None:
+    """What is published replaces what stood between the marks, and nothing else."""
+    page = f'before {measure.MARK_BEGIN} old {measure.MARK_END} after'
+    line = measure.one(67, tmp_path)
+    once = measure.published(page, [line])
+    assert once.startswith('before ')
+    assert once.endswith(' after')
+    assert line['kind'] in once
+    assert ' old ' not in once
+    assert measure.published(once, [line]) == once
+    assert measure.MARK_END in (ROOT / 'docs' / 'error_rate.md').read_text(encoding='utf-8')
 
 
 def test_the_robot_that_stands_in_for_those_of_others_is_itself(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from rich.console import Console
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli.result_text import print_result
 from ugv_acceptance.config import Config
-from ugv_acceptance.offline.evaluate import Options, evaluate
+from ugv_acceptance.offline.evaluate import evaluate
+from ugv_acceptance.offline.judge import Options
 
 PASS, FAIL, INCONCLUSIVE, EXIT_2 = 'PASS', 'FAIL', 'INCONCLUSIVE', 'exit 2'
 # Parts of a result that people read, beside what the terminal shows.
