@@ -11,6 +11,8 @@ from made.scene import Scene, sensed, told
 from made.truth import Load
 
 REASON = {'unsafe_limits': 'a test of limits that are too wide'}
+# What must be told of contact points beyond the robot's own shapes.
+OUTSIDE = r'contact[^"\n]*(outside|beyond|too wide)'
 # Criteria that no run can fail.
 VACUOUS: dict[str, dict[str, Any]] = {
     'above -180': {'value': 'tip_angle', 'above_deg': -180},
@@ -52,7 +54,7 @@ def limit_null(draw: Draw) -> Made:
     name = scene.config.settings.robot.joint_names[weak]
     parts = [*told(scene, scene.load.mass), *sensed(scene, draw.rng)]
     changed = draw.config({f'joints.{name}.limit_nm': None})
-    unjudged = rf'{name}[^"\n]*not (judged|checked)|not (judged|checked)[^"\n]*{name}'
+    unjudged = rf'{name}[^"\n]*(not judged|not checked|no limit)'
     return Made(parts, tipped(scene), changed, pardon=unjudged)
 
 
@@ -68,7 +70,7 @@ def contacts_wide(draw: Draw) -> Made:
         place = [float(x + np.sign(x) * wide), float(y + np.sign(y) * wide), float(z)]
         changed[name] = dict(contact) | {'position_m': place}
     parts = [*told(scene, scene.load.mass), *sensed(scene, draw.rng)]
-    return Made(parts, tipped(scene), draw.config({'contacts': changed}), pardon='contact')
+    return Made(parts, tipped(scene), draw.config({'contacts': changed}), pardon=OUTSIDE)
 
 
 def criteria_vacuous(draw: Draw) -> Made:
