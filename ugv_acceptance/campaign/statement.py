@@ -100,7 +100,9 @@ def statement(
         said |= {
             'mtbf_h': {**bounded(shown), 'ended_by': 'failure' if by_failure else 'time'},
             'endurance': _endurance(rows, question.confidence),
-            'availability': _availability(judged, failures, question.confidence),
+            'availability': _availability(
+                hours, failures, question.confidence, by_failure=by_failure
+            ),
             'success': _success(rows, question.confidence),
             'trend': _trend(times, hours, question.confidence, by_failure=by_failure),
             'requirement': _requirement(question, hours, len(times), shown),
@@ -160,12 +162,16 @@ def _endurance(rows: Sequence[Row], confidence: float) -> Json | None:
     return {'run': row.name, 'hours': hours, 'failures': failed, 'demonstrated_h': shown}
 
 
-def _availability(hours: float, failures: Sequence[Failure], confidence: float) -> Json:
+def _availability(
+    hours: float, failures: Sequence[Failure], confidence: float, *, by_failure: bool
+) -> Json:
     """Return the availability by repairs of known duration, and the number of unknown ones."""
     counted = [f for f in failures if f.chargeable]
     known = [f.repair_h for f in counted if f.repair_h is not None]
     repaired = len(known) == len(counted)
-    shown = availability(hours, len(known), sum(known), confidence)
+    shown = availability(
+        hours, len(known), sum(known), confidence, failure_terminated=by_failure
+    )
     empty = replace(shown, value=None, low=0.0, high=1.0, demonstrated=0.0)
     return {
         **bounded(shown if repaired else empty),
