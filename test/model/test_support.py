@@ -252,9 +252,10 @@ def test_a_table_rocks_about_the_legs_that_are_longer(uneven: float) -> None:
     )
     samples: list[Points] = [short, long] * 8
     found = many(standing_on(short, 1e-4), samples, [(-0.1, 0.1, 0.3)] * len(samples))
-    corners = {tuple(sorted(s.polygon)) for s in found[::2]}, {
-        tuple(sorted(s.polygon)) for s in found[1::2]
-    }
+    corners = (
+        {tuple(sorted(s.polygon)) for s in found[::2]},
+        {tuple(sorted(s.polygon)) for s in found[1::2]},
+    )
     assert corners == ({(0, 1, 2)}, {(0, 1, 3)})
     assert {(s.standing, s.raised) for s in found} == {(3, True)}
 

@@ -103,9 +103,12 @@ def missing_text(source: Json, duration: float) -> str:
 
 def doubts_of(result: Json) -> list[str]:
     """Return the reasons to doubt the margins or their limits, one sentence each."""
-    doubts, wider = [], result.get('limits_relaxed')
+    doubts, wider = _waived(result), result.get('limits_relaxed')
     if wider:
-        doubts = [f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}']
+        doubts = [
+            *doubts,
+            f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}',
+        ]
     load = result['model_check']['payload']
     if load is None or load['low'] < HEAVIER:
         return doubts
@@ -115,6 +118,15 @@ def doubts_of(result: Json) -> list[str]:
         'true margins are smaller, or efforts are wrong'
     )
     return [*doubts, text]
+
+
+def _waived(result: Json) -> list[str]:
+    """Return what the criteria waive that was not kept in this run."""
+    return [
+        f'{held["name"]} waived ({held["waived"]}), and not kept: {held["reasons"][0]}'
+        for held in result.get('safeguards', ())
+        if held['waived'] is not None and held['reasons']
+    ]
 
 
 def not_checked_lines(result: Json) -> list[str]:
