@@ -18,8 +18,9 @@ class Row:
     """One run of the table: times in s, its start in ns.
 
     A run that passed although something speaks against it is DOUBTFUL; one that could not be read
-    is BROKEN; one that something else kept from being judged is NOT_JUDGED; all with the reason. `judged_s` is the time in which the margins were known: only
-    that counts as operated without a failure. `also` names other copies of the same recording.
+    is BROKEN; one that something else kept from being judged is NOT_JUDGED; all with the reason.
+    `judged_s` is the time in which the margins were known: only that counts as operated without a
+    failure. `also` names other copies of the same recording.
     """
 
     name: str

@@ -243,11 +243,11 @@ def campaign(
 
     Writes campaign.json, campaign.html and one result for each run into --out. A run that is
     INCONCLUSIVE or cannot be read is counted, never dropped; one that passed with doubts (relaxed
-    limits, a waived safeguard, efforts that contradict) is DOUBTFUL, and no success. While a run was not judged (a worker
-    died, a scheduler or a network is gone) nothing is stated and the exit code is 3: run the same
-    command again to judge the missing runs. With --require-mtbf the exit code is 0 if the MTBF is
-    demonstrated, 1 if it is excluded, 3 otherwise; without it 0 if every run passed, 1 if one
-    failed, 2 if one could not be read, 3 if one is inconclusive or doubtful.
+    limits, a waived safeguard, efforts that contradict) is DOUBTFUL, and no success. While a run
+    was not judged (a worker died, a scheduler or a network is gone) nothing is stated and the exit
+    code is 3: run the same command again to judge the missing runs. With --require-mtbf the exit
+    code is 0 if the MTBF is demonstrated, 1 if it is excluded, 3 otherwise; without it 0 if every
+    run passed, 1 if one failed, 2 if one could not be read, 3 if one is inconclusive or doubtful.
 
     \b
     Examples:

@@ -12,7 +12,13 @@ from rich.progress import Progress, TextColumn
 from rich.table import Table
 
 from ugv_acceptance.evaluation.alerts.messages import level_words
-from ugv_acceptance.report.format import doubts_of, missing_text, not_checked_lines
+from ugv_acceptance.report.format import (
+    assumed_line,
+    doubts_of,
+    missing_text,
+    not_checked_lines,
+    origin_line,
+)
 
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
@@ -65,6 +71,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     paths = result['bag']['path']
     heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
     console.print(heading, soft_wrap=True)
+    for line in (origin_line(result), assumed_line(result)):
+        console.print(f'    {escape(line)}', soft_wrap=True)
     for reason in result['reasons'][:5]:
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:

@@ -101,6 +101,43 @@ def missing_text(source: Json, duration: float) -> str:
     return f'{share:.0%} missing' if share > MISSING else ''
 
 
+def origin_line(result: Json) -> str:
+    """Return whether a recording is simulated or real, as far as it or a person says."""
+    origin, entered = result['origin'], result['identity'].get('origin')
+    said = 'simulated or real: the recording does not say'
+    if origin['simulated']:
+        said = 'simulated, as the recording says'
+    elif origin['clock']:
+        said = f'simulated or replayed: the recording has a clock, {origin["clock"]}'
+    return f'{said}; entered: {entered}' if entered else said
+
+
+def assumed_line(result: Json) -> str:
+    """Return which numbers of the robot are only assumed, grouped by the reason."""
+    assumed = result['robot']['assumed']
+    if assumed is None:
+        return "the robot's configuration does not say which of its numbers are only assumed"
+    if not assumed:
+        return 'no number of the robot is only assumed, its configuration says'
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in assumed.items():
+        by_reason.setdefault(reason, []).append(name)
+    groups = (f'{", ".join(names)} ({reason})' for reason, names in by_reason.items())
+    return f'assumed, not measured: {"; ".join(groups)}'
+
+
+def load_text(result: Json) -> str:
+    """Return the load that was carried, by the configuration and the messages of the run."""
+    load = result['load']
+    if load['link'] is None:
+        return 'this robot carries none'
+    if not load['told']:
+        return f'{load["configured_kg"]:.2f} kg, as configured; none was told during the run'
+    told = ', '.join(f'{x["mass_kg"]:.2f} kg from {x["at_s"]:.2f} s' for x in load['told'])
+    more = load['changes'] - len(load['told'])
+    return f'{told}{f", and {more} more changes" if more else ""}: told during the run'
+
+
 def doubts_of(result: Json) -> list[str]:
     """Return the reasons to doubt the margins or their limits, one sentence each."""
     doubts, wider = _waived(result), result.get('limits_relaxed')
