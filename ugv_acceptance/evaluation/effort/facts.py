@@ -1,0 +1,133 @@
+"""What a joint's `effort` can mean, as one table: the sentence to tell, what to do, what it is for.
+
+Evaluation, report, doctor and the live monitor all speak from this table, and none of them may use
+an effort for more than its meaning allows.
+"""
+
+from dataclasses import dataclass
+
+TORQUE, OTHER_SIGN, SCALED, WITHOUT = 'torque', 'other sign', 'scaled', 'without gravity'
+NONE, CONSTANT, SATURATED, UNKNOWN = 'none', 'constant', 'saturated', 'unknown'
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A meaning of effort: `sentence` with {joint}, {unit} and {ratio}, and what to `do` about it.
+
+    `sign` is what makes the effort the joint's torque (1 or -1); None: it is no torque, so nothing
+    about loads, contacts or limits follows from it. `why` is the reason to give where an effort
+    could not be used, '' if it can be.
+    """
+
+    sentence: str
+    do: str = ''
+    sign: float | None = None
+    why: str = ''
+
+
+FACTS = {
+    TORQUE: Fact('the effort of {joint} is its torque in {unit}', sign=1.0),
+    OTHER_SIGN: Fact(
+        'the effort of {joint} is its torque in {unit}, but with the opposite sign',
+        'set effort_sign: -1 for {joint} in the configuration',
+        sign=-1.0,
+    ),
+    SCALED: Fact(
+        'the effort of {joint} is {ratio} of its torque: a current, a percentage or another unit',
+        'set effort_scale for {joint} in the configuration',
+        why='its effort is in another unit than {unit}',
+    ),
+    WITHOUT: Fact(
+        'the effort of {joint} leaves gravity out: the arm is held by gravity compensation, or the '
+        'driver subtracts it',
+        why='its effort leaves gravity out',
+    ),
+    NONE: Fact('no effort of {joint} is measured', why='no effort is recorded'),
+    CONSTANT: Fact(
+        'the effort of {joint} never changes although its load does: it is no measurement',
+        'check the driver of {joint}',
+        why='its effort never changes',
+    ),
+    SATURATED: Fact(
+        'the effort of {joint} is cut off at {level} {unit}: beyond it, it says nothing',
+        'check the limit of the motor or of the message',
+        why='its effort is cut off at one value',
+    ),
+    UNKNOWN: Fact(
+        'what the effort of {joint} means is not known',
+        'let the robot rest in several postures that load {joint} differently',
+        why='what its effort means is not known',
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """Effort over static torque with the declared load, and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def text(self) -> str:
+        """The ratio with its interval, as text."""
+        return f'{self.value:.3g} ({self.low:.3g} to {self.high:.3g})'
+
+
+@dataclass(frozen=True, slots=True)
+class JointMeaning:
+    """What the effort of one joint means, and with what probability of the meanings considered.
+
+    `ratio` is None where the joint was not loaded enough, or the effort is no measurement.
+    `below` is the meaning of a saturated effort below the value `level` at which it is cut off.
+    """
+
+    joint: str
+    unit: str
+    meaning: str
+    probability: float = 0.0
+    ratio: Ratio | None = None
+    level: float = 0.0
+    below: str = ''
+
+    @property
+    def fact(self) -> Fact:
+        """The row of FACTS."""
+        return FACTS[self.meaning]
+
+    @property
+    def sign(self) -> float | None:
+        """What makes the effort a torque (1, -1); None: it is none."""
+        return self.fact.sign if self.meaning != SATURATED else FACTS[self.below or UNKNOWN].sign
+
+    @property
+    def weighs(self) -> bool:
+        """Whether the effort may say something of loads: torque of known sign, not cut off."""
+        return self.fact.sign is not None
+
+    def _filled(self, text: str) -> str:
+        ratio = 'an unknown part' if self.ratio is None else self.ratio.text
+        return text.format(
+            joint=self.joint, unit=self.unit, ratio=ratio, level=f'{self.level:.4g}'
+        )
+
+    @property
+    def sentence(self) -> str:
+        """What the effort means, with the ratio where only that is known."""
+        told = self._filled(self.fact.sentence)
+        if self.meaning == UNKNOWN and self.ratio is not None:
+            told += (
+                f'; if the declared load is carried it is {self.ratio.text} of the static torque'
+            )
+        return told
+
+    @property
+    def do(self) -> str:
+        """What to do about it; '': nothing."""
+        return self._filled(self.fact.do)
+
+    @property
+    def why(self) -> str:
+        """Why nothing follows from the effort; '' where something does."""
+        return self._filled(self.fact.why)
