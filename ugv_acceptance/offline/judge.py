@@ -76,7 +76,7 @@ def judge(
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
     evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
-    reading = _Reading(settings, evaluator, limits, asked, options)
+    reading = _Reading(settings, sources, evaluator, limits, asked, options)
     batches = bag.batches(topics, workers=options.readers)
     evaluator.start(bag.start_ns)
     for batch in _stretches(batches):
@@ -88,7 +88,6 @@ def judge(
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
         'bag': _bag_result(bag, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
-        'model_check': reading.check.result(),
     }
     statements = [e.statement(*span) for e in reading.examinations]
     absent = absent_imu(settings, topics.imu)
@@ -107,10 +106,12 @@ def judge(
     return result, Judgement(settings, topics, evaluator, batches.facts, asked)
 
 
-def _examinations(settings: Settings, evaluator: RecordedEvaluator) -> tuple[Examination, ...]:
+def _examinations(
+    settings: Settings, sources: tuple[Source, ...], evaluator: RecordedEvaluator
+) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    del settings, evaluator
-    return ()
+    del evaluator
+    return (ModelCheck(settings, sources),)
 
 
 @dataclass(slots=True)
@@ -121,12 +122,12 @@ class _Reading:
     """
 
     settings: Settings
+    sources: tuple[Source, ...]
     evaluator: RecordedEvaluator
     limits: CriteriaMeasurement
     asked: CriteriaMeasurement
     options: Options
     summary: Summary = field(init=False)
-    check: ModelCheck = field(init=False)
     told: AlertAdvice = field(init=False)
     held: HeldMargins = field(init=False)
     examinations: tuple[Examination, ...] = field(init=False)
@@ -134,8 +135,7 @@ class _Reading:
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
-        self.check = ModelCheck(self.settings)
-        self.examinations = _examinations(self.settings, self.evaluator)
+        self.examinations = _examinations(self.settings, self.sources, self.evaluator)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)
@@ -175,7 +175,7 @@ class _Reading:
         return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
 
     def _judge(self, rows: MarginRows) -> None:
-        parts = (self.summary.add, self.check.add, *(e.add for e in self._measurements))
+        parts = (self.summary.add, *(e.add for e in self._measurements))
         for take in (*parts, *(e.add for e in self.examinations)):
             take(rows)
 

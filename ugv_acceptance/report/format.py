@@ -4,8 +4,8 @@ from ugv_acceptance.evaluation.criteria.quantities import DATA
 from ugv_acceptance.type_aliases import Json
 
 DASH = '\N{EN DASH}'
-# Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
-MISSING, HEAVIER = 0.05, 0.2
+# Less than this share of missing messages is jitter.
+MISSING = 0.05
 # From here on the digits of a number are counted, not read, and no column holds them.
 LONG = 1e6
 
@@ -146,15 +146,8 @@ def doubts_of(result: Json) -> list[str]:
             *doubts,
             f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}',
         ]
-    load = result['model_check']['payload']
-    if load is None or load['low'] < HEAVIER:
-        return doubts
-    text = (
-        f'measured efforts at rest suggest {load["value"]:.2f} kg more payload than declared '
-        f'(95 %: {load["low"]:.2f} to {load["high"]:.2f} kg): '
-        'true margins are smaller, or efforts are wrong'
-    )
-    return [*doubts, text]
+    said = set(result['reasons'])
+    return [*doubts, *(text for text in result['model_check']['findings'] if text not in said)]
 
 
 def _waived(result: Json) -> list[str]:

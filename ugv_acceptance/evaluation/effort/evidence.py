@@ -22,8 +22,10 @@ OTHER_UNIT = (np.abs(SCALES) < NOT_ONE[0]) | (np.abs(SCALES) > NOT_ONE[1])
 # Weight of one scale of the grid: log-uniform, either sign.
 SCALE_WEIGHT = float(np.log(STEP / (4.0 * SPAN)))
 # What is left where gravity is compensated, in whatever unit: smaller than this share of the static
-# torque; and in SEVERAL postures, up to LITTLE of it, if it correlates with it by less than ALIKE.
-SMALL, LITTLE, ALIKE, SEVERAL = 0.05, 0.3, 0.5, 4
+# torque; and in SEVERAL postures, up to LITTLE of it, unless it surely correlates with it (t test).
+SMALL, LITTLE, ALIKE, SEVERAL = 0.05, 0.3, 3.5, 4
+# What it costs that efforts which follow nothing may be of any size.
+ANY_SIZE = 3.0
 # Rows of `Evidence.meanings`: torque, other sign, scaled, without gravity, none of these.
 KINDS = 5
 LOG_2PI = float(np.log(2.0 * np.pi))
@@ -96,8 +98,8 @@ def evidence_of(joint: Joint, loads: Floats) -> Evidence:
     scaled[:, ~OTHER_UNIT] = -np.inf
     torque, opposite, without = (log_sum(np.array(part), 0) for part in (*parts[:2], parts[3]))
     anything = _anything(y)
-    without = np.logaddexp(without + np.log(0.9), _idle(joint, anything) + np.log(0.1))
-    other = np.full(len(loads), anything)
+    without = np.logaddexp(without, _idle(joint, anything)) - np.log(2.0)
+    other = np.full(len(loads), anything - ANY_SIZE)
     columns = (torque, opposite, log_sum(scaled) + SCALE_WEIGHT, without, other)
     return Evidence(np.stack(columns, axis=1), scaled)
 
@@ -136,10 +138,11 @@ def _anything(y: Floats) -> float:
 def _idle(joint: Joint, anything: float) -> float:
     """Return the log-density of the little that is left where gravity is compensated."""
     y, torque = joint.effort, joint.torque
-    share = np.sqrt((y**2).mean()) / max(np.sqrt((torque**2).mean()), 1e-12)
+    least = max(float(np.sqrt((torque**2).mean())), SMALL * joint.size)
+    share = float(np.sqrt((y**2).mean())) / least
     if len(y) < SEVERAL:
         return anything if share <= SMALL else -np.inf
     parts = y - y.mean(), torque - torque.mean()
     size = np.sqrt((parts[0] @ parts[0]) * (parts[1] @ parts[1]))
-    alike = size > 0.0 and abs(parts[0] @ parts[1]) > ALIKE * size
+    alike = abs(parts[0] @ parts[1]) * np.sqrt(len(y) - 2.0 + ALIKE**2) > ALIKE * size
     return -np.inf if alike or share > LITTLE else anything

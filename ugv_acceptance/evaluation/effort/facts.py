@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 TORQUE, OTHER_SIGN, SCALED, WITHOUT = 'torque', 'other sign', 'scaled', 'without gravity'
 NONE, CONSTANT, SATURATED, UNKNOWN = 'none', 'constant', 'saturated', 'unknown'
+# Kinds of NONE, an effort that is always 0 without and with a load; of UNKNOWN, a joint too lightly
+# loaded to tell.
+ZERO_EFFORT, IDLE, UNLOADED = 'zero', 'zero under load', 'unloaded'
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +46,14 @@ FACTS = {
         why='its effort leaves gravity out',
     ),
     NONE: Fact('no effort of {joint} is measured', why='no effort is recorded'),
+    ZERO_EFFORT: Fact(
+        'the effort of {joint} is always 0', why='its effort is always 0, and it is hardly loaded'
+    ),
+    IDLE: Fact(
+        'the effort of {joint} is always 0 although its posture needs torque: gravity is '
+        'compensated or left out, or nothing is measured',
+        why='its effort is 0 under load: gravity is compensated or left out, or it is not measured',
+    ),
     CONSTANT: Fact(
         'the effort of {joint} never changes although its load does: it is no measurement',
         'check the driver of {joint}',
@@ -52,6 +63,10 @@ FACTS = {
         'the effort of {joint} is cut off at {level} {unit}: beyond it, it says nothing',
         'check the limit of the motor or of the message',
         why='its effort is cut off at one value',
+    ),
+    UNLOADED: Fact(
+        '{joint} is too lightly loaded to tell what its effort means',
+        why='it is too lightly loaded to tell what its effort means',
     ),
     UNKNOWN: Fact(
         'what the effort of {joint} means is not known',
@@ -80,7 +95,8 @@ class JointMeaning:
     """What the effort of one joint means, and with what probability of the meanings considered.
 
     `ratio` is None where the joint was not loaded enough, or the effort is no measurement.
-    `below` is the meaning of a saturated effort below the value `level` at which it is cut off.
+    `below` is the meaning of a saturated effort below the value `level` at which it is cut off; of
+    one that is always 0 it is ZERO_EFFORT or IDLE, of an unknown one UNLOADED or ''.
     """
 
     joint: str
@@ -94,7 +110,8 @@ class JointMeaning:
     @property
     def fact(self) -> Fact:
         """The row of FACTS."""
-        return FACTS[self.meaning]
+        kind = self.below if self.meaning in {NONE, UNKNOWN} else ''
+        return FACTS[kind or self.meaning]
 
     @property
     def sign(self) -> float | None:
@@ -117,9 +134,7 @@ class JointMeaning:
         """What the effort means, with the ratio where only that is known."""
         told = self._filled(self.fact.sentence)
         if self.meaning == UNKNOWN and self.ratio is not None:
-            told += (
-                f'; if the declared load is carried it is {self.ratio.text} of the static torque'
-            )
+            told += f'; it is {self.ratio.text} of the static torque with the declared load'
         return told
 
     @property
@@ -130,4 +145,12 @@ class JointMeaning:
     @property
     def why(self) -> str:
         """Why nothing follows from the effort; '' where something does."""
-        return self._filled(self.fact.why)
+        told = self._filled(self.fact.why)
+        if self.meaning == UNKNOWN and self.odd and self.ratio is not None:
+            told += f'; it is {self.ratio.text} of the static torque with the declared load'
+        return told
+
+    @property
+    def odd(self) -> bool:
+        """Whether the effort is surely not the static torque with the declared load."""
+        return self.ratio is not None and not self.ratio.low <= 1.0 <= self.ratio.high

@@ -25,22 +25,25 @@ from ugv_acceptance.evaluation.effort.evidence import (
 )
 from ugv_acceptance.evaluation.effort.facts import (
     CONSTANT,
+    IDLE,
     NONE,
     OTHER_SIGN,
     SATURATED,
     SCALED,
     TORQUE,
     UNKNOWN,
+    UNLOADED,
     WITHOUT,
+    ZERO_EFFORT,
     Ratio,
 )
 from ugv_acceptance.type_aliases import Floats
 
 NAMES = (TORQUE, OTHER_SIGN, SCALED, WITHOUT, UNKNOWN)
 # Probability of each of NAMES before anything is measured, of one for the whole arm, of the load
-# declared, and the least at which a meaning is named.
-BEFORE = np.log((0.44, 0.10, 0.25, 0.19, 0.02))
-WHOLE_ARM, AS_DECLARED, NAMED = 0.6, 0.5, 0.95
+# declared, and the least at which a meaning is named: of a joint whose torque varies, and of another.
+BEFORE = np.log((0.45, 0.10, 0.25, 0.18, 0.02))
+WHOLE_ARM, AS_DECLARED, NAMED, SURE = 0.6, 0.5, 0.95, 0.99
 # Numbers of loads tried. Efforts below this are zero (denormal numbers too), and closer than the
 # share EQUAL of the largest they are one value.
 LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
@@ -49,6 +52,8 @@ LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
 VARIES, LOADED, CUT, ALIKE, CUT_SHARE, CUT_LEAST = 0.15, 0.05, 0.05, 1e-4, 0.2, 3
 # Below this probability of "none of these" a run is explained; so many cuts at most (load changes).
 EXPLAINED, CUTS = 0.5, 3
+# A ratio fits if its mean chi-square is at most this.
+FITS = 4.0
 # Log-probability of one more change of the load.
 CHANGE = -3.0
 
@@ -119,7 +124,12 @@ def name_meanings(arm: Arm) -> list[Named]:
     for j in range(count):
         plain, _, level = told[j]
         if j not in asked:
-            found.append(Named(plain or UNKNOWN, float(plain in {NONE, CONSTANT}), level=level))
+            below = ''
+            if plain == NONE and rows[:, j].any():
+                loaded = np.abs(arm.torque[rows[:, j], j]).max() >= VARIES * arm.sizes[j]
+                below = IDLE if loaded else ZERO_EFFORT
+            sure = float(plain in {NONE, CONSTANT})
+            found.append(Named(plain or UNKNOWN, sure, None, level, below))
             continue
         named = _named(arm, rows, parts, asked, j)
         if plain == SATURATED:
@@ -134,7 +144,7 @@ def _plain(arm: Arm, j: int) -> tuple[str, NDArray[np.bool_], float]:
     told = np.isfinite(effort)
     most = float(np.abs(effort[told]).max(initial=0.0))
     if most < ZERO:
-        return NONE, told, 0.0
+        return NONE, told, most
     if np.ptp(effort[told]) <= EQUAL * most:
         varies = np.ptp(torque[told]) / arm.sizes[j]
         unsure = UNKNOWN if varies > ALIKE and told.sum() >= CUT_LEAST else ''
@@ -253,30 +263,56 @@ def _named(
 ) -> Named:
     """Name the meaning of one joint from the parts of the run."""
     told = rows[:, j]
-    ratio = _ratio(arm, told, j)
     if np.abs(arm.torque[told, j]).max() < LOADED * arm.sizes[j]:
-        return Named(UNKNOWN)
+        return Named(UNKNOWN, below=UNLOADED)
     at = asked.index(j)
     varying = [i for i in asked if _varies(arm, rows, i)]
-    weights = [int(told[part].sum()) for part, _ in parts]
-    main = parts[int(np.argmax(weights))][1]
+    main = _main(arm, rows, parts, j)
     chance = main.meanings[at]
     k = int(chance.argmax())
     sure = float(chance[k])
     named = NAMES[k] if sure >= NAMED else UNKNOWN
-    if varying and j not in varying:
+    if varying and j not in varying and not _as_others(main, asked, varying, at):
         named = UNKNOWN
     if not varying and (len(asked) < 2 or not _agreed(arm, rows, asked, j)):
         named = UNKNOWN
-    if _contradicted(arm, rows, parts, at, j, named):
+    if any(_contradicts(arm, rows, part, (main, at, j)) for part in parts):
         named = UNKNOWN
     if named == SCALED:
-        ratio = _interval(main.scales[at])
-    return Named(named, sure, ratio)
+        return Named(named, sure, _interval(main.scales[at]))
+    return Named(named, sure, _ratio(arm, told, j) if named == UNKNOWN else None)
+
+
+def _main(
+    arm: Arm, rows: NDArray[np.bool_], parts: Sequence[tuple[slice, _Explained]], j: int
+) -> _Explained:
+    """Return the part of the run that tells most of a joint: it varies, and has most postures."""
+
+    def told(part: tuple[slice, _Explained]) -> tuple[bool, int]:
+        inside = _inside(rows, part[0])
+        return _varies(arm, inside, j), int(inside[:, j].sum())
+
+    return max(parts, key=told)[1]
+
+
+def _inside(rows: NDArray[np.bool_], part: slice) -> NDArray[np.bool_]:
+    inside = np.zeros_like(rows)
+    inside[part] = rows[part]
+    return inside
 
 
 def _varies(arm: Arm, rows: NDArray[np.bool_], j: int) -> bool:
-    return bool(np.ptp(arm.torque[rows[:, j], j]) >= VARIES * arm.sizes[j])
+    torque = arm.torque[rows[:, j], j]
+    return bool(len(torque) and np.ptp(torque) >= VARIES * arm.sizes[j])
+
+
+def _as_others(
+    main: _Explained, asked: Sequence[int], varying: Sequence[int], at: int
+) -> bool:
+    """Return whether a joint whose torque does not vary is surely as all those that vary are."""
+    kind = int(main.meanings[at].argmax())
+    others = [main.meanings[asked.index(i), kind] for i in varying]
+    return bool(main.meanings[at, kind] >= SURE and min(others) >= NAMED)
 
 
 def _agreed(arm: Arm, rows: NDArray[np.bool_], asked: Sequence[int], j: int) -> bool:
@@ -286,34 +322,49 @@ def _agreed(arm: Arm, rows: NDArray[np.bool_], asked: Sequence[int], j: int) -> 
     )
 
 
-def _contradicted(
+def _contradicts(
     arm: Arm,
     rows: NDArray[np.bool_],
-    parts: Sequence[tuple[slice, _Explained]],
-    at: int,
-    j: int,
-    named: str,
+    part: tuple[slice, _Explained],
+    main: tuple[_Explained, int, int],
 ) -> bool:
-    """Return whether a part in which the joint's torque varies has another name for its effort."""
-    for part, found in parts:
-        inside = np.zeros_like(rows)
-        inside[part] = rows[part]
-        k = int(found.meanings[at].argmax())
-        sure = found.meanings[at, k] >= NAMED and NAMES[k] != UNKNOWN
-        if sure and NAMES[k] != named and inside[:, j].any() and _varies(arm, inside, j):
-            return True
-    return False
+    """Return whether a part in which joint j varies surely has another meaning or scale than main.
+
+    `main` is the main part, the joint's number in it, and j. A single posture contradicts nothing:
+    what touches the arm there looks like another scale.
+    """
+    (span, found), (best, at, j) = part, main
+    if found is best or not _varies(arm, _inside(rows, span), j):
+        return False
+    k = int(found.meanings[at].argmax())
+    if found.meanings[at, k] < NAMED or NAMES[k] == UNKNOWN:
+        return False
+    if k != int(best.meanings[at].argmax()):
+        return True
+    one, other = _interval(found.scales[at]), _interval(best.scales[at])
+    apart = one is not None and other is not None and _apart(one, other)
+    return NAMES[k] == SCALED and apart
+
+
+def _apart(one: Ratio, other: Ratio) -> bool:
+    return one.high < other.low or other.high < one.low
 
 
 def _ratio(arm: Arm, told: NDArray[np.bool_], j: int) -> Ratio | None:
-    """Return effort over static torque with the declared load, by generalised least squares."""
+    """Return effort over static torque with the declared load, by generalised least squares.
+
+    None where one ratio does not fit all postures.
+    """
     joint = arm.joint(j, told)
     weight = np.linalg.inv(joint.covariances()[len(FRICTION) // 2])
     power = float(joint.torque @ weight @ joint.torque)
     if power <= 0.0:
         return None
     value = float(joint.torque @ weight @ joint.effort) / power
-    half = 1.96 * max(abs(value), 1e-9) / np.sqrt(power)
+    left = joint.effort - value * joint.torque
+    if not left @ weight @ left <= FITS * value**2 * len(left):
+        return None
+    half = 1.96 * abs(value) / np.sqrt(power)
     return Ratio(value, value - half, value + half)
 
 

@@ -135,7 +135,7 @@ def _stretches(
         if k > first:
             allowed = np.maximum(allowed, LEVEL_SHARE * np.abs(np.nan_to_num(level)))
             leaps = np.nan_to_num(np.abs(here - level)) > allowed
-            apart = not _near(q[a], q[at], gravity[a], gravity[at], reach)
+            apart = not is_near(q[a], q[at], gravity[a], gravity[at], reach)
             if apart or leaps.any():
                 yield offset + at, offset + a
                 first = k
@@ -143,7 +143,7 @@ def _stretches(
     yield offset + edges[first], offset + len(time)
 
 
-def _near(q: Floats, p: Floats, gravity: Floats, other: Floats, reach: Floats) -> bool:
+def is_near(q: Floats, p: Floats, gravity: Floats, other: Floats, reach: Floats) -> bool:
     """Return whether two postures are one: joints and direction of gravity differ by little."""
     if (np.abs(q - p) > reach).any():
         return False
@@ -162,7 +162,7 @@ def distinct(rests: Rests, reach: Floats) -> Rests:
     length, kept = rests.end - rests.start, list[int]()
     for k in np.argsort(-length, kind='stable').tolist():
         if not any(
-            _near(rests.q[k], rests.q[i], rests.gravity[k], rests.gravity[i], reach)
+            is_near(rests.q[k], rests.q[i], rests.gravity[k], rests.gravity[i], reach)
             and not (np.abs(rests.effort[k] - rests.effort[i]) > SAME * most).any()
             for i in kept
         ):
