@@ -116,10 +116,14 @@ class MeasuredLimits:
 
     def _unclear(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
         spells = self._over[j].spells()
+        why = joint.why
+        if joint.meaning == SCALED:
+            why = f'that it is {joint.ratio.text if joint.ratio else "a part"} of its torque is '
+            why += 'not sure: no other joint has such a unit'
         if spells:
             lines = [
                 f'{_when(x, start)}: the effort of {joint.joint} is {x.peak:.4g}, beyond its limit '
-                f'of {self._limit[j]:.1f} {joint.unit}, and {joint.why}'
+                f'of {self._limit[j]:.1f} {joint.unit}, and {why}'
                 for x in spells[:NAMED]
             ]
             yield Objection('measured_effort', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
