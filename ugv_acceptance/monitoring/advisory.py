@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.effort.facts import OTHER_SIGN, JointMeaning
+from ugv_acceptance.evaluation.effort.facts import JointMeaning
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests, PayloadEstimate
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
 from ugv_acceptance.evaluation.live import LiveEvaluator
@@ -111,7 +111,7 @@ class Advisory:
     def opposed(self) -> list[JointMeaning]:
         """The joints whose effort has the opposite sign."""
         joints = () if self.efforts is None else self.efforts.joints
-        return [joint for joint in joints if joint.meaning == OTHER_SIGN]
+        return [joint for joint in joints if joint.opposed]
 
     def do(self, alert: Alert) -> str:
         """Return what to do about an alert: the computed advice for its margin, else general."""

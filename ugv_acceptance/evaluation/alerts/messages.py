@@ -123,7 +123,7 @@ ALERTS = {
         'The motor named saturates below its limit and cannot hold its posture.',
     ),
     'ENCODER_FROZEN': AlertText(
-        'the position of {subject} does not change at all while its effort does',
+        'the position of {subject} does not change while its effort does',
         'check its encoder; if that works, something blocks the joint or pulls on it',
         FailureSource.SENSOR,
         'The reported position of a joint does not change: check its encoder.',

@@ -11,8 +11,9 @@ import numpy as np
 
 from ugv_acceptance.type_aliases import Floats
 
-# Friction as a share of the joint's largest static torque, each level as likely; offset, noise.
-FRICTION, OFFSET, NOISE = (0.005, 0.03, 0.10), 0.02, 0.004
+# Friction as a share of the joint's largest static torque, and how likely it is; offset, noise.
+FRICTION, LIKELY = (0.005, 0.03, 0.10, 0.20), np.log((0.3, 0.35, 0.3, 0.05))
+OFFSET, NOISE = 0.02, 0.004
 # Scales that count as 1; those of another unit lie between the two last, but not near 1.
 NEAR_ONE = np.array((0.95, 1.0, 1.05))
 NOT_ONE, STEP, SPAN = (0.8, 1.25), 0.03, np.log(1000.0)
@@ -79,9 +80,9 @@ def evidence_of(joint: Joint, loads: Floats) -> Evidence:
     y, n = joint.effort, len(joint.effort)
     mean = joint.torque + loads[:, None] * joint.lever
     parts: list[list[Floats]] = [[], [], [], []]
-    for covariance in joint.covariances():
+    for covariance, likely in zip(joint.covariances(), LIKELY, strict=True):
         weight = np.linalg.inv(covariance)
-        constant = -0.5 * (np.linalg.slogdet(covariance)[1] + n * LOG_2PI) - np.log(3.0)
+        constant = likely - 0.5 * (np.linalg.slogdet(covariance)[1] + n * LOG_2PI)
         a, b, c = _products(y, weight, mean)
 
         def fit(k: Floats, a: float = a, b: Floats = b, c: Floats = c) -> Floats:

@@ -12,6 +12,9 @@ NONE, CONSTANT, SATURATED, UNKNOWN = 'none', 'constant', 'saturated', 'unknown'
 # loaded to tell.
 ZERO_EFFORT, IDLE, UNLOADED = 'zero', 'zero under load', 'unloaded'
 
+# An effort within this share of minus the static torque has the opposite sign.
+ALIKE = 0.5
+
 
 @dataclass(frozen=True, slots=True)
 class Fact:
@@ -140,7 +143,7 @@ class JointMeaning:
     @property
     def do(self) -> str:
         """What to do about it; '': nothing."""
-        return self._filled(self.fact.do)
+        return self._filled(FACTS[OTHER_SIGN].do if self.opposed else self.fact.do)
 
     @property
     def why(self) -> str:
@@ -149,6 +152,13 @@ class JointMeaning:
         if self.meaning == UNKNOWN and self.odd and self.ratio is not None:
             told += f'; it is {self.ratio.text} of the static torque with the declared load'
         return told
+
+    @property
+    def opposed(self) -> bool:
+        """Whether the effort is about minus the torque, though its scale may not be certain."""
+        if self.meaning == UNKNOWN and self.ratio is not None:
+            return self.ratio.high < 0.0 and abs(self.ratio.value + 1.0) <= ALIKE
+        return self.sign == -1.0
 
     @property
     def odd(self) -> bool:

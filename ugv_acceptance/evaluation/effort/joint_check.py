@@ -55,16 +55,18 @@ class JointSamples:
         return (np.abs(np.nan_to_num(self.rate)) > MOVING) & np.isfinite(self.measured)
 
 
-def check_joint(s: JointSamples) -> Json:
-    """Return the comparison of one joint for JSON."""
+def counts(s: JointSamples) -> Json:
+    """Return how many samples there are at the limit, at rest and in motion, for JSON."""
     return {
         'clipped_samples': int(s.clipped.sum()),
         'rest_samples': int(s.rest().sum()),
         'motion_samples': int(s.motion().sum()),
-        **at_rest(s),
-        **friction(s),
-        'f_test': in_motion(s),
     }
+
+
+def check_joint(s: JointSamples) -> Json:
+    """Return the comparison of one joint whose effort is its torque, for JSON."""
+    return {**at_rest(s), **friction(s), 'f_test': in_motion(s)}
 
 
 def at_rest(s: JointSamples) -> Json:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.effort.evidence import (
-    FRICTION,
     KINDS,
     OTHER_UNIT,
     SCALE_WEIGHT,
@@ -42,7 +41,7 @@ from ugv_acceptance.type_aliases import Floats
 NAMES = (TORQUE, OTHER_SIGN, SCALED, WITHOUT, UNKNOWN)
 # Probability of each of NAMES before anything is measured, of one for the whole arm, of the load
 # declared, and the least at which a meaning is named: of a joint whose torque varies, and of another.
-BEFORE = np.log((0.45, 0.10, 0.25, 0.18, 0.02))
+BEFORE = np.log((0.48, 0.12, 0.22, 0.16, 0.02))
 WHOLE_ARM, AS_DECLARED, NAMED, SURE = 0.6, 0.5, 0.95, 0.99
 # Numbers of loads tried. Efforts below this are zero (denormal numbers too), and closer than the
 # share EQUAL of the largest they are one value.
@@ -52,8 +51,8 @@ LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
 VARIES, LOADED, CUT, ALIKE, CUT_SHARE, CUT_LEAST = 0.15, 0.05, 0.05, 1e-4, 0.2, 3
 # Below this probability of "none of these" a run is explained; so many cuts at most (load changes).
 EXPLAINED, CUTS = 0.5, 3
-# A ratio fits if its mean chi-square is at most this.
-FITS = 4.0
+# Number of the level of friction that is usual. A ratio fits if its mean chi-square is at most this.
+USUAL, FITS = 1, 4.0
 # Log-probability of one more change of the load.
 CHANGE = -3.0
 
@@ -85,8 +84,10 @@ class Arm:
         """Return the loads (kg) beyond the declared one that are tried; 0 is one of them."""
         if not self.lever.any():
             return np.zeros(1)
-        least = -float(self.declared.max(initial=0.0))
-        return np.unique(np.append(np.linspace(least, max(self.most, 1e-3), LOADS), 0.0))
+        least, most = -float(self.declared.max(initial=0.0)), max(self.most, 1e-3)
+        steps = round(-least / (most - least) * LOADS) if least < 0.0 else 0
+        less = np.linspace(least, 0.0, steps, endpoint=False)
+        return np.concatenate((less, np.linspace(0.0, most, LOADS - steps)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -356,7 +357,7 @@ def _ratio(arm: Arm, told: NDArray[np.bool_], j: int) -> Ratio | None:
     None where one ratio does not fit all postures.
     """
     joint = arm.joint(j, told)
-    weight = np.linalg.inv(joint.covariances()[len(FRICTION) // 2])
+    weight = np.linalg.inv(joint.covariances()[USUAL])
     power = float(joint.torque @ weight @ joint.torque)
     if power <= 0.0:
         return None
@@ -365,7 +366,7 @@ def _ratio(arm: Arm, told: NDArray[np.bool_], j: int) -> Ratio | None:
     if not left @ weight @ left <= FITS * value**2 * len(left):
         return None
     half = 1.96 * abs(value) / np.sqrt(power)
-    return Ratio(value, value - half, value + half)
+    return Ratio(value, float(value - half), float(value + half))
 
 
 def _interval(chances: Floats) -> Ratio | None:

@@ -13,8 +13,8 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.downsampling import Sampler
-from ugv_acceptance.evaluation.effort.facts import OTHER_SIGN, SCALED, WITHOUT
-from ugv_acceptance.evaluation.effort.joint_check import REST, JointSamples, check_joint
+from ugv_acceptance.evaluation.effort.facts import SCALED, WITHOUT
+from ugv_acceptance.evaluation.effort.joint_check import REST, JointSamples, check_joint, counts
 from ugv_acceptance.evaluation.effort.measured import MeasuredLimits
 from ugv_acceptance.evaluation.effort.rests import find_rests, reaches
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
@@ -82,11 +82,13 @@ class ModelCheck:
                 'do': joint.do,
                 'ratio': _ratio(found, j),
             }
+            measured = np.where(clipped[:, j], np.nan, effort[:, j]) * (joint.fact.sign or 1.0)
+            margin = limits[j] - np.abs(torque[:, j])
+            columns = measured, torque[:, j], rate[:, j], margin, clipped[:, j], slow
+            samples = JointSamples(*columns)
+            told |= counts(samples)
             if joint.weighs:
-                measured = np.where(clipped[:, j], np.nan, effort[:, j]) * joint.fact.sign
-                margin = limits[j] - np.abs(torque[:, j])
-                columns = measured, torque[:, j], rate[:, j], margin, clipped[:, j], slow
-                told |= check_joint(JointSamples(*columns))
+                told |= check_joint(samples)
             joints[joint.joint] = told
         return {
             'samples': len(time),
@@ -162,7 +164,7 @@ def _load_objections(found: Understanding, start: int) -> Iterator[Objection]:
 def _findings(found: Understanding, start: int) -> Iterator[str]:
     """Yield what somebody should know or do, one sentence each."""
     for joint in found.joints:
-        if joint.meaning in {OTHER_SIGN, SCALED, WITHOUT}:
+        if joint.meaning in {SCALED, WITHOUT} or joint.opposed:
             yield ': '.join(part for part in (joint.sentence, joint.do) if part)
     for load in found.loads:
         if load.differs:
@@ -180,12 +182,10 @@ def _not_checked(found: Understanding) -> Iterator[NotChecked]:
             reasons.setdefault(joint.why, []).append(joint.joint)
     for why, names in reasons.items():
         yield NotChecked(f'measured effort of {", ".join(names)}', why)
-    turned = [joint for joint in found.joints if joint.fact.sign == -1.0]
+    turned = [joint for joint in found.joints if joint.opposed]
     if turned:
         names = ', '.join(joint.joint for joint in turned)
-        why = f'it is opposite, and was turned round here: {turned[0].do}'
-        if len(turned) > 1:
-            why = 'it is opposite, and was turned round here: set effort_sign: -1 for each'
+        why = 'it is opposite: set effort_sign: -1 for each in the configuration'
         yield NotChecked(f'sign of the measured effort of {names}', why)
     if not found.loads:
         why = 'no joint with a measured torque of known scale and sign weighs it'
