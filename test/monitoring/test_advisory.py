@@ -105,13 +105,12 @@ LOADED = ((0.0, 0.0, 0.3, 2.0), (0.0, 0.6, 1.5, 2.0), (0.0, 1.0, -1.2, 2.0))
 def rest(session: Session, q: tuple[float, ...], carried: float, scale: float = 1.0) -> None:
     """Let a robot rest for three looks with a load (kg) and an effort that is `scale` x torque."""
     effort = scale * static_torque(PACKBOT.robot, q, DOWN, Payload(carried))
-    for k in range(3):
+    for _ in range(3):
         wait_until(
             lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort.tolist())
         )
         give(session, q, 0.0, effort.tolist())
         session.feel()
-        assert k or session.advisory.estimate is None or session.advisory.rests.current
 
 
 def test_a_robot_that_slides_before_it_tips_is_told() -> None:

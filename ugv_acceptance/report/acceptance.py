@@ -22,6 +22,7 @@ from ugv_acceptance.report.format import (
     not_checked_lines,
     number_text,
     origin_line,
+    range_text,
     seconds_text,
     worst_text,
 )
@@ -86,6 +87,7 @@ def acceptance_page(
         limit=limit_text,
         bound=bound_text,
         interval=interval_text,
+        range=range_text,
         missing=missing_text,
     )
     return environment.get_template('acceptance.html').render(

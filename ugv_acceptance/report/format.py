@@ -177,6 +177,11 @@ def interval_text(found: Json | None, unit: str = '') -> str:
     return f'{_short(found["value"])} ± {_short(half)} {unit}'.strip()
 
 
+def range_text(found: Json) -> str:
+    """Return a number with both ends of its 95 % interval, which need not lie evenly about it."""
+    return f'{found["value"]:.3g} ({found["low"]:.3g} to {found["high"]:.3g})'
+
+
 def _short(value: float) -> str:
     """Return a number with two decimals, a large one with three digits."""
     return number_text(value, 2) if abs(value) < 100.0 else f'{value:.3g}'

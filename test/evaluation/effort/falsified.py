@@ -32,29 +32,31 @@ from ugv_acceptance.model.robot import Joint, Link, Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.type_aliases import Floats
 
+SIGNS = np.array((-1.0, 1.0))
 MEANINGS = (TORQUE, OTHER_SIGN, SCALED, WITHOUT, NONE, CONSTANT, SATURATED)
 SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'robots'
 # Robots of others with arms: the joints that move, and the link that carries.
 ARMS = {
     'husky_ur5': (
-        'ur5_shoulder_pan_joint ur5_shoulder_lift_joint ur5_elbow_joint '
-        'ur5_wrist_1_joint ur5_wrist_2_joint ur5_wrist_3_joint',
+        [f'ur5_{name}_joint' for name in 'shoulder_pan shoulder_lift elbow'.split()]
+        + [f'ur5_wrist_{k}_joint' for k in (1, 2, 3)],
         'ur5_tool0',
     ),
     'tiago': (
-        'torso_lift_joint head_1_joint head_2_joint ' + ' '.join(f'arm_{k}_joint' for k in range(1, 8)),
+        ['torso_lift_joint', 'head_1_joint', 'head_2_joint']
+        + [f'arm_{k}_joint' for k in range(1, 8)],
         'gripper_link',
     ),
-    'tb3_manip': ('joint1 joint2 joint3 joint4', 'link5'),
-    'z1': ('joint1 joint2 joint3 joint4 joint5 joint6', 'link06'),
-}  # fmt: skip
+    'tb3_manip': ([f'joint{k}' for k in range(1, 5)], 'link5'),
+    'z1': ([f'joint{k}' for k in range(1, 7)], 'link06'),
+}
 
 
 def of_others(name: str, folder: Path = SHARED) -> Robot:
     """Return a robot whose URDF others made, with the joints of its arm."""
     joints, link = ARMS[name]
     read = read_urdf((folder / name / f'{name}.urdf').read_bytes(), name)
-    return Robot(name, read.links, read.joints, tuple(joints.split()), payload_link=link)
+    return Robot(name, read.links, read.joints, tuple(joints), payload_link=link)
 
 
 def random_arm(rng: np.random.Generator) -> Robot:
@@ -186,18 +188,18 @@ def _reported(
     meaning: str, full: Floats, gravity: Floats, size: float, rng: np.random.Generator
 ) -> Floats:
     """Return what is reported of the torque `full`, of which `gravity` holds the arm alone."""
-    if meaning == OTHER_SIGN:
-        return -full
-    if meaning == SCALED:
-        spans = (rng.uniform(np.log(0.01), np.log(0.65)), rng.uniform(np.log(1.6), np.log(100.0)))
-        return float(np.exp(rng.choice(spans)) * rng.choice((-1.0, 1.0))) * full
-    if meaning == WITHOUT:
-        return full - gravity
-    if meaning == NONE:
-        return np.full(len(full), rng.choice((0.0, np.nan, 5e-310)))
-    if meaning == CONSTANT:
-        return np.full(len(full), rng.normal() * size)
-    if meaning == SATURATED:
-        most = np.quantile(np.abs(full), 0.5)
-        return np.clip(full, -most, most)
-    return full
+    makers = {
+        OTHER_SIGN: lambda: -full,
+        SCALED: lambda: _scale(rng) * full,
+        WITHOUT: lambda: full - gravity,
+        NONE: lambda: np.full(len(full), rng.choice((0.0, np.nan, 5e-310))),
+        CONSTANT: lambda: np.full(len(full), rng.normal() * size),
+        SATURATED: lambda: np.clip(full, *(np.quantile(np.abs(full), 0.5) * SIGNS)),
+    }
+    return makers.get(meaning, lambda: full)()
+
+
+def _scale(rng: np.random.Generator) -> float:
+    """Return a scale of either sign that is not near 1."""
+    spans = (rng.uniform(np.log(0.01), np.log(0.65)), rng.uniform(np.log(1.6), np.log(100.0)))
+    return float(np.exp(rng.choice(spans)) * rng.choice((-1.0, 1.0)))

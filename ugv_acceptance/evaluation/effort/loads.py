@@ -16,7 +16,9 @@ from ugv_acceptance.type_aliases import Floats
 
 # Uncertainty of a scale of 1; friction as a share of the joint's largest torque: assumed, least and
 # most.
-GAIN, FRICTION, LEAST, LARGEST = 0.02, 0.03, 0.004, 0.2
+GAIN, FRICTION, LEAST, LARGEST = 0.02, 0.10, 0.004, 0.3
+# Scatter is told by this many numbers.
+FEW = 3
 # A change of the load must explain this much (chi-square); so many changes at most.
 CHANGE, CHANGES = 16.0, 8
 # A load differs from the declared one if 99 % of its distribution do, and by more than this share
@@ -88,11 +90,13 @@ def weigh(arm: Arm, signs: Sequence[float | None]) -> Weighed:
     if not len(stack.open):
         return Weighed()
     least = MATTERS * float(min(arm.sizes[j] / lever[j] for j in joints if feels[j]))
-    friction = FRICTION * stack.size
-    cuts = _cuts(stack, stack.weight(friction), len(arm.effort), least)
+    # What loads cannot explain in any posture is friction, however often the load changed.
+    friction, every = FRICTION * stack.size, np.unique(stack.row)[1:].tolist()
     for _ in range(2):
-        friction = _friction(stack, cuts, friction)
-        cuts = _kept(stack, stack.weight(friction), cuts, least)
+        friction = _friction(stack, every, friction)
+    cuts = _cuts(stack, stack.weight(friction), len(arm.effort), least)
+    friction = np.maximum(friction, _friction(stack, cuts, friction))
+    cuts = _kept(stack, stack.weight(friction), cuts, least)
     return _told(arm, stack, cuts, stack.weight(friction), least)
 
 
@@ -125,8 +129,11 @@ def _fit(stack: _Stack, weight: Floats, cuts: Sequence[int]) -> tuple[Floats, Fl
 
 
 def _misfit(stack: _Stack, weight: Floats, cuts: Sequence[int]) -> float:
-    left = _fit(stack, weight, cuts)[2]
-    return float(stack.open @ left @ stack.open)
+    columns = _columns(stack, cuts)
+    weighted = weight @ columns
+    felt = weighted.T @ stack.open
+    gain = felt @ np.linalg.pinv(columns.T @ weighted) @ felt
+    return float(stack.open @ weight @ stack.open - gain)
 
 
 def _cuts(stack: _Stack, weight: Floats, rows: int, least: float) -> list[int]:
@@ -169,7 +176,7 @@ def _friction(stack: _Stack, cuts: Sequence[int], friction: Floats) -> Floats:
     for j in np.unique(stack.joint):
         mine = stack.joint == j
         told = z[mine][np.isfinite(z[mine])]
-        if len(told) >= 3:
+        if len(told) >= FEW:
             found[mine] *= np.sqrt(np.median(told**2) / 0.455)
     return np.clip(found, LEAST * stack.size, LARGEST * stack.size)
 

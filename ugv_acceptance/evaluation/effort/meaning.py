@@ -50,9 +50,10 @@ LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
 # anything, and vary among cut-off efforts, and among equal ones; share and number of postures that are cut off.
 VARIES, LOADED, CUT, ALIKE, CUT_SHARE, CUT_LEAST = 0.15, 0.05, 0.05, 1e-4, 0.2, 3
 # Below this probability of "none of these" a run is explained; so many cuts at most (load changes).
-EXPLAINED, CUTS = 0.5, 3
-# Number of the level of friction that is usual. A ratio fits if its mean chi-square is at most this.
-USUAL, FITS = 1, 4.0
+EXPLAINED, CUTS = 0.05, 3
+# Number of the level of friction that is usual. A ratio fits if its mean chi-square is at most FITS,
+# and is not told if it is known worse than by this share.
+USUAL, FITS, VAGUE = 1, 4.0, 0.5
 # Log-probability of one more change of the load.
 CHANGE = -3.0
 
@@ -219,7 +220,7 @@ def _parts(arm: Arm, rows: NDArray[np.bool_], asked: Sequence[int]) -> list[tupl
     if whole is None:
         return []
     parts = [(slice(0, len(rows)), whole)]
-    while len(parts) <= CUTS and any(_unexplained(found) for _, found in parts):
+    while len(parts) <= CUTS and (len(parts) > 1 or _unexplained(whole)):
         best = max(
             (split for k in range(len(parts)) for split in _splits(arm, rows, asked, parts, k)),
             key=lambda split: split[0],
@@ -354,7 +355,7 @@ def _apart(one: Ratio, other: Ratio) -> bool:
 def _ratio(arm: Arm, told: NDArray[np.bool_], j: int) -> Ratio | None:
     """Return effort over static torque with the declared load, by generalised least squares.
 
-    None where one ratio does not fit all postures.
+    None where one ratio does not fit all postures, or is not determined to half of itself.
     """
     joint = arm.joint(j, told)
     weight = np.linalg.inv(joint.covariances()[USUAL])
@@ -366,6 +367,8 @@ def _ratio(arm: Arm, told: NDArray[np.bool_], j: int) -> Ratio | None:
     if not left @ weight @ left <= FITS * value**2 * len(left):
         return None
     half = 1.96 * abs(value) / np.sqrt(power)
+    if half > VAGUE * abs(value):
+        return None
     return Ratio(value, float(value - half), float(value + half))
 
 

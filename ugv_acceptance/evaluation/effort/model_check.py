@@ -77,6 +77,7 @@ class ModelCheck:
         for j, joint in enumerate(found.joints):
             told: Json = {
                 'meaning': joint.meaning,
+                'unit': joint.unit,
                 'probability': joint.probability,
                 'sentence': joint.sentence,
                 'do': joint.do,
