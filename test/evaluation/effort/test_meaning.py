@@ -20,7 +20,6 @@ from robots import paper_arm
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.effort.facts import (
     CONSTANT,
-    FACTS,
     NONE,
     OTHER_SIGN,
     SATURATED,
@@ -30,6 +29,7 @@ from ugv_acceptance.evaluation.effort.facts import (
     WITHOUT,
     JointMeaning,
     Ratio,
+    signs_of,
 )
 from ugv_acceptance.evaluation.effort.loads import Weighed, weigh
 from ugv_acceptance.evaluation.effort.meaning import Named, name_meanings
@@ -66,7 +66,7 @@ def test_of_the_named_meanings_99_percent_are_right_and_a_fifth_is_unknown() -> 
 
 def signs(names: Sequence[Named]) -> list[float | None]:
     """Return what makes each effort a torque."""
-    return [FACTS[one.meaning].sign for one in names]
+    return signs_of([one.meaning for one in names])
 
 
 def test_no_payload_is_told_that_is_not_carried() -> None:

@@ -4,6 +4,7 @@ Evaluation, report, doctor and the live monitor all speak from this table, and n
 an effort for more than its meaning allows.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 TORQUE, OTHER_SIGN, SCALED, WITHOUT = 'torque', 'other sign', 'scaled', 'without gravity'
@@ -77,6 +78,16 @@ FACTS = {
         why='what its effort means is not known',
     ),
 }
+
+
+def signs_of(meanings: Sequence[str]) -> list[float | None]:
+    """Return what makes the effort of each joint a torque; None where nothing can be weighed by it.
+
+    Where most of an arm's efforts are in another unit, one that seems to be a torque is no proof.
+    """
+    signs = [FACTS[meaning].sign for meaning in meanings]
+    torques = sum(sign is not None for sign in signs)
+    return [None] * len(signs) if meanings.count(SCALED) > torques else signs
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,8 @@ from ugv_acceptance.type_aliases import Floats
 # Uncertainty of a scale of 1; friction as a share of the joint's largest torque: assumed, least and
 # most.
 GAIN, FRICTION, LEAST, LARGEST = 0.02, 0.10, 0.004, 0.3
-# Scatter is told by this many numbers.
-FEW = 3
+# Scatter is told by this many numbers, a load by this many.
+FEW, TOLD = 3, 2
 # A change of the load must explain this much (chi-square); so many changes at most.
 CHANGE, CHANGES = 16.0, 8
 # A load differs from the declared one if 99 % of its distribution do, and by more than this share
@@ -184,7 +184,8 @@ def _friction(stack: _Stack, cuts: Sequence[int], friction: Floats) -> Floats:
 def _deviations(stack: _Stack, left: Floats) -> Floats:
     """Return by how many standard deviations each number (n,) is off what the others tell."""
     power = np.diag(left)
-    good = power > 1e-9 * np.abs(power).max(initial=0.0)
+    # Where nothing but the number itself tells its load, rounding is left.
+    good = power > 1e-6 / np.maximum(stack.size**2, 1e-12)
     found: Floats = np.where(good, left @ stack.open, np.nan) / np.sqrt(np.where(good, power, 1.0))
     return found
 
@@ -200,7 +201,8 @@ def _told(
     for k, (first, after) in enumerate(pairwise((0, *cuts, len(arm.effort)))):
         declared = float(arm.declared[first:after].mean())
         mass, sigma = declared + float(extra[k]), float(deviation[k])
-        if not 0.0 < sigma * SURE < VAGUE * arm.most:
+        told = int(((stack.row >= first) & (stack.row < after)).sum())
+        if not 0.0 < sigma * SURE < VAGUE * arm.most or told < TOLD:
             continue
         if mass + SURE * sigma < 0.0:
             # No load weighs less than nothing: the arm rests on something.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
-from ugv_acceptance.evaluation.effort.facts import SATURATED, UNKNOWN, JointMeaning
+from ugv_acceptance.evaluation.effort.facts import UNKNOWN, JointMeaning, signs_of
 from ugv_acceptance.evaluation.effort.loads import Contact, Load, weigh
 from ugv_acceptance.evaluation.effort.meaning import name_meanings
 from ugv_acceptance.evaluation.effort.rests import Rests, arm_of, distinct, reaches
@@ -32,11 +32,6 @@ class Understanding:
     contacts: tuple[Contact, ...] = ()
     link: str | None = None
     guessed: bool = False
-
-    @property
-    def signs(self) -> list[float | None]:
-        """What makes each effort a torque; None where it is none, or cut off."""
-        return [joint.fact.sign for joint in self.joints]
 
     def span(self, load: Load) -> tuple[int, int]:
         """Return from when to when (ns) a load was carried, as far as rests tell."""
@@ -79,7 +74,7 @@ def understand(settings: Settings, sources: Sequence[Source], rests: Rests) -> U
         for n, u, m in zip(names, units, name_meanings(arm), strict=True)
     )
     kept = longest(rests)
-    signs = [None if joint.meaning == SATURATED else joint.fact.sign for joint in joints]
+    signs = signs_of([joint.meaning for joint in joints])
     weighed = weigh(arm_of(settings, sources, kept)[0], signs)
     return Understanding(
         joints, kept, weighed.loads, weighed.contacts, sizes.link, sizes.guessed
