@@ -41,7 +41,7 @@ PACKBOT = replace(load().settings.robot, payload=Payload())
 # Every robot with every meaning, and arms whose joints have a meaning each.
 RUNS = [
     (name, robot, meanings, seed)
-    for name, robot in [*own_robots(1, 3), *others()]
+    for name, robot in [*own_robots(1, 2), *others()]
     for seed, meanings in enumerate([*((m,) for m in MEANINGS), MEANINGS, MEANINGS])
 ]
 
@@ -59,7 +59,7 @@ def test_of_the_named_meanings_99_percent_are_right_and_a_fifth_is_unknown() -> 
         for truth, found in zip(made.truth, name_meanings(made.arm), strict=True):
             unknown = found.meaning == UNKNOWN
             count['unknown' if unknown else 'right' if found.meaning == truth else 'wrong'] += 1
-    assert count.total() > 300
+    assert count.total() > 200
     assert count['wrong'] <= 0.01 * (count['right'] + count['wrong'])
     assert count['unknown'] <= 0.20 * count.total()
 
