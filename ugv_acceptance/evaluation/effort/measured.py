@@ -75,7 +75,7 @@ class MeasuredLimits:
             if joint.sign is not None:
                 yield from self._saturated(j, joint, start)
                 yield from self._differing(j, joint, start)
-            elif joint.meaning == SCALED and _shared(joint, joints):
+            elif in_another_unit(joint, joints):
                 yield from self._scaled(j, joint)
             elif joint.meaning not in {NONE, CONSTANT}:
                 yield from self._unclear(j, joint, start)
@@ -129,9 +129,12 @@ class MeasuredLimits:
             yield Objection('measured_effort', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
 
 
-def _shared(joint: JointMeaning, joints: Sequence[JointMeaning]) -> bool:
-    """Return whether another joint's effort has the same unit; one alone may be a fault."""
-    mine = joint.ratio
+def in_another_unit(joint: JointMeaning, joints: Sequence[JointMeaning]) -> bool:
+    """Return whether the efforts of a joint and of another one have one other unit.
+
+    One alone may be a fault.
+    """
+    mine = joint.ratio if joint.meaning == SCALED else None
     ratios = [x.ratio for x in joints if x is not joint and x.meaning == SCALED]
     return any(
         mine is not None and r is not None and r.low <= mine.high and mine.low <= r.high

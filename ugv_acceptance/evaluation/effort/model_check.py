@@ -15,7 +15,7 @@ from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.downsampling import Sampler
 from ugv_acceptance.evaluation.effort.facts import SCALED, WITHOUT
 from ugv_acceptance.evaluation.effort.joint_check import REST, JointSamples, check_joint, counts
-from ugv_acceptance.evaluation.effort.measured import MeasuredLimits
+from ugv_acceptance.evaluation.effort.measured import MeasuredLimits, in_another_unit
 from ugv_acceptance.evaluation.effort.rests import find_rests, reaches
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
 from ugv_acceptance.evaluation.margin_table import MarginRows
@@ -65,7 +65,10 @@ class ModelCheck:
         loads = tuple(_load_objections(found, start))
         objections = (*self._limits.objections(found.joints, start), *loads)
         result = {'model_check': self.result(found, start)}
-        return Statement(result, objections, tuple(_not_checked(found)))
+        # An encoder is called frozen because the effort changed: not by an effort in another unit.
+        no_torque = {x.joint for x in found.joints if in_another_unit(x, found.joints)}
+        unfounded = frozenset(('ENCODER_FROZEN', name) for name in no_torque)
+        return Statement(result, objections, tuple(_not_checked(found)), unfounded)
 
     def result(self, found: Understanding, start: int) -> Json:
         """Return the comparison for JSON: joints, loads, contacts, share of slow samples."""
