@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test'))
 
-from evaluation.effort.falsified import (  # noqa: E402
+from evaluation.effort.falsified import (
     MEANINGS,
     SHARED,
     Falsified,
@@ -24,9 +24,9 @@ from evaluation.effort.falsified import (  # noqa: E402
     own_robots,
 )
 
-from ugv_acceptance.evaluation.effort.facts import UNKNOWN  # noqa: E402
-from ugv_acceptance.evaluation.effort.meaning import name_meanings  # noqa: E402
-from ugv_acceptance.model.robot import Robot  # noqa: E402
+from ugv_acceptance.evaluation.effort.facts import UNKNOWN
+from ugv_acceptance.evaluation.effort.meaning import name_meanings
+from ugv_acceptance.model.robot import Robot
 
 # What is tried: name, meanings mixed in one arm, how far the truth is off.
 TRIED = (
@@ -62,17 +62,17 @@ class Count:
         right = sum(n for (truth, name), n in self.joints.items() if truth == name)
         unknown = sum(n for (_, name), n in self.joints.items() if name == UNKNOWN)
         named = max(total - unknown, 1)
-        lines = [
+        first = (
             f'{title}: {self.runs} runs, {total} joints; of the named right {right / named:.2%}, '
             f'unknown {unknown / total:.1%}; {self.seconds / max(self.runs, 1):.3f} s a run'
-        ]
-        lines += [
+        )
+        lines = [
             f'  {truth}: ' + ', '.join(
                 f'{name} {n}' for (t, name), n in sorted(self.joints.items()) if t == truth
             )
             for truth in MEANINGS
         ]  # fmt: skip
-        return '\n'.join([*lines, f'  wrong: {self.wrong[:10]}'])
+        return '\n'.join([first, *lines, f'  wrong: {self.wrong[:10]}'])
 
 
 def trial(robots: list[tuple[str, Robot]], seeds: range, postures: int) -> None:

@@ -34,7 +34,9 @@ def judged(repository: Path, tmp_path: Path) -> Callable[[Change], Json]:
 def held(sample: JointStateSample, mass: float) -> list[float]:
     """Return the static torque of each joint of a message with a load (kg)."""
     q = [sample.position[sample.names.index(name)] for name in ROBOT.joint_names]
-    torque = dict(zip(ROBOT.joint_names, static_torque(ROBOT, q, LEVEL, Payload(mass)), strict=True))
+    torque = dict(
+        zip(ROBOT.joint_names, static_torque(ROBOT, q, LEVEL, Payload(mass)), strict=True)
+    )
     return [float(torque[name]) for name in sample.names]
 
 
@@ -152,7 +154,9 @@ def test_a_wrong_sign_passes_and_is_named(judged: Callable[[Change], Json]) -> N
     result = judged(efforts(lambda _, s: [-e for e in s.effort]))
     assert result['verdict'] == 'PASS'
     for joint in ARM:
-        assert any(f'set effort_sign: -1 for {joint}' in x for x in result['model_check']['findings'])
+        assert any(
+            f'set effort_sign: -1 for {joint}' in x for x in result['model_check']['findings']
+        )
 
 
 CASES = {

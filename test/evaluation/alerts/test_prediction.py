@@ -115,8 +115,10 @@ def test_a_position_that_keeps_every_bit_under_changing_effort_is_frozen(*, froz
 
 
 @pytest.mark.parametrize('seed', range(4))
-@pytest.mark.parametrize(('noise', 'rise', 'frozen'), [(2e-4, 8.0, True), (2e-4, 3.0, False),
-                                                      (3e-4, 8.0, True), (4e-3, 8.0, False)])
+@pytest.mark.parametrize(
+    ('noise', 'rise', 'frozen'),
+    [(2e-4, 8.0, True), (2e-4, 3.0, False), (3e-4, 8.0, True), (4e-3, 8.0, False)],
+)
 def test_a_position_that_only_trembles_under_growing_effort_is_frozen(
     seed: int, noise: float, rise: float, *, frozen: bool
 ) -> None:

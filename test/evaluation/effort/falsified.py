@@ -38,7 +38,7 @@ SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'robots'
 # Robots of others with arms: the joints that move, and the link that carries.
 ARMS = {
     'husky_ur5': (
-        [f'ur5_{name}_joint' for name in 'shoulder_pan shoulder_lift elbow'.split()]
+        [f'ur5_{name}_joint' for name in ['shoulder_pan', 'shoulder_lift', 'elbow']]
         + [f'ur5_wrist_{k}_joint' for k in (1, 2, 3)],
         'ur5_tool0',
     ),
@@ -177,9 +177,7 @@ def falsified(
     truths = tuple(str(rng.choice(meanings)) for _ in range(n)) if len(meanings) > 1 else (
         meanings[0],
     ) * n  # fmt: skip
-    columns = [
-        _reported(truths[j], full[:, j], model[:, j], size[j], rng) for j in range(n)
-    ]
+    columns = [_reported(truths[j], full[:, j], model[:, j], size[j], rng) for j in range(n)]
     effort = np.column_stack(columns)
     return Falsified(arm_of(robot, q, gravity, effort)[0], truths, load, q, gravity)
 

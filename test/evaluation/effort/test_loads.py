@@ -81,7 +81,9 @@ def test_a_load_is_told_by_the_stretch_in_which_it_was_carried(seed: int) -> Non
     """0, 4, 0 kg: three stretches that end where the load changed, and no mean of them."""
     rng = np.random.default_rng(seed)
     q, ends = postures(15, seed), (0, 5, 10, 15)
-    effort = np.concatenate([held(q[a:b], m) for a, b, m in zip(ends, ends[1:], (0.0, 4.0, 0.0), strict=False)])
+    effort = np.concatenate(
+        [held(q[a:b], m) for a, b, m in zip(ends, ends[1:], (0.0, 4.0, 0.0), strict=False)]
+    )
     effort += rng.normal(0.0, 0.3, effort.shape)
     found = weighed(q, effort)
     assert [(x.first, x.last) for x in found.loads] == [(0, 4), (5, 9), (10, 14)]

@@ -265,5 +265,3 @@ def test_a_robot_that_has_tipped_is_not_compared() -> None:
     angle = told.angle.copy()
     angle[10:15, 2] = 0.0
     assert checked(replace(told, angle=angle))['samples'] == 35
-
-

@@ -101,7 +101,8 @@ def torque_effects(
 
     `gravity` (P, 3) m/s2; N m (N). Sources of limits and contacts have none.
     """
-    point: Any = _Point(robot, tuple(q.T), tuple(gravity.T), payload)  # type: ignore[arg-type]
+    columns: Any = tuple(gravity.T)
+    point: Any = _Point(robot, tuple(q.T), columns, payload)
     nominal = _torques(point, len(q))
     found = np.zeros((len(sources), *nominal.shape))
     for k, source in enumerate(sources):

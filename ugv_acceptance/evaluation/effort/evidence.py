@@ -81,7 +81,7 @@ def evidence_of(joint: Joint, loads: Floats) -> Evidence:
     mean = joint.torque + loads[:, None] * joint.lever
     parts: list[list[Floats]] = [[], [], [], []]
     for covariance, likely in zip(joint.covariances(), LIKELY, strict=True):
-        weight = np.linalg.inv(covariance)
+        weight: Floats = np.linalg.inv(covariance)
         constant = likely - 0.5 * (np.linalg.slogdet(covariance)[1] + n * LOG_2PI)
         a, b, c = _products(y, weight, mean)
 
@@ -121,7 +121,8 @@ def _without(joint: Joint, loads: Floats, weight: Floats) -> Floats:
         a, b, c = _products(joint.effort, weight, carried * joint.lever)
         scales = np.concatenate((NEAR_ONE, -NEAR_ONE))
         found.append(-0.5 * (a - 2.0 * np.outer(scales, b) + np.outer(scales**2, c)))
-    return log_sum(np.concatenate(found), 0) - np.log(12.0)
+    density: Floats = log_sum(np.concatenate(found), 0) - np.log(12.0)
+    return density
 
 
 def _anything(y: Floats) -> float:

@@ -139,9 +139,7 @@ class JointMeaning:
 
     def _filled(self, text: str) -> str:
         ratio = 'an unknown part' if self.ratio is None else self.ratio.text
-        return text.format(
-            joint=self.joint, unit=self.unit, ratio=ratio, level=f'{self.level:.4g}'
-        )
+        return text.format(joint=self.joint, unit=self.unit, ratio=ratio, level=f'{self.level:.4g}')
 
     @property
     def sentence(self) -> str:

@@ -31,9 +31,7 @@ class Lasting:
             return
         edges = np.flatnonzero(np.diff(bad.astype(np.int8), prepend=0, append=0))
         for first, after in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            spell = Spell(
-                int(time[first]), int(until[after - 1]), float(value[first:after].max())
-            )
+            spell = Spell(int(time[first]), int(until[after - 1]), float(value[first:after].max()))
             before, self._open = self._open, None
             if before is not None and first == 0 and before.end >= spell.start:
                 spell = Spell(before.start, spell.end, max(before.peak, spell.peak))

@@ -22,7 +22,7 @@ from ugv_acceptance.type_aliases import Floats
 
 # So many rests are remembered. Samples of one rest before its efforts are judged, and again.
 KEPT, FIRST, AGAIN = 40, 3, 10
-# A static torque that changes by this share of the largest in one posture: another load is declared.
+# A static torque that changes by this share of the largest in one posture is another load declared.
 DECLARED = 0.03
 # A load that differs by less than this (kg) counts as the declared one.
 DIFFERS = 0.5
@@ -66,7 +66,7 @@ class _Rest:
         self.end, self.count = now, self.count + 1
         means = self.effort, self.torque, self.q, self.gravity
         for mean, new in zip(means, sample, strict=True):
-            mean += (new - mean) / self.count
+            mean[:] = mean + (new - mean) / self.count
 
 
 @dataclass(slots=True)

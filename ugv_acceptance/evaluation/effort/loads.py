@@ -157,7 +157,9 @@ def _kept(stack: _Stack, weight: Floats, cuts: list[int], least: float) -> list[
     while cuts:
         before = _misfit(stack, weight, cuts)
         loads = _fit(stack, weight, cuts)[0]
-        gains = [_misfit(stack, weight, cuts[:k] + cuts[k + 1 :]) - before for k in range(len(cuts))]
+        gains = [
+            _misfit(stack, weight, cuts[:k] + cuts[k + 1 :]) - before for k in range(len(cuts))
+        ]
         small = [
             (gain, k) for k, gain in enumerate(gains)
             if gain < CHANGE or abs(loads[k + 1] - loads[k]) < least
@@ -190,9 +192,7 @@ def _deviations(stack: _Stack, left: Floats) -> Floats:
     return found
 
 
-def _told(
-    arm: Arm, stack: _Stack, cuts: Sequence[int], weight: Floats, least: float
-) -> Weighed:
+def _told(arm: Arm, stack: _Stack, cuts: Sequence[int], weight: Floats, least: float) -> Weighed:
     extra, variance, left = _fit(stack, weight, cuts)
     deviation = np.sqrt(np.maximum(np.diag(variance), 0.0))
     z = _deviations(stack, left)
@@ -228,9 +228,7 @@ def _contacts(stack: _Stack, left: Floats, z: Floats) -> list[Contact]:
     ]
 
 
-def _leaning(
-    arm: Arm, stack: _Stack, first: int, after: int, touched: set[int]
-) -> list[Contact]:
+def _leaning(arm: Arm, stack: _Stack, first: int, after: int, touched: set[int]) -> list[Contact]:
     """Return the contacts of a stretch whose load would weigh less than nothing."""
     found = []
     for row in range(first, after):

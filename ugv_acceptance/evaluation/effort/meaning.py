@@ -40,19 +40,20 @@ from ugv_acceptance.type_aliases import Floats
 
 NAMES = (TORQUE, OTHER_SIGN, SCALED, WITHOUT, UNKNOWN)
 # Probability of each of NAMES before anything is measured, of one for the whole arm, of the load
-# declared, and the least at which a meaning is named: of a joint whose torque varies, and of another.
+# declared; the least at which a meaning is named, of a joint whose torque varies and of another.
 BEFORE = np.log((0.48, 0.12, 0.22, 0.16, 0.02))
 WHOLE_ARM, AS_DECLARED, NAMED, SURE = 0.6, 0.5, 0.95, 0.99
 # Numbers of loads tried. Efforts below this are zero (denormal numbers too), and closer than the
 # share EQUAL of the largest they are one value.
 LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
 # Shares of the joint's largest static torque: what must vary to tell a scale, be there to tell
-# anything, and vary among cut-off efforts, and among equal ones; share and number of postures that are cut off.
+# anything, vary among efforts that are cut off, and among equal ones; share and number of postures
+# that are cut off.
 VARIES, LOADED, CUT, ALIKE, CUT_SHARE, CUT_LEAST = 0.15, 0.05, 0.05, 1e-4, 0.2, 3
-# Below this probability of "none of these" a run is explained; so many cuts at most (load changes).
+# Below this probability of "none of these" a run is explained; so many changes of the load at most.
 EXPLAINED, CUTS = 0.05, 3
-# Number of the level of friction that is usual. A ratio fits if its mean chi-square is at most FITS,
-# and is not told if it is known worse than by this share.
+# Number of the level of friction that is usual. A ratio fits if its mean chi-square is at most
+# FITS, and is not told if it is known worse than by this share.
 USUAL, FITS, VAGUE = 1, 4.0, 0.5
 # Log-probability of one more change of the load.
 CHANGE = -3.0
@@ -214,7 +215,9 @@ def _scales(one: Evidence, whole: Floats, weight: Floats, share: Floats) -> Floa
     return found / total if total > 0.0 else found
 
 
-def _parts(arm: Arm, rows: NDArray[np.bool_], asked: Sequence[int]) -> list[tuple[slice, _Explained]]:
+def _parts(
+    arm: Arm, rows: NDArray[np.bool_], asked: Sequence[int]
+) -> list[tuple[slice, _Explained]]:
     """Return the run in parts of constant load: one, unless that explains nothing."""
     whole = _explain(arm, rows, asked, slice(0, len(rows)))
     if whole is None:
@@ -308,9 +311,7 @@ def _varies(arm: Arm, rows: NDArray[np.bool_], j: int) -> bool:
     return bool(len(torque) and np.ptp(torque) >= VARIES * arm.sizes[j])
 
 
-def _as_others(
-    main: _Explained, asked: Sequence[int], varying: Sequence[int], at: int
-) -> bool:
+def _as_others(main: _Explained, asked: Sequence[int], varying: Sequence[int], at: int) -> bool:
     """Return whether a joint whose torque does not vary is surely as all those that vary are."""
     kind = int(main.meanings[at].argmax())
     others = [main.meanings[asked.index(i), kind] for i in varying]

@@ -63,9 +63,7 @@ class MeasuredLimits:
             twice = np.fmin(size[1:], size[:-1])
         self._most = np.fmax(self._most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
 
-    def _feed(
-        self, spells: list[Lasting], rows: MarginRows, bad: Floats, value: Floats
-    ) -> None:
+    def _feed(self, spells: list[Lasting], rows: MarginRows, bad: Floats, value: Floats) -> None:
         for j, lasting in enumerate(spells):
             lasting.add(rows.time, rows.until, bad[:, j], value[:, j])
 

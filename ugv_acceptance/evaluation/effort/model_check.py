@@ -188,9 +188,9 @@ def _not_checked(found: Understanding) -> Iterator[NotChecked]:
         yield NotChecked(f'measured effort of {", ".join(names)}', why)
     turned = [joint for joint in found.joints if joint.opposed]
     if turned:
-        names = ', '.join(joint.joint for joint in turned)
+        listed = ', '.join(joint.joint for joint in turned)
         why = 'it is opposite: set effort_sign: -1 for each in the configuration'
-        yield NotChecked(f'sign of the measured effort of {names}', why)
+        yield NotChecked(f'sign of the measured effort of {listed}', why)
     if not found.loads:
         why = 'no joint with a measured torque of known scale and sign weighs it'
         yield NotChecked('the payload that was carried', why)

@@ -124,4 +124,5 @@ def model_errors(
 ) -> Floats:
     """Return the effect (s, P, j) of each source on the static torques in postures (P, j)."""
     effects = torque_effects(robot, sources, q, gravity, Payload(load, robot.payload.cog))
-    return effects[np.abs(effects).max(axis=(1, 2), initial=0.0) > 0.0]
+    found: Floats = effects[np.abs(effects).max(axis=(1, 2), initial=0.0) > 0.0]
+    return found

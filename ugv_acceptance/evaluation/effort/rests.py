@@ -22,8 +22,8 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.type_aliases import Floats, Times
 
-# A joint slower than this (rad/s, m/s) is at rest; a rest lasts at least this long (ns), and samples
-# further apart than this are two rests.
+# A joint slower than this (rad/s, m/s) is at rest; a rest lasts at least this long (ns), and
+# samples further apart than this are two rests.
 REST, LASTS, APART = 0.02, 400_000_000, 1_500_000_000
 # Postures closer than this (rad; m) in every joint, and in the direction of gravity, are one.
 TURNED, MOVED = np.radians(4.0), 0.02
@@ -40,7 +40,7 @@ MOST = 30
 
 @dataclass(frozen=True, slots=True)
 class Rests:
-    """Rests in order of time (R): `start`, `end` ns; `effort`, `torque`, `q` (R, j); gravity (R, 3).
+    """Rests in order of time: `start`, `end` (R,) ns, the others (R, j), `gravity` (R, 3).
 
     Medians of the samples; `torque` is static, with the declared load; NaN: no effort reported.
     """
@@ -85,14 +85,16 @@ def find_rests(time: Times, samples: Samples, reach: Floats) -> Rests:
     table = [(a, b) for a, b in found if time[b - 1] - time[a] >= LASTS]
     parts = (effort, torque, q, gravity)
     medians = [[_median(part[a:b]) for a, b in table] for part in parts]
-    shaped = [np.array(m).reshape(len(table), p.shape[1]) for m, p in zip(medians, parts, strict=True)]
+    shaped = [
+        np.array(m).reshape(len(table), p.shape[1]) for m, p in zip(medians, parts, strict=True)
+    ]
     start = np.array([time[a] for a, _ in table], np.int64)
     return Rests(start, np.array([time[b - 1] for _, b in table], np.int64), *shaped)
 
 
 def _still(time: Times, rate: Floats, q: Floats) -> NDArray[np.bool_]:
     """Return at which samples (n,) all joints rest; where no rate is told, by their positions."""
-    fast = np.nan_to_num(np.abs(rate)) > REST
+    fast: NDArray[np.bool_] = np.asarray(np.nan_to_num(np.abs(rate)) > REST)
     if len(time) > 1:
         passed = np.maximum(np.diff(time), 1)[:, None] / 1e9
         moved = np.nan_to_num(np.abs(np.diff(q, axis=0))) > REST * np.maximum(passed, 0.1)
@@ -148,7 +150,7 @@ def is_near(q: Floats, p: Floats, gravity: Floats, other: Floats, reach: Floats)
     if (np.abs(q - p) > reach).any():
         return False
     size = float(np.linalg.norm(gravity) * np.linalg.norm(other))
-    return float(gravity @ other) >= np.cos(TURNED) * size
+    return bool(float(gravity @ other) >= np.cos(TURNED) * size)
 
 
 def distinct(rests: Rests, reach: Floats) -> Rests:
@@ -156,9 +158,7 @@ def distinct(rests: Rests, reach: Floats) -> Rests:
 
     A posture that is taken again with the same efforts says nothing new.
     """
-    most = np.nanmax(
-        np.abs(rests.effort), axis=0, initial=0.0, where=np.isfinite(rests.effort)
-    )
+    most = np.nanmax(np.abs(rests.effort), axis=0, initial=0.0, where=np.isfinite(rests.effort))
     length, kept = rests.end - rests.start, list[int]()
     for k in np.argsort(-length, kind='stable').tolist():
         if not any(

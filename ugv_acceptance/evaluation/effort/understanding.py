@@ -76,9 +76,7 @@ def understand(settings: Settings, sources: Sequence[Source], rests: Rests) -> U
     kept = longest(rests)
     signs = signs_of([joint.meaning for joint in joints])
     weighed = weigh(arm_of(settings, sources, kept)[0], signs)
-    return Understanding(
-        joints, kept, weighed.loads, weighed.contacts, sizes.link, sizes.guessed
-    )
+    return Understanding(joints, kept, weighed.loads, weighed.contacts, sizes.link, sizes.guessed)
 
 
 def _without_clipped(settings: Settings, rests: Rests) -> Rests:
