@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -69,7 +70,7 @@ def lift(meaning: str, **more: Any) -> JointMeaning:
 def test_an_effort_beyond_the_limit_counts_by_its_meaning(
     meaning: JointMeaning, verdicts: list[str]
 ) -> None:
-    """70 of 50 N m: a torque fails, an unknown effort is INCONCLUSIVE, no measurement is neither."""
+    """70 of 50 N m: a torque fails, an unknown effort is INCONCLUSIVE, a constant is neither."""
     found = objections([20.0] * 20 + [70.0] * 20 + [20.0] * 20, meaning)
     assert [x.verdict for x in found if x.safeguard == 'measured_effort'] == verdicts[:1]
     assert all('lift' in x.reason for x in found)
@@ -121,7 +122,7 @@ def test_spells_are_the_same_however_a_recording_is_cut(bad: list[bool], cuts: l
     time, value = np.arange(n) * S, np.arange(n, dtype=np.float64)
     parted = Lasting(2 * S)
     edges = sorted({0, n, *(min(cut, n) for cut in cuts)})
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         parted.add(time[a:b], time[a:b] + S, np.array(bad[a:b]), value[a:b])
     expected, first = [], None
     for k, one in enumerate([*bad, False]):
