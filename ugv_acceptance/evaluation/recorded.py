@@ -91,7 +91,7 @@ class RecordedEvaluator:
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
-        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0)
+        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0, never < 0)
         self._carry = _Newest(joints, never, imu, never)
         if not self.settings.hears_imu:
             down = ImuRows(never, never, np.array([[0.0, 0.0, -robot.gravity]]), never > 0)
@@ -108,6 +108,11 @@ class RecordedEvaluator:
     def orientations(self) -> dict[str, int]:
         """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
+
+    @property
+    def imu(self) -> ImuTracker:
+        """The tracker of the IMU, with what its checks judged."""
+        return self._imu
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
