@@ -37,7 +37,8 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
     """Return margins in which those of the spans (ns) are unknown; the same if there are none."""
     doubtful = np.zeros(len(rows.time), np.bool_)
     for start, end in spans:
-        doubtful |= (rows.time >= start) & (rows.time < end)
+        # What is known at the end itself came just before the alert.
+        doubtful |= (rows.time >= start) & (rows.time <= end)
     doubtful &= rows.known
     if not doubtful.any():
         return rows

@@ -13,6 +13,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
     default_criteria,
 )
+from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
@@ -110,8 +111,7 @@ def _examinations(
     settings: Settings, sources: tuple[Source, ...], evaluator: RecordedEvaluator
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    del evaluator
-    return (ModelCheck(settings, sources),)
+    return ModelCheck(settings, sources), ImuExamination(evaluator.imu)
 
 
 @dataclass(slots=True)

@@ -122,7 +122,9 @@ class RuleSet:
     ) -> Signal:
         delays = self.settings.delays
         off = int((delays.tip_off if code == 'TIP_OVER' else delays.off) * 1e9)
-        rule = Rule(code, subject, level, *at, int(on_delay * 1e9), off, reach=int(reach * 1e9))
+        # A warning does not make margins doubtful.
+        back = int(reach * 1e9) if level > WARN else 0
+        rule = Rule(code, subject, level, *at, int(on_delay * 1e9), off, reach=back)
         return Signal(rule, self.log)
 
     def _torque(self, joint: str, level: int, limit: float) -> Signal:

@@ -1,25 +1,38 @@
 """What the checks of the IMU judged in a recording, and what they cannot tell on it."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
-from ugv_acceptance.evaluation.inputs.imu_rates import AGREES
+from ugv_acceptance.evaluation.inputs.imu_rates import AGREES, LEAST_RATE
 from ugv_acceptance.evaluation.inputs.imu_tally import Tally
+from ugv_acceptance.evaluation.margin_table import MarginRows
 
 IMU = 'imu'
 
 
-def imu_statement(tracker: ImuTracker, rate: float) -> Statement:
-    """Return the statement on a recording whose IMU sent `rate` messages a second (NaN: unknown).
+@dataclass(frozen=True, slots=True)
+class ImuExamination:
+    """States what the checks of `tracker` judged; they look at the messages themselves.
 
     Its result stands under `imu_checks`: windows judged, those in which something turned, those
     that verified the orientation, and the worst statistic beside its threshold.
     """
-    tally = tracker.motion.tally
-    if tally is None:
-        return Statement({'imu_checks': None})
-    return Statement({'imu_checks': _result(tracker, tally)}, not_checked=tuple(_gaps(tracker, rate)))
+
+    tracker: ImuTracker
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the margins of the next part of the recording: they tell nothing of this."""
+
+    def statement(self, start: int, end: int) -> Statement:
+        """Return what was judged in the recording from `start` to `end` (ns), and what was not."""
+        tally, count = self.tracker.motion.tally, self.tracker.seen.messages
+        if tally is None or not count:
+            return Statement({'imu_checks': None})
+        rate = count / max((end - start) * 1e-9, 1e-9)
+        gaps = tuple(_gaps(self.tracker, tally, rate))
+        return Statement({'imu_checks': _result(self.tracker, tally)}, not_checked=gaps)
 
 
 def _result(tracker: ImuTracker, tally: Tally) -> dict[str, object]:
@@ -49,11 +62,9 @@ def _result(tracker: ImuTracker, tally: Tally) -> dict[str, object]:
     }
 
 
-def _gaps(tracker: ImuTracker, rate: float) -> Iterator[NotChecked]:
+def _gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotChecked]:
     """Yield what no number of this recording could tell about the IMU."""
-    tally, seen, imu = tracker.motion.tally, tracker.seen, tracker.settings.imu
-    if tally is None or not seen.messages:
-        return
+    seen, imu = tracker.seen, tracker.settings.imu
     if tracker.motion.frozen.varied <= 1 < seen.messages and not imu.noise_free:
         yield NotChecked(
             IMU, 'the IMU never varied: a frozen one looks the same; a simulator without noise is '
@@ -83,8 +94,8 @@ def _rate_gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotCh
     what = 'orientation against the gyro'
     if not tracker.seen.turned:
         yield NotChecked(what, 'the gyro sent nothing but 0')
-    elif rate < 40.0:
-        yield NotChecked(what, f'{rate:.0f} messages a second are too few: 40 are needed')
+    elif rate < LEAST_RATE:
+        yield NotChecked(what, f'{rate:.0f} messages a second are too few, {LEAST_RATE:.0f} are needed')
     elif not tally.turned:
         yield NotChecked(what, 'nothing turned faster than 0.1 rad/s and the noise')
     elif not tally.verified:

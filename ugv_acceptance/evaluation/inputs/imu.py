@@ -251,6 +251,7 @@ class ImuTracker:
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
+        self.seen.rested += int(rest.sum())
         apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
@@ -269,7 +270,6 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        self.seen.rested += int((~np.isnan(apart) | (rest & ~rotation)).sum())
         samples = np.column_stack((q.T, omega.T, acceleration.T, told))
         trusted = self._judge_motion(time, stamp, samples, gravity)
         self._busy = True

@@ -305,7 +305,7 @@ class MotionChecks:
         """Give a signal the value of a hop; an alert reaches back as far as `reach` (ns)."""
         if signal.quiet and not value > 0.0:
             return
-        if reach is not None and value > 0.0 and signal.alert is None:
+        if reach and value > 0.0 and signal.alert is None and signal.rule.level > WARN:
             signal.judge_by(replace(signal.rule, reach=reach))
         signal.step(now, value)
         self._busy = True
