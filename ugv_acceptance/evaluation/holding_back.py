@@ -24,7 +24,8 @@ def doubtful_spans(log: Sequence[Alert]) -> Iterator[Span]:
     """Yield the spans (ns) before alerts in which what they contradict was still believed."""
     for alert in log:
         if alert.rule.reach:
-            yield alert.start - alert.rule.reach, alert.start
+            # What is known in the nanosecond of the alert came just before it.
+            yield alert.start - alert.rule.reach, alert.start + 1
 
 
 def drawn_in_doubt(alert: Alert, spans: Sequence[Span]) -> bool:
@@ -37,8 +38,7 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
     """Return margins in which those of the spans (ns) are unknown; the same if there are none."""
     doubtful = np.zeros(len(rows.time), np.bool_)
     for start, end in spans:
-        # What is known at the end itself came just before the alert.
-        doubtful |= (rows.time >= start) & (rows.time <= end)
+        doubtful |= (rows.time >= start) & (rows.time < end)
     doubtful &= rows.known
     if not doubtful.any():
         return rows

@@ -56,9 +56,7 @@ def test_orientation_and_acceleration_are_compared_at_rest(
 ) -> None:
     """A rate of 0.125 rad/s and a quarter of a m/s2 from g are rest, as configured here."""
     message = Imu(T0, tilted(0.5), omega, (0.0, 0.0, up))
-    gravity, unusable, _, codes = tracked(
-        message, 100, rest_rate=0.125, rest_acceleration=0.25
-    )
+    gravity, unusable, _, codes = tracked(message, 100, rest_rate=0.125, rest_acceleration=0.25)
     assert codes == found
     assert math.isnan(gravity[0]) == bool(found)
     assert not unusable

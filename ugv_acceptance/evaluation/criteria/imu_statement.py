@@ -72,7 +72,9 @@ def _gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotChecked
         )  # fmt: skip
     used, given = tracker.taken[0], any(found.judged for found in tally.gravity.values())
     if not used and not seen.rested:
-        yield NotChecked('tilt', 'only the accelerometer tells it, and it was never verified at rest')
+        yield NotChecked(
+            'tilt', 'only the accelerometer tells it, and it was never verified at rest'
+        )
     elif used:
         yield NotChecked(
             'tilt errors', 'an orientation wrong by less than about 9 degrees (5 at rest), for less '
@@ -80,7 +82,9 @@ def _gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotChecked
             if given else 'no window held the orientation against the acceleration',
         )  # fmt: skip
     yield from _rate_gaps(tracker, tally, rate)
-    declared = [name for name, count in (('rate', seen.no_rate), ('acceleration', seen.no_force)) if count]
+    declared = [
+        name for name, count in (('rate', seen.no_rate), ('acceleration', seen.no_force)) if count
+    ]
     if declared:
         yield NotChecked(
             f'{" and ".join(declared)} of the IMU',
@@ -95,7 +99,9 @@ def _rate_gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotCh
     if not tracker.seen.turned:
         yield NotChecked(what, 'the gyro sent nothing but 0')
     elif rate < LEAST_RATE:
-        yield NotChecked(what, f'{rate:.0f} messages a second are too few, {LEAST_RATE:.0f} are needed')
+        yield NotChecked(
+            what, f'{rate:.0f} messages a second are too few, {LEAST_RATE:.0f} are needed'
+        )
     elif not tally.turned:
         yield NotChecked(what, 'nothing turned faster than 0.1 rad/s and the noise')
     elif not tally.verified:

@@ -27,7 +27,17 @@ from ugv_acceptance.type_aliases import Floats
 
 # Columns of a sample: orientation x y z w, rate, acceleration, whether the orientation may be used,
 # squares of rate and acceleration, whether the numbers can be used, time since the start (ns).
-Q, W, A, OK, W2, A2, GOOD, TAU, WIDTH = slice(0, 4), slice(4, 7), slice(7, 10), 10, 11, 12, 13, 14, 15
+Q, W, A, OK, W2, A2, GOOD, TAU, WIDTH = (
+    slice(0, 4),
+    slice(4, 7),
+    slice(7, 10),
+    10,
+    11,
+    12,
+    13,
+    14,
+    15,
+)
 # Columns of the running sums: seconds of samples; acceleration (m/s), its square (m2/s3); rotation
 # (rad); samples; variance of the rate times degrees of freedom, and those;
 SECONDS, BODY, SQUARE, TURN, COUNT, SPREAD, FREEDOM = 0, slice(1, 4), 4, slice(5, 8), 8, 9, 10
@@ -123,6 +133,6 @@ def jumps(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
 
 def jump_rows(x: Floats, y: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Return `jumps` of many samples (n, WIDTH)."""
-    d = y[:, : OK] - x[:, : OK]
+    d = y[:, :OK] - x[:, :OK]
     force, turn = (np.einsum('ij,ij->i', d[:, of], d[:, of]) for of in (A, Q))
     return force > (JUMP * APART_FORCE) ** 2, turn > (JUMP * APART_TURN) ** 2

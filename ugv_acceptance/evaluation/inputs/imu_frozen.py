@@ -79,7 +79,9 @@ class FrozenCheck:
 
     def _still(self, time: Times, first: int, end: int, since: int) -> None:
         """Take that the messages from `first` to before `end` have the values of `since` (ns)."""
-        confirmed = max(int(np.searchsorted(time, since + LASTS)), first + MESSAGES - 1 - self.count)
+        confirmed = max(
+            int(np.searchsorted(time, since + LASTS)), first + MESSAGES - 1 - self.count
+        )
         self.count += end - first
         if confirmed < end and self._lively():
             self._frozen = True

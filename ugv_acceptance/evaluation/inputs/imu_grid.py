@@ -53,7 +53,15 @@ KEPT = 120
 SPAN = 5
 # Columns of a row after the sums: sums of products of rotations, of the gyro with itself, of the
 # orientation with itself, of both, and the number; then orientation and time (s) of the row.
-GYRO_2, OWN_2, BOTH, COMPARED, PRODUCTS, QUATERNION, TIME = 26, 27, 28, 29, slice(26, 30), slice(30, 34), 34
+GYRO_2, OWN_2, BOTH, COMPARED, PRODUCTS, QUATERNION, TIME = (
+    26,
+    27,
+    28,
+    29,
+    slice(26, 30),
+    slice(30, 34),
+    34,
+)
 
 Row = Sequence[float]
 
@@ -215,7 +223,10 @@ def _added(x: Floats, edges: NDArray[np.intp], weight: Floats, g: float) -> Floa
     total = np.add.reduceat(cells, starts, axis=0)
     good = total[:, GOOD]
     known = (good == count) & (total[:, OK] == count) & (x[ends, OK] != 0.0)
-    q = np.where(known[:, None], x[starts, Q], UNTURNED), np.where(known[:, None], x[ends, Q], UNTURNED)
+    q = (
+        np.where(known[:, None], x[starts, Q], UNTURNED),
+        np.where(known[:, None], x[ends, Q], UNTURNED),
+    )
     before, after = (list(v.T) for v in q)
     sums = [total[:, k] for k in (7, 8, 9, A2, 4, 5, 6, W2)]
     out = np.zeros((len(starts), SUMS))

@@ -56,7 +56,10 @@ def unit_over(d: Sequence[float], g: float) -> float:
     if not seconds > 0.5 * d[TIME]:
         return math.nan
     x, y, z = d[BODY]
-    mean, square = (x * x + y * y + z * z) / (seconds * seconds * g * g), d[SQUARE] / (seconds * g * g)
+    mean, square = (
+        (x * x + y * y + z * z) / (seconds * seconds * g * g),
+        d[SQUARE] / (seconds * g * g),
+    )
     if _M_S2[0] < mean < _M_S2[1] and _M_S2[0] < square < _M_S2[1]:
         return 0.0
     one, other = _unit(mean, g), _unit(square, g)

@@ -82,7 +82,9 @@ def rates_over(grid: ImuGrid, end: int) -> RatesFound:
         return RatesFound()
     d = grid.over(end, WINDOW)
     rate = d[COUNT] / d[TIME]
-    noise = NOISE * math.sqrt(max(d[SPREAD], 0.0) / max(d[FREEDOM], 1.0) / max(0.1 * SPAN * rate, 1.0))
+    noise = NOISE * math.sqrt(
+        max(d[SPREAD], 0.0) / max(d[FREEDOM], 1.0) / max(0.1 * SPAN * rate, 1.0)
+    )
     largest = math.sqrt(max(g2, o2) / count) / (0.1 * SPAN)
     if rate < LEAST_RATE or largest <= EXCITED + noise:
         return RatesFound()
