@@ -4,7 +4,7 @@ By the same rules as live.py: a recording gives the margins and alerts that the 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import feed
+from ugv_acceptance.evaluation.chassis.columns import take_columns
+from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
@@ -36,6 +38,8 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 # A period of silence (ns): from when the input became stale to its next message.
 Gap = tuple[int, int]
+# Mass (kg) and centre of gravity (3, m) of payloads: floats, or arrays of one a joint row.
+Load = tuple[Floats | float, ...]
 
 # Time and row number that stand for "no message yet".
 NEVER = -1
@@ -69,6 +73,7 @@ class RecordedEvaluator:
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
+    _chassis: ChassisMotion = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
@@ -82,6 +87,7 @@ class RecordedEvaluator:
         self._mechanics = mechanics_of(robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
+        self._chassis = ChassisMotion(self.settings, self.watch.chassis)
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
@@ -131,8 +137,10 @@ class RecordedEvaluator:
             _lead(self._carry.imu, imu),
             np.concatenate((self._carry.imu_until, imu.time + imu_limits)),
         )
-        rows = self._margins(newest)
+        load = self._payload.at(newest.joints.time)
+        rows = self._margins(newest, load)
         self._watch_pairs(rows)
+        rows = replace(rows, chassis=take_columns(self._chassis, batch.imu, rows, load))
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
         )
@@ -172,8 +180,11 @@ class RecordedEvaluator:
                 self._payload.declare(when, payload)
                 self.first_payload = self.first_payload or (when, payload)
 
-    def _margins(self, newest: _Newest) -> MarginRows:
-        """Return the margins of every message of the batch (not of the preceding rows)."""
+    def _margins(self, newest: _Newest, load: Load) -> MarginRows:
+        """Return the margins of every message of the batch (not of the preceding rows).
+
+        `load` is the payload of each joint row.
+        """
         joints, imu = newest.joints, newest.imu
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
@@ -184,7 +195,7 @@ class RecordedEvaluator:
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
         whole = np.asarray(np.isfinite(joints.q).all(axis=1))
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
-        table, state = self._table(pairs, whole, known)
+        table, state = self._table(pairs, load, whole, known)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
             time=time,
@@ -201,14 +212,13 @@ class RecordedEvaluator:
         )
 
     def _table(
-        self, pairs: Pairs, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+        self, pairs: Pairs, load: Load, whole: NDArray[np.bool_], known: NDArray[np.bool_]
     ) -> tuple[Floats, NDArray[np.int8]]:
         """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
 
-        `whole` says which joint rows have all positions, `known` which rows have margins.
+        `load` is the payload of each joint row, `whole` says which joint rows have all positions, `known` which rows have margins.
         """
         q = pairs.joints.q
-        payload = self._payload.at(pairs.joints.time)
         n = q.shape[1]
         table = np.empty((n + (13 if self.detail else 4), len(known)))
         state = np.full(len(known), UNKNOWN, np.int8)
@@ -220,7 +230,7 @@ class RecordedEvaluator:
         if not len(j):
             return table, state
         columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
-        mass, x, y, z = payload
+        mass, x, y, z = load
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
         gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
         with np.errstate(over='ignore', invalid='ignore'):

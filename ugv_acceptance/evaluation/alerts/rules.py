@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.chassis.motion import CALM, CAUTION, LIFT, LOW, ChassisSignals
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
@@ -11,9 +12,11 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
 # Alerts of level ERROR with these codes are failures of the robot; all others are input faults.
-FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
+FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'TIP_MOVING', 'NO_SUPPORT')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
+# Margin (rad) of a moving robot from which DANGER ends.
+MARGIN_BACK = 0.01745
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
 
@@ -32,6 +35,7 @@ class RuleSet:
     speed: list[Signal] = field(init=False)
     tip: list[tuple[Signal, Signal]] = field(init=False)
     support: Signal = field(init=False)
+    chassis: ChassisSignals = field(init=False)
     joints: 'InputSignals' = field(init=False)
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
@@ -63,6 +67,7 @@ class RuleSet:
             for side in SIDES
         ]
         self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
+        self.chassis = self._chassis()
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
@@ -106,6 +111,20 @@ class RuleSet:
         """Return a tip-over signal; its value is minus the tilt left (rad): larger is worse."""
         at = (-angle, -angle - self.settings.limits.tip_deadband)
         return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
+
+    def _chassis(self) -> ChassisSignals:
+        """Return the signals of a chassis in motion: without delay, a tip takes no longer."""
+
+        def at(code: str, level: int, on: float, off: float) -> list[Signal]:
+            return [self._signal(code, side, level, (on, off), 0.0) for side in SIDES]
+
+        caution = at('TIP_MOVING', WARN, -CAUTION, -CALM)
+        danger = at('TIP_MOVING', ERROR, 0.0, -MARGIN_BACK)
+        return ChassisSignals(
+            list(zip(caution, danger, strict=True)),
+            at('ACCELERATION', WARN, 0.0, -LOW),
+            at('TRACK_LIFT', WARN, LIFT, LIFT),
+        )
 
     def _slide(self) -> Signal:
         """Return the sliding signal; its value is minus the slope left (rad), see slides_first."""
@@ -174,6 +193,7 @@ class RuleSet:
             *self.jump_signals,
             *inputs,
             *faults,
+            *self.chassis.all(),
             self.slide,
             *self.prediction.signals(),
             *self.relaxed.values(),

@@ -1,0 +1,244 @@
+"""motion.py for columns: the IMU messages of a part of a recording, with the same alerts.
+
+Filters and comparison run on whole columns; the margins are computed for the rows in which the
+robot turns or is pushed, and only the episodes of those are gone through one by one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ugv_acceptance.evaluation.alerts.state_machine import feed
+from ugv_acceptance.evaluation.chassis.filters import FORCE, LEARNT, SETTLED, SLOWEST, FeltRows
+from ugv_acceptance.evaluation.chassis.motion import (
+    BACK,
+    COS_CALM,
+    FALL,
+    HELD,
+    LIFT,
+    LOW,
+    MATTERS,
+    NOTHING,
+    RIGHT,
+    SLOW_PENDULUM,
+    TRUE,
+    ChassisMotion,
+    stance_kernel,
+)
+from ugv_acceptance.evaluation.margin_table import NO_CHASSIS_ROWS, ChassisRows, MarginRows
+from ugv_acceptance.evaluation.samples import ImuColumns
+from ugv_acceptance.model.edges import SIDES
+from ugv_acceptance.model.mechanics import posture_of
+from ugv_acceptance.model.row_selection import pick
+from ugv_acceptance.model.stability import STANDING, stances_of
+from ugv_acceptance.model.tipping import inertia_of
+from ugv_acceptance.type_aliases import Floats, Times
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Columns of a part of a recording, one row an IMU message.
+
+    `which` are the rows of margins, `gravity` (3, n), `least` (n,) the least tip angle (rad),
+    `judged` says where all is there that is needed. `trusted_at` and `hard_at` (n,) are those of
+    Episodes after each row.
+    """
+
+    time: Times
+    felt: FeltRows
+    gravity: Floats
+    which: NDArray[np.intp]
+    judged: Mask
+    spins: Mask
+    pushed: Mask
+    trusted_at: Floats
+    hard_at: Floats
+
+
+def take_columns(
+    motion: ChassisMotion, segments: Sequence[ImuColumns], rows: MarginRows, load: Sequence[Any]
+) -> ChassisRows:
+    """Take the IMU messages of a part of a recording; feed the signals; return what stands out.
+
+    `rows` are the margins of the part, `load` mass and centre of gravity (floats or arrays) of the
+    payload in each row of `rows.pairs.joints`.
+    """
+    columns = [s for s in segments if len(s.log_time)]
+    if not columns:
+        return NO_CHASSIS_ROWS
+    with np.errstate(all='ignore'):
+        time, stamp, vectors, measured = _in_order(columns)
+        felt = motion.filter.columns(
+            time, stamp, vectors[:3], vectors[3:], rows.pairs.imu.gravity[1:].T
+        )
+        gyro = measured & _turned(motion, vectors[:3])
+        part = _compare(motion, (time, felt), rows, gyro)
+        found, believed = _judge(motion, part, rows, load)
+    known = rows.known[part.which]
+    true = part.judged & (part.trusted_at == felt.elapsed)
+    masks = (known, part.judged, true | believed, known & ~gyro, known & (felt.pace > SLOWEST))
+    return ChassisRows(*found, *(float(felt.step[mask].sum()) for mask in masks))
+
+
+def _in_order(columns: Sequence[ImuColumns]) -> tuple[Times, Times, Floats, Mask]:
+    """Return time, stamp, rate and force (6, n), and whether the rate was measured, as received."""
+    time = np.concatenate([s.log_time for s in columns])
+    stamp = np.concatenate([s.stamp for s in columns])
+    measured = np.concatenate([s.angular_velocity_covariance_0 for s in columns]) != -1.0
+    table = np.empty((6, len(time)))
+    for lines, name in ((table[:3], 'angular_velocity'), (table[3:], 'linear_acceleration')):
+        np.concatenate([getattr(s, name).T for s in columns], axis=1, out=lines)
+    if (np.diff(time) < 0).any():
+        order = np.argsort(time, kind='stable')
+        return time[order], stamp[order], table[:, order], measured[order]
+    return time, stamp, table, measured
+
+
+def _turned(motion: ChassisMotion, omega: Floats) -> Mask:
+    """Return in which rows the gyro has shown any number but 0 so far."""
+    if motion.turned:
+        return np.ones(omega.shape[1], np.bool_)
+    turned: Mask = np.logical_or.accumulate((omega != 0.0).any(axis=0))
+    motion.turned = bool(turned[-1])
+    return turned
+
+
+def _compare(
+    motion: ChassisMotion, felt_at: tuple[Times, FeltRows], rows: MarginRows, gyro: Mask
+) -> _Part:
+    """Return the part with the rows in which the robot turns, or is or was just pushed."""
+    time, felt = felt_at
+    which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
+    front, left, rear, right = rows.angle.T
+    least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
+    judged = (felt.elapsed >= SETTLED) & (felt.pace <= SLOWEST) & gyro & ~np.isnan(least)
+    judged &= rows.known[which]
+    (px, py, pz), (mx, my, mz), (fx, fy, fz) = felt.rate, felt.mean, felt.force
+    flat, up = px * px + py * py, pz * pz
+    square = np.where(rows.state[which] == STANDING, flat, flat + up)
+    spins = judged & (square > 2.0 * SLOW_PENDULUM * (COS_CALM - np.cos(least)))
+    true = judged & (felt.elapsed >= LEARNT) & (mx * mx + my * my + mz * mz <= TRUE * TRUE)
+    of, fall = motion.episodes, FALL * motion.settings.robot.gravity
+    trusted_at = _last(felt, true, of.trusted_at)
+    heavy = judged & (fx * fx + fy * fy + fz * fz >= fall * fall)
+    heavy &= felt.elapsed - trusted_at <= HELD
+    gravity = rows.pairs.imu.gravity[1:].T
+    dx, dy, dz = felt.force + gravity
+    alpha = np.abs(felt.rate - felt.lagging).sum(axis=0) / FORCE
+    off = np.sqrt(dx * dx + dy * dy + dz * dz) + motion.reach * (alpha + flat + up)
+    hard = heavy & (off > -gravity[2] * np.sin(np.minimum(least - LOW, RIGHT)))
+    hard_at = _last(felt, hard, of.hard_at)
+    pushed = heavy & (felt.elapsed - hard_at < BACK)
+    return _Part(time, felt, gravity, which, judged, spins, pushed, trusted_at, hard_at)
+
+
+def _last(felt: FeltRows, mask: Mask, before: float) -> Floats:
+    """Return `elapsed` of when `mask` was last true, in each row; -inf if not since the beginning.
+
+    `before` is that of before these rows.
+    """
+    place = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
+    at = np.where(place >= 0, felt.elapsed[place], -np.inf)
+    at[(place < felt.began) & (felt.began >= 0)] = -np.inf
+    at[(place < 0) & (felt.began < 0)] = before
+    return at
+
+
+def _judge(
+    motion: ChassisMotion, part: _Part, rows: MarginRows, load: Sequence[Any]
+) -> tuple[tuple[NDArray[np.intp], Floats, Floats, Mask, Mask], Mask]:
+    """Feed the signals; return the first fields of ChassisRows, and where an episode was believed.
+
+    The accelerometer, that is: its mean may be off meanwhile.
+    """
+    some = np.flatnonzero(part.spins | part.pushed)
+    shape = (len(part.time), len(SIDES))
+    values = [np.full(shape, NOTHING) for _ in range(3)] if len(some) or motion.busy else []
+    believed = np.zeros(shape[0], np.bool_)
+    if not len(some):
+        _go_on(motion, part, -1)
+        _feed(motion, part, values)
+        nothing = np.zeros((0, len(SIDES)))
+        return (some, nothing, nothing, nothing > 0, nothing > 0), believed
+    margin, effective, against, frequency = _margins(motion, part, rows, load, some)
+    turns = part.spins[some, None] & (rows.angle[part.which[some]] - margin > MATTERS)
+    values[0][some] = np.where(turns, -margin, NOTHING)
+    denied = np.zeros(margin.shape, np.bool_)
+    of, felt, segment = motion.episodes, part.felt, -1
+    for k in np.flatnonzero(part.pushed[some]).tolist():
+        row = int(some[k])
+        segment = _begin(motion, part, row, segment)
+        elapsed, of.trusted_at = float(felt.elapsed[row]), float(part.trusted_at[row])
+        if of.believed(elapsed):
+            of.step(elapsed, float(felt.step[row]), effective[k].tolist(), against[k].tolist())
+            believed[row], values[1][row], values[2][row] = True, -effective[k], of.turn
+            denied[k] = of.contradicted(frequency[k].tolist())
+    _go_on(motion, part, segment)
+    _feed(motion, part, values)
+    least, felt_least = (np.where(x > NOTHING, -x, np.inf) for x in (values[0][some], values[1][some]))
+    return (part.which[some], least, felt_least, values[2][some] >= LIFT, denied), believed
+
+
+def _begin(motion: ChassisMotion, part: _Part, row: int, segment: int) -> int:
+    """Forget the episodes if the filters began anew since `segment`; return in which row."""
+    began = int(part.felt.began[row])
+    if began != segment:
+        motion.episodes.begin()
+    return began
+
+
+def _go_on(motion: ChassisMotion, part: _Part, segment: int) -> None:
+    """Leave the episodes as the last row does."""
+    _begin(motion, part, -1, segment)
+    motion.episodes.trusted_at = float(part.trusted_at[-1])
+    motion.episodes.hard_at = float(part.hard_at[-1])
+
+
+def _margins(
+    motion: ChassisMotion,
+    part: _Part,
+    rows: MarginRows,
+    load: Sequence[Any],
+    some: NDArray[np.intp],
+) -> list[Floats]:
+    """Return the four results of model/tipping.py for some IMU rows, each (m, 4)."""
+    j = rows.pairs.of_joints[part.which[some]]
+    q = list(rows.pairs.joints.q[j].T)
+    mass, *cog = [x[j] if isinstance(x, np.ndarray) else x for x in load]
+    posture = posture_of(motion.mechanics, q, mass, (cog[0], cog[1], cog[2]))
+    inertia = tuple(np.broadcast_to(x, len(some)) for x in inertia_of(motion.mechanics).run(*q, mass, *cog))
+    felt = part.felt
+    alpha = (felt.rate - felt.lagging) / FORCE
+    vectors = tuple(np.vstack((part.gravity, felt.force, felt.rate, alpha))[:, some])
+    table = np.full((4, len(some), len(SIDES)), np.nan)
+    for of, stance in stances_of(motion.mechanics, posture, len(some)):
+        if stance.edges is None:
+            continue
+        kernel = stance_kernel(motion.mechanics, stance, motion.settings.imu.position)
+        found = kernel.run(
+            *stance.terms, stance.mass, *pick(inertia, of), *pick(vectors, of)
+        )
+        for k, values in enumerate(found):
+            for side, value in enumerate(values):
+                table[k, of, side] = value
+    return list(table)
+
+
+def _feed(motion: ChassisMotion, part: _Part, values: Sequence[Floats]) -> None:
+    """Feed the signals with the judged rows; with no `values` nothing is the matter in any."""
+    of, judged = motion.signals, part.judged
+    if not values or not judged.any():
+        return
+    time, (turning, unloaded, lift) = part.time[judged], [x[judged].T for x in values]
+    for (caution, danger), value in zip(of.turning, turning, strict=True):
+        feed(caution, time, value)
+        feed(danger, time, value)
+    for signals, table in ((of.unloaded, unloaded), (of.lift, lift)):
+        for signal, value in zip(signals, table, strict=True):
+            feed(signal, time, value)
+    motion.busy = not all(signal.quiet for signal in of.all())
