@@ -139,8 +139,10 @@ class RecordedEvaluator:
         )
         load = self._payload.at(newest.joints.time)
         rows = self._margins(newest, load)
-        self._watch_pairs(rows)
-        rows = replace(rows, chassis=take_columns(self._chassis, batch.imu, rows, load))
+        lost = self._lost(rows)
+        self._watch_pairs(rows, lost)
+        chassis = take_columns(self._chassis, batch.imu, rows, load, (lost.place, lost.time))
+        rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
         )
@@ -216,7 +218,8 @@ class RecordedEvaluator:
     ) -> tuple[Floats, NDArray[np.int8]]:
         """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
 
-        `load` is the payload of each joint row, `whole` says which joint rows have all positions, `known` which rows have margins.
+        `load` is the payload of each joint row, `whole` says which joint rows have all positions,
+        `known` which rows have margins.
         """
         q = pairs.joints.q
         n = q.shape[1]
@@ -267,9 +270,8 @@ class RecordedEvaluator:
         found = stability_of(stance, gravity)
         return *found.angle, *found.moment, *found.energy, found.zmp, found.state
 
-    def _watch_pairs(self, rows: MarginRows) -> None:
+    def _watch_pairs(self, rows: MarginRows, lost: '_Lost') -> None:
         all_known = rows.known.all()
-        lost = self._lost(rows)
         time = rows.time if all_known else rows.time[rows.known]
         time = _with(time, lost, lost.time)
         values_of = (*rows.torque.T, *rows.angle.T)

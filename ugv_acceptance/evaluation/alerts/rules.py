@@ -176,7 +176,7 @@ class RuleSet:
     def lose(self, when: int) -> None:
         """Take that margins are unknown from `when` (ns) on: nothing is raised or held by them."""
         of_margins = [s for pair in (*self.torque, *self.tip) for s in pair]
-        for signal in (*of_margins, self.support, self.slide):
+        for signal in (*of_margins, *self.chassis.all(), self.support, self.slide):
             if not signal.quiet:
                 signal.clear(when)
 

@@ -19,6 +19,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
     FALL,
     HELD,
     LIFT,
+    LONG_AGO,
     LOW,
     MATTERS,
     NOTHING,
@@ -38,6 +39,8 @@ from ugv_acceptance.model.tipping import inertia_of
 from ugv_acceptance.type_aliases import Floats, Times
 
 Mask = NDArray[np.bool_]
+Lost = tuple[NDArray[np.intp], Times]
+_Standout = tuple[NDArray[np.intp], Floats, Floats, Mask, Mask]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,20 +59,27 @@ class _Part:
     judged: Mask
     spins: Mask
     pushed: Mask
-    trusted_at: Floats
-    hard_at: Floats
+    trusted_at: Times
+    hard_at: Times
 
 
 def take_columns(
-    motion: ChassisMotion, segments: Sequence[ImuColumns], rows: MarginRows, load: Sequence[Any]
+    motion: ChassisMotion,
+    segments: Sequence[ImuColumns],
+    rows: MarginRows,
+    load: Sequence[Any],
+    lost: Lost,
 ) -> ChassisRows:
     """Take the IMU messages of a part of a recording; feed the signals; return what stands out.
 
     `rows` are the margins of the part, `load` mass and centre of gravity (floats or arrays) of the
-    payload in each row of `rows.pairs.joints`.
+    payload in each row of `rows.pairs.joints`; `lost` when margins became unknown: before which
+    known row, and the time (ns).
     """
     columns = [s for s in segments if len(s.log_time)]
     if not columns:
+        for time in lost[1] if motion.busy else ():
+            motion.lose(int(time))
         return NO_CHASSIS_ROWS
     with np.errstate(all='ignore'):
         time, stamp, vectors, measured = _in_order(columns)
@@ -78,7 +88,8 @@ def take_columns(
         )
         gyro = measured & _turned(motion, vectors[:3])
         part = _compare(motion, (time, felt), rows, gyro)
-        found, believed = _judge(motion, part, rows, load)
+        values, found, believed = _judge(motion, part, rows, load)
+        _feed(motion, part, rows, values, lost)
     known = rows.known[part.which]
     true = part.judged & (part.trusted_at == felt.elapsed)
     masks = (known, part.judged, true | believed, known & ~gyro, known & (felt.pace > SLOWEST))
@@ -137,24 +148,24 @@ def _compare(
     return _Part(time, felt, gravity, which, judged, spins, pushed, trusted_at, hard_at)
 
 
-def _last(felt: FeltRows, mask: Mask, before: float) -> Floats:
-    """Return `elapsed` of when `mask` was last true, in each row; -inf if not since the beginning.
+def _last(felt: FeltRows, mask: Mask, before: int) -> Times:
+    """Return `elapsed` of when `mask` was last true, in each row; LONG_AGO if not since the start.
 
     `before` is that of before these rows.
     """
     place = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
-    at = np.where(place >= 0, felt.elapsed[place], -np.inf)
-    at[(place < felt.began) & (felt.began >= 0)] = -np.inf
+    at = np.where(place >= 0, felt.elapsed[place], LONG_AGO)
+    at[(place < felt.began) & (felt.began >= 0)] = LONG_AGO
     at[(place < 0) & (felt.began < 0)] = before
     return at
 
 
 def _judge(
     motion: ChassisMotion, part: _Part, rows: MarginRows, load: Sequence[Any]
-) -> tuple[tuple[NDArray[np.intp], Floats, Floats, Mask, Mask], Mask]:
-    """Feed the signals; return the first fields of ChassisRows, and where an episode was believed.
+) -> tuple[list[Floats], _Standout, Mask]:
+    """Return the values of the signals, the first fields of ChassisRows, and ...
 
-    The accelerometer, that is: its mean may be off meanwhile.
+    ... where the accelerometer was believed for the sake of an episode. No values: none matters.
     """
     some = np.flatnonzero(part.spins | part.pushed)
     shape = (len(part.time), len(SIDES))
@@ -162,9 +173,8 @@ def _judge(
     believed = np.zeros(shape[0], np.bool_)
     if not len(some):
         _go_on(motion, part, -1)
-        _feed(motion, part, values)
-        nothing = np.zeros((0, len(SIDES)))
-        return (some, nothing, nothing, nothing > 0, nothing > 0), believed
+        none = NO_CHASSIS_ROWS.moving
+        return values, (some, none, none, none > 0.0, none > 0.0), believed
     margin, effective, against, frequency = _margins(motion, part, rows, load, some)
     turns = part.spins[some, None] & (rows.angle[part.which[some]] - margin > MATTERS)
     values[0][some] = np.where(turns, -margin, NOTHING)
@@ -173,15 +183,15 @@ def _judge(
     for k in np.flatnonzero(part.pushed[some]).tolist():
         row = int(some[k])
         segment = _begin(motion, part, row, segment)
-        elapsed, of.trusted_at = float(felt.elapsed[row]), float(part.trusted_at[row])
+        elapsed, of.trusted_at = int(felt.elapsed[row]), int(part.trusted_at[row])
         if of.believed(elapsed):
             of.step(elapsed, float(felt.step[row]), effective[k].tolist(), against[k].tolist())
             believed[row], values[1][row], values[2][row] = True, -effective[k], of.turn
             denied[k] = of.contradicted(frequency[k].tolist())
     _go_on(motion, part, segment)
-    _feed(motion, part, values)
-    least, felt_least = (np.where(x > NOTHING, -x, np.inf) for x in (values[0][some], values[1][some]))
-    return (part.which[some], least, felt_least, values[2][some] >= LIFT, denied), believed
+    least, felt_least = -values[0][some], -values[1][some]
+    found = part.which[some], least, felt_least, values[2][some] >= LIFT, denied
+    return values, found, believed
 
 
 def _begin(motion: ChassisMotion, part: _Part, row: int, segment: int) -> int:
@@ -195,8 +205,8 @@ def _begin(motion: ChassisMotion, part: _Part, row: int, segment: int) -> int:
 def _go_on(motion: ChassisMotion, part: _Part, segment: int) -> None:
     """Leave the episodes as the last row does."""
     _begin(motion, part, -1, segment)
-    motion.episodes.trusted_at = float(part.trusted_at[-1])
-    motion.episodes.hard_at = float(part.hard_at[-1])
+    motion.episodes.trusted_at = int(part.trusted_at[-1])
+    motion.episodes.hard_at = int(part.hard_at[-1])
 
 
 def _margins(
@@ -229,12 +239,17 @@ def _margins(
     return list(table)
 
 
-def _feed(motion: ChassisMotion, part: _Part, values: Sequence[Floats]) -> None:
+def _feed(
+    motion: ChassisMotion, part: _Part, rows: MarginRows, values: Sequence[Floats], lost: Lost
+) -> None:
     """Feed the signals with the judged rows; with no `values` nothing is the matter in any."""
-    of, judged = motion.signals, part.judged
-    if not values or not judged.any():
+    if not values:
         return
-    time, (turning, unloaded, lift) = part.time[judged], [x[judged].T for x in values]
+    of, judged = motion.signals, part.judged
+    number = np.cumsum(rows.known)[part.which[judged]]
+    place = np.searchsorted(number, lost[0], side='right')
+    time = np.insert(part.time[judged], place, lost[1])
+    turning, unloaded, lift = (np.insert(x[judged].T, place, NOTHING, axis=1) for x in values)
     for (caution, danger), value in zip(of.turning, turning, strict=True):
         feed(caution, time, value)
         feed(danger, time, value)

@@ -29,23 +29,24 @@ from ugv_acceptance.model.tree import pose_of, point_of
 Four = tuple[float, ...]
 
 # The accelerometer is believed while its mean is so near (m/s2) to gravity, and through an episode
-# that began so for at most HELD (s).
-TRUE, HELD = 1.0, 2.0
+# that began so for at most HELD (ns).
+TRUE, HELD = 1.0, 2_000_000_000
 # Less specific force than this share of g tells no direction.
 FALL = 0.3
 # Margins (rad) of a moving robot: caution, and where caution ends.
 CAUTION, CALM = math.radians(5.0), math.radians(6.0)
 # The turn counts if it takes this much (rad) of the static margin: else TIP_OVER says it all.
 MATTERS = math.radians(1.0)
-# An edge under effective gravity below LOW (rad) begins an episode, which lasts BACK (s) longer. A
+# An edge under effective gravity below LOW (rad) begins an episode, which lasts BACK (ns) longer. A
 # turn towards it of LIFT (rad) meanwhile is a lift, one below NONE (rad) is none.
-LOW, BACK = math.radians(3.0), 0.1
+LOW, BACK = math.radians(3.0), 100_000_000
 LIFT, NONE = math.radians(1.0), math.radians(0.5)
 # The square of the natural frequency (1/s2) is above this on any robot that one man can stand
 # beside (its centre of gravity less than 4 m from the edge): rates far below need no closer look.
 SLOW_PENDULUM = 2.0
 RIGHT = math.pi / 2
 COS_CALM = math.cos(CALM)
+LONG_AGO = -(2**62)
 # The value of a signal where nothing is the matter.
 NOTHING = -math.inf
 CALMEST: Four = (NOTHING,) * len(SIDES)
@@ -74,37 +75,37 @@ class Episodes:
     """How far the robot turned towards each side while effective gravity was near tipping there.
 
     `turn` (rad), `past` (s) how long the margin has been below 0, each to one of SIDES. The times
-    are `elapsed` of the filters: when the margin to a side and when any was last low, when the push
+    (ns) are `elapsed` of the filters: when the margin to a side and when any was last low, when the push
     was last hard enough to look closer, and when the mean force was last gravity.
     """
 
     turn: list[float] = field(default_factory=lambda: [0.0] * len(SIDES))
     past: list[float] = field(default_factory=lambda: [0.0] * len(SIDES))
-    low_at: list[float] = field(default_factory=lambda: [-math.inf] * len(SIDES))
-    newest: float = -math.inf
-    hard_at: float = -math.inf
-    trusted_at: float = -math.inf
-    clock: float = -math.inf
+    low_at: list[int] = field(default_factory=lambda: [LONG_AGO] * len(SIDES))
+    newest: int = LONG_AGO
+    hard_at: int = LONG_AGO
+    trusted_at: int = LONG_AGO
+    clock: int = LONG_AGO
 
     def begin(self) -> None:
         """Forget everything: the filters began anew."""
-        self.low_at = [-math.inf] * len(SIDES)
-        self.newest = self.hard_at = self.trusted_at = self.clock = -math.inf
+        self.low_at = [LONG_AGO] * len(SIDES)
+        self.newest = self.hard_at = self.trusted_at = self.clock = LONG_AGO
 
-    def believed(self, elapsed: float) -> bool:
+    def believed(self, elapsed: int) -> bool:
         """Return whether the accelerometer is believed: now, or since before this episode."""
         if self.trusted_at == elapsed:
             return True
         return elapsed - self.newest < BACK and elapsed - self.trusted_at <= HELD
 
     def step(
-        self, elapsed: float, dt: float, effective: Sequence[float], against: Sequence[float]
+        self, elapsed: int, dt: float, effective: Sequence[float], against: Sequence[float]
     ) -> None:
         """Take the margins under effective gravity (rad) and minus the rates to the edges (rad/s).
 
         `dt` (s) is since the message before.
         """
-        if not 0.0 <= elapsed - self.clock <= BACK:
+        if not 0 <= elapsed - self.clock <= BACK:
             self.turn, self.past = [0.0] * len(SIDES), [0.0] * len(SIDES)
         self.clock = elapsed
         for k, (margin, w) in enumerate(zip(effective, against, strict=True)):
@@ -250,6 +251,12 @@ class ChassisMotion:
             for signal, value in zip(signals, values, strict=True):
                 signal.step(now, value)
         self.busy = not all([signal.quiet for signal in of.all()])
+
+    def lose(self, now: int) -> None:
+        """Take that margins are unknown from `now` (ns) on: nothing is held by them."""
+        for signal in self.signals.all():
+            if not signal.quiet:
+                signal.clear(now)
 
 
 def reach_of(mechanics: Mechanics, imu: Vector) -> float:
