@@ -8,6 +8,7 @@ from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
+from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
@@ -104,7 +105,7 @@ def judge(
 def _examinations(settings: Settings, evaluator: RecordedEvaluator) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
     del settings, evaluator
-    return ()
+    return (ChassisExamination(),)
 
 
 @dataclass(slots=True)
