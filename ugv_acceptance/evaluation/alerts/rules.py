@@ -1,6 +1,7 @@
 """The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
 from dataclasses import dataclass, field
+from itertools import chain
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
@@ -118,10 +119,9 @@ class RuleSet:
         def at(code: str, level: int, on: float, off: float) -> list[Signal]:
             return [self._signal(code, side, level, (on, off), 0.0) for side in SIDES]
 
-        caution = at('TIP_MOVING', WARN, -CAUTION, -CALM)
-        danger = at('TIP_MOVING', ERROR, 0.0, -MARGIN_BACK)
         return ChassisSignals(
-            list(zip(caution, danger, strict=True)),
+            at('TIP_MOVING', WARN, -CAUTION, -CALM),
+            at('TIP_MOVING', ERROR, 0.0, -MARGIN_BACK),
             at('ACCELERATION', WARN, 0.0, -LOW),
             at('TRACK_LIFT', WARN, LIFT, LIFT),
         )
@@ -176,7 +176,8 @@ class RuleSet:
     def lose(self, when: int) -> None:
         """Take that margins are unknown from `when` (ns) on: nothing is raised or held by them."""
         of_margins = [s for pair in (*self.torque, *self.tip) for s in pair]
-        for signal in (*of_margins, *self.chassis.all(), self.support, self.slide):
+        chassis = chain.from_iterable(self.chassis.all())
+        for signal in (*of_margins, *chassis, self.support, self.slide):
             if not signal.quiet:
                 signal.clear(when)
 
@@ -193,7 +194,7 @@ class RuleSet:
             *self.jump_signals,
             *inputs,
             *faults,
-            *self.chassis.all(),
+            *chain.from_iterable(self.chassis.all()),
             self.slide,
             *self.prediction.signals(),
             *self.relaxed.values(),

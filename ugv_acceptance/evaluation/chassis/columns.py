@@ -28,9 +28,11 @@ from ugv_acceptance.evaluation.chassis.motion import (
     TRUE,
     ChassisMotion,
     stance_kernel,
+    witnessed,
 )
 from ugv_acceptance.evaluation.margin_table import NO_CHASSIS_ROWS, ChassisRows, MarginRows
 from ugv_acceptance.evaluation.samples import ImuColumns
+from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.model.mechanics import posture_of
 from ugv_acceptance.model.row_selection import pick
@@ -48,7 +50,8 @@ class _Part:
     """Columns of a part of a recording, one row an IMU message.
 
     `which` are the rows of margins, `gravity` (3, n), `least` (n,) the least tip angle (rad),
-    `judged` says where all is there that is needed. `trusted_at` and `hard_at` (n,) are those of
+    `judged` says where all is there that is needed, `alone` where no orientation witnesses the rate,
+    `spins` and `pushed` where margins are computed. `trusted_at` and `hard_at` (n,) are those of
     Episodes after each row.
     """
 
@@ -57,6 +60,7 @@ class _Part:
     gravity: Floats
     which: NDArray[np.intp]
     judged: Mask
+    alone: Mask
     spins: Mask
     pushed: Mask
     trusted_at: Times
@@ -82,12 +86,12 @@ def take_columns(
             motion.lose(int(time))
         return NO_CHASSIS_ROWS
     with np.errstate(all='ignore'):
-        time, stamp, vectors, measured = _in_order(columns)
+        time, stamp, vectors, measured, alone = _in_order(columns, motion.settings.imu)
         felt = motion.filter.columns(
             time, stamp, vectors[:3], vectors[3:], rows.pairs.imu.gravity[1:].T
         )
         gyro = measured & _turned(motion, vectors[:3])
-        part = _compare(motion, (time, felt), rows, gyro)
+        part = _compare(motion, (time, felt), rows, (gyro, alone))
         values, found, believed = _judge(motion, part, rows, load)
         _feed(motion, part, rows, values, lost)
     known = rows.known[part.which]
@@ -96,18 +100,25 @@ def take_columns(
     return ChassisRows(*found, *(float(felt.step[mask].sum()) for mask in masks))
 
 
-def _in_order(columns: Sequence[ImuColumns]) -> tuple[Times, Times, Floats, Mask]:
-    """Return time, stamp, rate and force (6, n), and whether the rate was measured, as received."""
+def _in_order(
+    columns: Sequence[ImuColumns], imu: ImuInput
+) -> tuple[Times, Times, Floats, Mask, Mask]:
+    """Return time, stamp, rate and force (6, n), as received.
+
+    Then where the rate was measured, and where no orientation of the IMU's own witnesses it.
+    """
     time = np.concatenate([s.log_time for s in columns])
     stamp = np.concatenate([s.stamp for s in columns])
     measured = np.concatenate([s.angular_velocity_covariance_0 for s in columns]) != -1.0
+    alone = np.concatenate([s.orientation_covariance_0 for s in columns]) == -1.0
+    alone |= imu.attitude == 'accelerometer' or imu.specific_force
     table = np.empty((6, len(time)))
     for lines, name in ((table[:3], 'angular_velocity'), (table[3:], 'linear_acceleration')):
         np.concatenate([getattr(s, name).T for s in columns], axis=1, out=lines)
     if (np.diff(time) < 0).any():
         order = np.argsort(time, kind='stable')
-        return time[order], stamp[order], table[:, order], measured[order]
-    return time, stamp, table, measured
+        return time[order], stamp[order], table[:, order], measured[order], alone[order]
+    return time, stamp, table, measured, alone
 
 
 def _turned(motion: ChassisMotion, omega: Floats) -> Mask:
@@ -120,10 +131,13 @@ def _turned(motion: ChassisMotion, omega: Floats) -> Mask:
 
 
 def _compare(
-    motion: ChassisMotion, felt_at: tuple[Times, FeltRows], rows: MarginRows, gyro: Mask
+    motion: ChassisMotion,
+    felt_at: tuple[Times, FeltRows],
+    rows: MarginRows,
+    known: tuple[Mask, Mask],
 ) -> _Part:
     """Return the part with the rows in which the robot turns, or is or was just pushed."""
-    time, felt = felt_at
+    (time, felt), (gyro, alone) = felt_at, known
     which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
     front, left, rear, right = rows.angle.T
     least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
@@ -145,7 +159,7 @@ def _compare(
     hard = heavy & (off > -gravity[2] * np.sin(np.minimum(least - LOW, RIGHT)))
     hard_at = _last(felt, hard, of.hard_at)
     pushed = heavy & (felt.elapsed - hard_at < BACK)
-    return _Part(time, felt, gravity, which, judged, spins, pushed, trusted_at, hard_at)
+    return _Part(time, felt, gravity, which, judged, alone, spins, pushed, trusted_at, hard_at)
 
 
 def _last(felt: FeltRows, mask: Mask, before: int) -> Times:
@@ -169,7 +183,7 @@ def _judge(
     """
     some = np.flatnonzero(part.spins | part.pushed)
     shape = (len(part.time), len(SIDES))
-    values = [np.full(shape, NOTHING) for _ in range(3)] if len(some) or motion.busy else []
+    values = [np.full(shape, NOTHING) for _ in range(4)] if len(some) or motion.busy else []
     believed = np.zeros(shape[0], np.bool_)
     if not len(some):
         _go_on(motion, part, -1)
@@ -178,19 +192,23 @@ def _judge(
     margin, effective, against, frequency = _margins(motion, part, rows, load, some)
     turns = part.spins[some, None] & (rows.angle[part.which[some]] - margin > MATTERS)
     values[0][some] = np.where(turns, -margin, NOTHING)
-    denied = np.zeros(margin.shape, np.bool_)
-    of, felt, segment = motion.episodes, part.felt, -1
+    felt = part.felt
+    sure = part.alone[some] | witnessed(
+        felt.rate[:, some], part.gravity[:, some], felt.gravity[:, some]
+    )
+    values[1][some] = np.where(sure[:, None], values[0][some], NOTHING)
+    denied = (values[0][some] >= 0.0) & ~sure[:, None]
+    of, segment = motion.episodes, -1
     for k in np.flatnonzero(part.pushed[some]).tolist():
         row = int(some[k])
         segment = _begin(motion, part, row, segment)
         elapsed, of.trusted_at = int(felt.elapsed[row]), int(part.trusted_at[row])
         if of.believed(elapsed):
             of.step(elapsed, float(felt.step[row]), effective[k].tolist(), against[k].tolist())
-            believed[row], values[1][row], values[2][row] = True, -effective[k], of.turn
-            denied[k] = of.contradicted(frequency[k].tolist())
+            believed[row], values[2][row], values[3][row] = True, -effective[k], of.turn
+            denied[k] |= of.contradicted(frequency[k].tolist())
     _go_on(motion, part, segment)
-    least, felt_least = -values[0][some], -values[1][some]
-    found = part.which[some], least, felt_least, values[2][some] >= LIFT, denied
+    found = part.which[some], -values[1][some], -values[2][some], values[3][some] >= LIFT, denied
     return values, found, believed
 
 
@@ -221,7 +239,9 @@ def _margins(
     q = list(rows.pairs.joints.q[j].T)
     mass, *cog = [x[j] if isinstance(x, np.ndarray) else x for x in load]
     posture = posture_of(motion.mechanics, q, mass, (cog[0], cog[1], cog[2]))
-    inertia = tuple(np.broadcast_to(x, len(some)) for x in inertia_of(motion.mechanics).run(*q, mass, *cog))
+    inertia = tuple(
+        np.broadcast_to(x, len(some)) for x in inertia_of(motion.mechanics).run(*q, mass, *cog)
+    )
     felt = part.felt
     alpha = (felt.rate - felt.lagging) / FORCE
     vectors = tuple(np.vstack((part.gravity, felt.force, felt.rate, alpha))[:, some])
@@ -230,9 +250,7 @@ def _margins(
         if stance.edges is None:
             continue
         kernel = stance_kernel(motion.mechanics, stance, motion.settings.imu.position)
-        found = kernel.run(
-            *stance.terms, stance.mass, *pick(inertia, of), *pick(vectors, of)
-        )
+        found = kernel.run(*stance.terms, stance.mass, *pick(inertia, of), *pick(vectors, of))
         for k, values in enumerate(found):
             for side, value in enumerate(values):
                 table[k, of, side] = value
@@ -245,15 +263,11 @@ def _feed(
     """Feed the signals with the judged rows; with no `values` nothing is the matter in any."""
     if not values:
         return
-    of, judged = motion.signals, part.judged
+    judged = part.judged
     number = np.cumsum(rows.known)[part.which[judged]]
     place = np.searchsorted(number, lost[0], side='right')
     time = np.insert(part.time[judged], place, lost[1])
-    turning, unloaded, lift = (np.insert(x[judged].T, place, NOTHING, axis=1) for x in values)
-    for (caution, danger), value in zip(of.turning, turning, strict=True):
-        feed(caution, time, value)
-        feed(danger, time, value)
-    for signals, table in ((of.unloaded, unloaded), (of.lift, lift)):
-        for signal, value in zip(signals, table, strict=True):
-            feed(signal, time, value)
-    motion.busy = not all(signal.quiet for signal in of.all())
+    for signals, table in zip(motion.signals.all(), values, strict=True):
+        for signal, value in zip(signals, table[judged].T, strict=True):
+            feed(signal, time, np.insert(value, place, NOTHING))
+    motion.busy = not motion.signals.quiet()

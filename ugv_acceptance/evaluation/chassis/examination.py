@@ -128,8 +128,8 @@ class ChassisExamination:
             (
                 self._denied,
                 INCONCLUSIVE,
-                'acceleration past tipping to the {side}, but the gyro shows no turn: the IMU '
-                'contradicts itself',
+                'past tipping to the {side} by one sensor of the IMU, but not by the others: gyro, '
+                'accelerometer and orientation contradict each other',
             ),
         )
         for event, verdict, words in told:

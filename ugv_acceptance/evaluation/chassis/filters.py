@@ -27,7 +27,7 @@ SLOWEST = 0.0221
 # Stamps (ns) that step further than this say nothing about time.
 STAMP_STEP = 1_000_000_000
 
-_NO_STATE = (0.0,) * 16
+_NO_STATE = (0.0,) * 19
 
 
 @dataclass(slots=True)
@@ -35,9 +35,9 @@ class ChassisFilter:
     """Filters IMU messages one at a time (`step`) or many (`columns`), in any mixture.
 
     After a step: `elapsed` (ns) since the filters began, 0 while they have nothing; `step_s` (s)
-    since the message before; `state` are 16 numbers: the force filtered once and twice, the rate
-    (RATE), that filtered again (FORCE), the mean difference between force and gravity (each 3), and
-    the mean step (s).
+    since the message before; `state` are 19 numbers: the force filtered once and twice, the rate
+    (RATE), that filtered again (FORCE), the mean difference between force and gravity, gravity
+    filtered (FORCE) (each 3), and the mean step (s).
     """
 
     mounting: Matrix
@@ -78,7 +78,7 @@ class ChassisFilter:
         if not (self.running and 0 < step <= LONGEST_STEP):
             self.running, self.elapsed, self.step_s = True, 0, 0.0
             of = (ax, ay, az, ax, ay, az, wx, wy, wz, wx, wy, wz)
-            self.state = (*of, ax + gx, ay + gy, az + gz, 0.0)
+            self.state = (*of, ax + gx, ay + gy, az + gz, gx, gy, gz, 0.0)
             return True
         dt = step * 1e-9
         if dt != self.step_s:
@@ -101,22 +101,25 @@ class ChassisFilter:
         with np.errstate(under='ignore'):
             f = np.where(fresh, 0.0, np.exp(-step / FORCE))
             r = np.where(fresh, 0.0, np.exp(-step / RATE))
-        new = np.where(fresh, 1.0, step / np.maximum(np.minimum(elapsed * 1e-9 + step, MEAN), 1e-12))
+        new = np.where(
+            fresh, 1.0, step / np.maximum(np.minimum(elapsed * 1e-9 + step, MEAN), 1e-12)
+        )
         before = np.array(self.state)
-        once = np.empty((6, len(time)))
-        once[:3] = recursion(f, x[:3], before[:3])
-        once[3:] = recursion(r, x[3:6], before[6:9])
+        slowed = recursion(f, x[[0, 1, 2, 6, 7, 8]], np.concatenate((before[:3], before[15:18])))
+        once = np.concatenate((slowed[:3], recursion(r, x[3:6], before[6:9])))
         twice = recursion(f, once, np.concatenate((before[3:6], before[9:12])))
         second = np.concatenate(([self.running and self.elapsed == 0], fresh[:-1])) & ~fresh
         mean = recursion(1.0 - new, x[:3] + x[6:], before[12:15])
         slow = np.where(second, 0.0, 1.0 - new)
-        pace = recursion(slow, step[None], before[15:])
+        pace = recursion(slow, step[None], before[18:])
         self.elapsed, self.step_s = int(elapsed[-1]), float(step[-1])
         self.running = bool(good[-1])
-        last = (once[:3], twice[:3], once[3:], twice[3:], mean, pace)
+        last = (once[:3], twice[:3], once[3:], twice[3:], mean, slowed[3:], pace)
         self.state = tuple(np.concatenate([part[:, -1] for part in last]).tolist())
         self._stamp, self._time = int(stamp[-1]), int(time[-1])
-        return FeltRows(good, step, elapsed, began, twice[:3], once[3:], twice[3:], mean, pace[0])
+        return FeltRows(
+            good, step, elapsed, began, twice[:3], once[3:], twice[3:], mean, slowed[3:], pace[0]
+        )
 
     def _steps(
         self, time: Times, stamp: Times, omega: Floats, force: Floats, gravity: Floats
@@ -150,7 +153,7 @@ def _filtered(
 
     Of force and rate (shares), of the mean the new share, and the step (s) for its own mean.
     """
-    ux, uy, uz, fx, fy, fz, px, py, pz, qx, qy, qz, mx, my, mz, pace = state
+    ux, uy, uz, fx, fy, fz, px, py, pz, qx, qy, qz, mx, my, mz, lx, ly, lz, pace = state
     wx, wy, wz, ax, ay, az = new
     gx, gy, gz = gravity
     f, r, m, dt, paced = keep
@@ -176,6 +179,9 @@ def _filtered(
         mx + m * (ax + gx - mx),
         my + m * (ay + gy - my),
         mz + m * (az + gz - mz),
+        gx + f * (lx - gx),
+        gy + f * (ly - gy),
+        gz + f * (lz - gz),
         pace + paced * (dt - pace),
     )
 
@@ -187,7 +193,7 @@ class FeltRows:
     `good` says which messages could be used, `step` (n,) s is since the message before, `elapsed`
     (n,) ns since the filters began, in row `began` (n,) (-1: before these rows). `force` (m/s2)
     filtered twice, `rate` (rad/s) once, `lagging` the rate filtered once more, `mean` the mean
-    difference between force and gravity (m/s2), `pace` (n,) the mean step (s).
+    difference between force and gravity (m/s2), `gravity` filtered (m/s2), `pace` (n,) the mean step (s).
     """
 
     good: NDArray[np.bool_]
@@ -198,6 +204,7 @@ class FeltRows:
     rate: Floats
     lagging: Floats
     mean: Floats
+    gravity: Floats
     pace: Floats
 
 

@@ -7,6 +7,7 @@ hard costs the filters and one comparison; the margins are computed for the othe
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
@@ -17,7 +18,7 @@ from ugv_acceptance.evaluation.chassis.filters import (
     SLOWEST,
     ChassisFilter,
 )
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.edges import SIDES, corners_of
 from ugv_acceptance.model.kernels import Kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
@@ -44,6 +45,10 @@ LIFT, NONE = math.radians(1.0), math.radians(0.5)
 # The square of the natural frequency (1/s2) is above this on any robot that one man can stand
 # beside (its centre of gravity less than 4 m from the edge): rates far below need no closer look.
 SLOW_PENDULUM = 2.0
+# How the rate of a message is known: not measured or not to be trusted; without an orientation of
+# the IMU's own to compare it with; with one, which must turn by this share of the rate at least.
+NO_RATE, UNWITNESSED, WITNESSED = range(3)
+WITNESS = 0.25
 RIGHT = math.pi / 2
 COS_CALM = math.cos(CALM)
 LONG_AGO = -(2**62)
@@ -57,17 +62,22 @@ UNKNOWN4: Four = (math.nan,) * len(SIDES)
 class ChassisSignals:
     """The signals of a chassis in motion, one to each of SIDES.
 
-    `turning` (CAUTION, DANGER): minus the margin with the energy of the turn (rad); `unloaded`:
-    minus the margin under effective gravity (rad); `lift`: the turn since it was low (rad).
+    `caution`, `danger`: minus the margin with the energy of the turn (rad); `push`: minus the
+    margin under effective gravity (rad); `lift`: the turn since that was low (rad).
     """
 
-    turning: Sequence[tuple[Signal, Signal]]
-    unloaded: Sequence[Signal]
+    caution: Sequence[Signal]
+    danger: Sequence[Signal]
+    push: Sequence[Signal]
     lift: Sequence[Signal]
 
-    def all(self) -> list[Signal]:
-        """Return all signals in a fixed order."""
-        return [*(s for pair in self.turning for s in pair), *self.unloaded, *self.lift]
+    def all(self) -> tuple[Sequence[Signal], ...]:
+        """Return the signals of each kind in a fixed order."""
+        return self.caution, self.danger, self.push, self.lift
+
+    def quiet(self) -> bool:
+        """Return whether all signals are quiet."""
+        return all([signal.quiet for kind in self.all() for signal in kind])
 
 
 @dataclass(slots=True)
@@ -162,12 +172,12 @@ class ChassisMotion:
         force: Sequence[float],
         gravity: Vector,
         angles: Four | None,
-        gyro: bool,  # noqa: FBT001 - a number of the message
+        rate: int,
     ) -> None:
         """Take an IMU message: rate and specific force in sensor axes, `gravity` in base axes.
 
-        `angles` are the tip angles now (rad), None while they are not known; `gyro` says whether
-        the rate was measured and can be trusted.
+        `angles` are the tip angles now (rad), None while they are not known; `rate` is
+        NO_RATE, UNWITNESSED or WITNESSED.
         """
         felt = self.filter
         felt.step(now, stamp, omega, force, gravity)
@@ -175,11 +185,11 @@ class ChassisMotion:
             self.episodes.begin()
         if not self.turned:
             self.turned = any(omega)
-        if angles is not None and gyro and self.turned and felt.elapsed >= SETTLED:
-            self._judge(now, gravity, angles)
+        if angles is not None and rate and self.turned and felt.elapsed >= SETTLED:
+            self._judge(now, gravity, angles, rate)
 
-    def _judge(self, now: int, gravity: Vector, angles: Four) -> None:
-        _, _, _, fx, fy, fz, px, py, pz, qx, qy, qz, mx, my, mz, pace = self.filter.state
+    def _judge(self, now: int, gravity: Vector, angles: Four, rate: int) -> None:
+        _, _, _, fx, fy, fz, px, py, pz, qx, qy, qz, mx, my, mz, *_, pace = self.filter.state
         least, stands = min(angles), self.stands
         if stands is None or stands[0].edges is None or pace > SLOWEST or least != least:  # noqa: PLR0124 - NaN
             return
@@ -201,24 +211,27 @@ class ChassisMotion:
                 of.hard_at = elapsed
             pushed = elapsed - of.hard_at < BACK
         if spins or pushed:
-            self._look(now, gravity, angles, spins=spins, pushed=pushed)
+            self._look(now, gravity, angles, (spins, pushed, rate))
         elif self.busy:
-            self._feed(now, CALMEST, CALMEST, CALMEST)
+            self._feed(now, (CALMEST,) * 4)
 
-    def _look(
-        self, now: int, gravity: Vector, angles: Four, *, spins: bool, pushed: bool
-    ) -> None:
+    def _look(self, now: int, gravity: Vector, angles: Four, which: tuple[bool, bool, int]) -> None:
+        """Compute the margins; `which`: whether it spins, is pushed, and how the rate is known."""
+        spins, pushed, rate = which
         margin, effective, against, _ = self.margins(gravity)
-        turning = unloaded = lift = CALMEST
+        turning = certain = unloaded = lift = CALMEST
         if spins:
             turning = tuple(
                 [-m if a - m > MATTERS else NOTHING for m, a in zip(margin, angles, strict=True)]
             )
+            _, _, _, _, _, _, *spin, _, _, _, _, _, _, lx, ly, lz, _ = self.filter.state
+            if rate == UNWITNESSED or witnessed(spin[:3], gravity, (lx, ly, lz)):
+                certain = turning
         of = self.episodes
         if pushed and of.believed(self.filter.elapsed):
             of.step(self.filter.elapsed, self.filter.step_s, effective, against)
             unloaded, lift = tuple([-x for x in effective]), tuple(of.turn)
-        self._feed(now, turning, unloaded, lift)
+        self._feed(now, (turning, certain, unloaded, lift))
 
     def margins(self, gravity: Vector) -> tuple[Four, ...]:
         """Return the four results of model/tipping.py for the newest message and stance."""
@@ -242,21 +255,31 @@ class ChassisMotion:
             return None
         return tuple(map(min, self.margins(gravity)[0], angles))
 
-    def _feed(self, now: int, turning: Four, unloaded: Four, lift: Four) -> None:
-        of = self.signals
-        for (caution, danger), value in zip(of.turning, turning, strict=True):
-            caution.step(now, value)
-            danger.step(now, value)
-        for signals, values in ((of.unloaded, unloaded), (of.lift, lift)):
-            for signal, value in zip(signals, values, strict=True):
+    def _feed(self, now: int, values: Sequence[Four]) -> None:
+        """Feed the signals: CAUTION and DANGER of the turn, push, lift, each to SIDES."""
+        for signals, some in zip(self.signals.all(), values, strict=True):
+            for signal, value in zip(signals, some, strict=True):
                 signal.step(now, value)
-        self.busy = not all([signal.quiet for signal in of.all()])
+        self.busy = not self.signals.quiet()
 
     def lose(self, now: int) -> None:
         """Take that margins are unknown from `now` (ns) on: nothing is held by them."""
-        for signal in self.signals.all():
+        for signal in chain.from_iterable(self.signals.all()):
             if not signal.quiet:
                 signal.clear(now)
+
+
+def witnessed(rate: Sequence[Any], gravity: Sequence[Any], before: Sequence[Any]) -> Any:  # noqa: ANN401 - bool or array
+    """Return whether the orientation turns as the gyro says: by WITNESS of its rate or more.
+
+    `rate` (rad/s), gravity now and filtered (m/s2), each three floats or arrays, in base axes. A
+    gyro in other units, or an orientation that is stuck, differ by far more.
+    """
+    (px, py, _), (gx, gy, gz), (lx, ly, lz) = rate, gravity, before
+    dx, dy, dz = gx - lx, gy - ly, gz - lz
+    along = px * (dy * gz - dz * gy) + py * (dz * gx - dx * gz)
+    size = FORCE * (gx * gx + gy * gy + gz * gz)
+    return along >= WITNESS * size * (px * px + py * py)
 
 
 def reach_of(mechanics: Mechanics, imu: Vector) -> float:
@@ -265,6 +288,14 @@ def reach_of(mechanics: Mechanics, imu: Vector) -> float:
     pose = pose_of(tree, [0.0] * (len(tree.bodies) - 1))
     feet: Any = [point_of(tree, pose, c.link, c.position)[1] for c in mechanics.robot.contacts]
     return max((math.dist(foot, imu) for foot in feet), default=0.0)
+
+
+def rate_of(omega_covariance_0: float, covariance_0: float, imu: ImuInput) -> int:
+    """Return how the rate of a message is known, from the covariances of rate and orientation."""
+    if omega_covariance_0 == -1.0:
+        return NO_RATE
+    alone = covariance_0 == -1.0 or imu.attitude == 'accelerometer' or imu.specific_force
+    return UNWITNESSED if alone else WITNESSED
 
 
 def stance_kernel(mechanics: Mechanics, stance: Stance, imu: Vector) -> Kernel:
