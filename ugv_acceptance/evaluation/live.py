@@ -10,7 +10,12 @@ from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE
-from ugv_acceptance.evaluation.chassis.motion import ChassisMotion, rate_of
+from ugv_acceptance.evaluation.chassis.motion import (
+    NO_RATE,
+    UNWITNESSED,
+    WITNESSED,
+    ChassisMotion,
+)
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
@@ -144,7 +149,9 @@ class LiveEvaluator:
         self._gravity = gravity
         margins = self._evaluate(now, stamp)
         angles: Any = margins.stability.angle if margins else None
-        rate = rate_of(omega_covariance_0, covariance_0, self.settings.imu)
+        rate = NO_RATE if omega_covariance_0 == -1.0 else WITNESSED
+        if covariance_0 == -1.0 and rate:
+            rate = UNWITNESSED
         self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
         return margins
 

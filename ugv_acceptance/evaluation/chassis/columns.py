@@ -12,21 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import feed
-from ugv_acceptance.evaluation.chassis.filters import FORCE, LEARNT, SETTLED, SLOWEST, FeltRows
+from ugv_acceptance.evaluation.chassis.filters import LEARNT, PUSH, SETTLED, SLOWEST, FeltRows
 from ugv_acceptance.evaluation.chassis.motion import (
     BACK,
-    COS_CALM,
     FALL,
+    HARD,
+    HARD_UP_TO,
     HELD,
     LIFT,
     LONG_AGO,
     LOW,
     MATTERS,
     NOTHING,
-    RIGHT,
-    SLOW_PENDULUM,
+    SPIN,
+    SPIN_LESS,
     TRUE,
     ChassisMotion,
+    no_witness,
     stance_kernel,
     witnessed,
 )
@@ -49,9 +51,9 @@ _Standout = tuple[NDArray[np.intp], Floats, Floats, Mask, Mask]
 class _Part:
     """Columns of a part of a recording, one row an IMU message.
 
-    `which` are the rows of margins, `gravity` (3, n), `least` (n,) the least tip angle (rad),
-    `judged` says where all is there that is needed, `alone` where no orientation witnesses the rate,
-    `spins` and `pushed` where margins are computed. `trusted_at` and `hard_at` (n,) are those of
+    `which` are the rows of margins, `gravity` (3, n) m/s2; `judged` says where all is there that is
+    needed, `alone` where no orientation shows the rate, `true` where the accelerometer shows gravity,
+       `spins` and `pushed` where margins are computed. `trusted_at` and `hard_at` (n,) are those of
     Episodes after each row.
     """
 
@@ -61,6 +63,7 @@ class _Part:
     which: NDArray[np.intp]
     judged: Mask
     alone: Mask
+    true: Mask
     spins: Mask
     pushed: Mask
     trusted_at: Times
@@ -95,8 +98,7 @@ def take_columns(
         values, found, believed = _judge(motion, part, rows, load)
         _feed(motion, part, rows, values, lost)
     known = rows.known[part.which]
-    true = part.judged & (part.trusted_at == felt.elapsed)
-    masks = (known, part.judged, true | believed, known & ~gyro, known & (felt.pace > SLOWEST))
+    masks = (known, part.judged, part.true | believed, known & ~gyro, known & (felt.pace > SLOWEST))
     return ChassisRows(*found, *(float(felt.step[mask].sum()) for mask in masks))
 
 
@@ -111,7 +113,7 @@ def _in_order(
     stamp = np.concatenate([s.stamp for s in columns])
     measured = np.concatenate([s.angular_velocity_covariance_0 for s in columns]) != -1.0
     alone = np.concatenate([s.orientation_covariance_0 for s in columns]) == -1.0
-    alone |= imu.attitude == 'accelerometer' or imu.specific_force
+    alone |= no_witness(imu)
     table = np.empty((6, len(time)))
     for lines, name in ((table[:3], 'angular_velocity'), (table[3:], 'linear_acceleration')):
         np.concatenate([getattr(s, name).T for s in columns], axis=1, out=lines)
@@ -143,23 +145,24 @@ def _compare(
     least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
     judged = (felt.elapsed >= SETTLED) & (felt.pace <= SLOWEST) & gyro & ~np.isnan(least)
     judged &= rows.known[which]
-    (px, py, pz), (mx, my, mz), (fx, fy, fz) = felt.rate, felt.mean, felt.force
+    (px, py, pz), (mx, my, mz) = felt.rate, felt.mean
     flat, up = px * px + py * py, pz * pz
     square = np.where(rows.state[which] == STANDING, flat, flat + up)
-    spins = judged & (square > 2.0 * SLOW_PENDULUM * (COS_CALM - np.cos(least)))
+    spins = judged & (square > SPIN * least * np.abs(least) - SPIN_LESS)
     true = judged & (felt.elapsed >= LEARNT) & (mx * mx + my * my + mz * mz <= TRUE * TRUE)
-    of, fall = motion.episodes, FALL * motion.settings.robot.gravity
-    trusted_at = _last(felt, true, of.trusted_at)
-    heavy = judged & (fx * fx + fy * fy + fz * fz >= fall * fall)
-    heavy &= felt.elapsed - trusted_at <= HELD
-    gravity = rows.pairs.imu.gravity[1:].T
-    dx, dy, dz = felt.force + gravity
-    alpha = np.abs(felt.rate - felt.lagging).sum(axis=0) / FORCE
-    off = np.sqrt(dx * dx + dy * dy + dz * dz) + motion.reach * (alpha + flat + up)
-    hard = heavy & (off > -gravity[2] * np.sin(np.minimum(least - LOW, RIGHT)))
+    of, gravity = motion.episodes, rows.pairs.imu.gravity[1:].T
+    alpha = np.abs(felt.rate - felt.lagging).sum(axis=0) / PUSH
+    off = np.sqrt((felt.push * felt.push).sum(axis=0)) + motion.filter.reach * (alpha + flat + up)
+    hard = judged & (off > HARD * gravity[2] * np.minimum(least - LOW, HARD_UP_TO))
     hard_at = _last(felt, hard, of.hard_at)
-    pushed = heavy & (felt.elapsed - hard_at < BACK)
-    return _Part(time, felt, gravity, which, judged, alone, spins, pushed, trusted_at, hard_at)
+    most = (1.0 - FALL) * motion.settings.robot.gravity**2
+    pushed = judged & (felt.elapsed - hard_at < BACK)
+    pushed &= (felt.push * gravity).sum(axis=0) <= most
+    trusted_at = _last(felt, pushed & true, of.trusted_at)
+    pushed &= felt.elapsed - trusted_at <= HELD
+    return _Part(
+        time, felt, gravity, which, judged, alone, true, spins, pushed, trusted_at, hard_at
+    )
 
 
 def _last(felt: FeltRows, mask: Mask, before: int) -> Times:
@@ -194,7 +197,7 @@ def _judge(
     values[0][some] = np.where(turns, -margin, NOTHING)
     felt = part.felt
     sure = part.alone[some] | witnessed(
-        felt.rate[:, some], part.gravity[:, some], felt.gravity[:, some]
+        felt.rate[:, some], part.gravity[:, some], felt.level[:, some]
     )
     values[1][some] = np.where(sure[:, None], values[0][some], NOTHING)
     denied = (values[0][some] >= 0.0) & ~sure[:, None]
@@ -243,8 +246,8 @@ def _margins(
         np.broadcast_to(x, len(some)) for x in inertia_of(motion.mechanics).run(*q, mass, *cog)
     )
     felt = part.felt
-    alpha = (felt.rate - felt.lagging) / FORCE
-    vectors = tuple(np.vstack((part.gravity, felt.force, felt.rate, alpha))[:, some])
+    alpha = (felt.rate - felt.lagging) / PUSH
+    vectors = tuple(np.vstack((part.gravity, felt.push - part.gravity, felt.rate, alpha))[:, some])
     table = np.full((4, len(some), len(SIDES)), np.nan)
     for of, stance in stances_of(motion.mechanics, posture, len(some)):
         if stance.edges is None:

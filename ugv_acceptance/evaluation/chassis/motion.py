@@ -12,8 +12,8 @@ from typing import Any
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
 from ugv_acceptance.evaluation.chassis.filters import (
-    FORCE,
     LEARNT,
+    PUSH,
     SETTLED,
     SLOWEST,
     ChassisFilter,
@@ -25,14 +25,14 @@ from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import IDENTITY, Payload, Vector
 from ugv_acceptance.model.stability import Stance
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
-from ugv_acceptance.model.tree import pose_of, point_of
+from ugv_acceptance.model.tree import point_of, pose_of
 
 Four = tuple[float, ...]
 
 # The accelerometer is believed while its mean is so near (m/s2) to gravity, and through an episode
 # that began so for at most HELD (ns).
 TRUE, HELD = 1.0, 2_000_000_000
-# Less specific force than this share of g tells no direction.
+# Less specific force against gravity than this share of g tells no direction.
 FALL = 0.3
 # Margins (rad) of a moving robot: caution, and where caution ends.
 CAUTION, CALM = math.radians(5.0), math.radians(6.0)
@@ -42,15 +42,17 @@ MATTERS = math.radians(1.0)
 # turn towards it of LIFT (rad) meanwhile is a lift, one below NONE (rad) is none.
 LOW, BACK = math.radians(3.0), 100_000_000
 LIFT, NONE = math.radians(1.0), math.radians(0.5)
-# The square of the natural frequency (1/s2) is above this on any robot that one man can stand
-# beside (its centre of gravity less than 4 m from the edge): rates far below need no closer look.
-SLOW_PENDULUM = 2.0
+# A closer look is taken where the rate may leave less than CALM of the least tip angle: its square is
+# above SPIN angle^2 - SPIN_LESS, as 1 - cos(angle) > 0.4 angle^2, and as the square of the natural
+# frequency is above 2 / s2 on any robot whose centre of gravity is less than 4 m from the edge.
+SPIN, SPIN_LESS = 2.0 * 2.0 * 0.4, 2.0 * 2.0 * (1.0 - math.cos(CALM))
+# So it is where the push may leave less than LOW: it is above 0.8 g (angle - LOW), which is below
+# g sin(angle - LOW) up to 1.1 rad. (Gravity's z is negative.)
+HARD, HARD_UP_TO = -0.8, 1.1
 # How the rate of a message is known: not measured or not to be trusted; without an orientation of
 # the IMU's own to compare it with; with one, which must turn by this share of the rate at least.
 NO_RATE, UNWITNESSED, WITNESSED = range(3)
 WITNESS = 0.25
-RIGHT = math.pi / 2
-COS_CALM = math.cos(CALM)
 LONG_AGO = -(2**62)
 # The value of a signal where nothing is the matter.
 NOTHING = -math.inf
@@ -103,7 +105,7 @@ class Episodes:
         self.newest = self.hard_at = self.trusted_at = self.clock = LONG_AGO
 
     def believed(self, elapsed: int) -> bool:
-        """Return whether the accelerometer is believed: now, or since before this episode."""
+        """Return whether the accelerometer is believed now, or was when this episode began."""
         if self.trusted_at == elapsed:
             return True
         return elapsed - self.newest < BACK and elapsed - self.trusted_at <= HELD
@@ -143,7 +145,7 @@ class ChassisMotion:
     """What live and recorded forms share: filters, episodes, signals, compiled mechanics.
 
     `stands` is how the robot stands since the newest joint state, None while that is not known.
-    `reach` (m) is how far the contacts are from the IMU. `busy` says that a signal is not quiet,
+    `busy` says that a signal is not quiet,
     `turned` that the gyro showed any number but 0: one that never does is none.
     """
 
@@ -151,7 +153,6 @@ class ChassisMotion:
     signals: ChassisSignals
     filter: ChassisFilter = field(init=False)
     mechanics: Mechanics = field(init=False)
-    reach: float = field(init=False)
     episodes: Episodes = field(default_factory=Episodes)
     stands: Standing | None = None
     busy: bool = False
@@ -161,8 +162,8 @@ class ChassisMotion:
     def __post_init__(self) -> None:
         imu, robot = self.settings.imu, self.settings.robot
         self.mechanics = mechanics_of(robot)
-        self.filter = ChassisFilter(IDENTITY if imu.mounting == IDENTITY else imu.mounting)
-        self.reach = reach_of(self.mechanics, imu.position)
+        mounting = IDENTITY if imu.mounting == IDENTITY else imu.mounting
+        self.filter = ChassisFilter(mounting, reach_of(self.mechanics, imu.position))
 
     def step(
         self,
@@ -180,58 +181,67 @@ class ChassisMotion:
         NO_RATE, UNWITNESSED or WITNESSED.
         """
         felt = self.filter
-        felt.step(now, stamp, omega, force, gravity)
-        if felt.elapsed < SETTLED:
-            self.episodes.begin()
+        found = felt.step(now, stamp, omega, force, gravity)
         if not self.turned:
             self.turned = any(omega)
-        if angles is not None and rate and self.turned and felt.elapsed >= SETTLED:
-            self._judge(now, gravity, angles, rate)
-
-    def _judge(self, now: int, gravity: Vector, angles: Four, rate: int) -> None:
-        _, _, _, fx, fy, fz, px, py, pz, qx, qy, qz, mx, my, mz, *_, pace = self.filter.state
-        least, stands = min(angles), self.stands
-        if stands is None or stands[0].edges is None or pace > SLOWEST or least != least:  # noqa: PLR0124 - NaN
+        if found is None:
+            if felt.elapsed < SETTLED:
+                self.episodes.begin()
             return
-        square = flat = px * px + py * py
-        if stands[0].state:  # not flat on its tracks
-            square += pz * pz
-        spins = square > 2.0 * SLOW_PENDULUM * (COS_CALM - math.cos(least))
-        pushed = False
-        elapsed, of = self.filter.elapsed, self.episodes
-        if mx * mx + my * my + mz * mz <= TRUE * TRUE and elapsed >= LEARNT:
-            of.trusted_at = elapsed
-        fall = FALL * self.settings.robot.gravity
-        if elapsed - of.trusted_at <= HELD and fx * fx + fy * fy + fz * fz >= fall * fall:
-            gx, gy, gz = gravity
-            dx, dy, dz = fx + gx, fy + gy, fz + gz
-            alpha = (abs(px - qx) + abs(py - qy) + abs(pz - qz)) / FORCE
-            off = math.sqrt(dx * dx + dy * dy + dz * dz) + self.reach * (alpha + flat + pz * pz)
-            if off > -gz * math.sin(min(least - LOW, RIGHT)):
-                of.hard_at = elapsed
-            pushed = elapsed - of.hard_at < BACK
-        if spins or pushed:
-            self._look(now, gravity, angles, (spins, pushed, rate))
+        stands = self.stands
+        if stands is None or angles is None or not rate or not self.turned:
+            return
+        least, stance = min(angles), stands[0]
+        if stance.edges is None or least != least:  # noqa: PLR0124 - NaN
+            return
+        square, up, off = found
+        if stance.state:  # not flat on its tracks
+            square += up
+        spins = square > SPIN * least * abs(least) - SPIN_LESS
+        if off > HARD * gravity[2] * min(least - LOW, HARD_UP_TO):
+            self.episodes.hard_at = felt.elapsed
+        if spins or felt.elapsed - self.episodes.hard_at < BACK:
+            self._look(now, gravity, angles, (spins, rate))
         elif self.busy:
             self._feed(now, (CALMEST,) * 4)
 
-    def _look(self, now: int, gravity: Vector, angles: Four, which: tuple[bool, bool, int]) -> None:
-        """Compute the margins; `which`: whether it spins, is pushed, and how the rate is known."""
-        spins, pushed, rate = which
+    def _look(self, now: int, gravity: Vector, angles: Four, which: tuple[bool, int]) -> None:
+        """Look closer at a message: `which` says whether the robot spins, and how that is known."""
+        spins, rate = which
+        felt, of = self.filter, self.episodes
+        pushed = felt.elapsed - of.hard_at < BACK and self._pushed(gravity)
+        if not (spins or pushed):
+            if self.busy:
+                self._feed(now, (CALMEST,) * 4)
+            return
         margin, effective, against, _ = self.margins(gravity)
         turning = certain = unloaded = lift = CALMEST
         if spins:
             turning = tuple(
                 [-m if a - m > MATTERS else NOTHING for m, a in zip(margin, angles, strict=True)]
             )
-            _, _, _, _, _, _, *spin, _, _, _, _, _, _, lx, ly, lz, _ = self.filter.state
-            if rate == UNWITNESSED or witnessed(spin[:3], gravity, (lx, ly, lz)):
+            if (
+                rate == UNWITNESSED
+                or no_witness(self.settings.imu)
+                or witnessed(felt.state[6:9], gravity, felt.state[15:17])
+            ):
                 certain = turning
-        of = self.episodes
-        if pushed and of.believed(self.filter.elapsed):
-            of.step(self.filter.elapsed, self.filter.step_s, effective, against)
+        if pushed:
+            of.step(felt.elapsed, felt.step_s, effective, against)
             unloaded, lift = tuple([-x for x in effective]), tuple(of.turn)
         self._feed(now, (turning, certain, unloaded, lift))
+
+    def _pushed(self, gravity: Vector) -> bool:
+        """Return whether the push is to be believed: the ground presses, and gravity is measured."""
+        felt, of = self.filter, self.episodes
+        vx, vy, vz = felt.state[3:6]
+        gx, gy, gz = gravity
+        if vx * gx + vy * gy + vz * gz > (1.0 - FALL) * self.settings.robot.gravity**2:
+            return False
+        mx, my, mz = felt.state[12:15]
+        if mx * mx + my * my + mz * mz <= TRUE * TRUE and felt.elapsed >= LEARNT:
+            of.trusted_at = felt.elapsed
+        return of.believed(felt.elapsed)
 
     def margins(self, gravity: Vector) -> tuple[Four, ...]:
         """Return the four results of model/tipping.py for the newest message and stance."""
@@ -241,9 +251,10 @@ class ChassisMotion:
         if self._inertia[0] is not self.stands:
             self._inertia = self.stands, inertia_of(self.mechanics).one(*q, load.mass, *load.cog)
         kernel = stance_kernel(self.mechanics, stance, self.settings.imu.position)
-        _, _, _, fx, fy, fz, px, py, pz, qx, qy, qz, *_ = self.filter.state
-        alpha = ((px - qx) / FORCE, (py - qy) / FORCE, (pz - qz) / FORCE)
-        felt = (*gravity, fx, fy, fz, px, py, pz, *alpha)
+        _, _, _, vx, vy, vz, px, py, pz, qx, qy, qz, *_ = self.filter.state
+        gx, gy, gz = gravity
+        alpha = ((px - qx) / PUSH, (py - qy) / PUSH, (pz - qz) / PUSH)
+        felt = (*gravity, vx - gx, vy - gy, vz - gz, px, py, pz, *alpha)
         return kernel.one(*stance.terms, stance.mass, *self._inertia[1], *felt)
 
     def moving(self, gravity: Vector, angles: Four) -> Four | None:
@@ -272,14 +283,13 @@ class ChassisMotion:
 def witnessed(rate: Sequence[Any], gravity: Sequence[Any], before: Sequence[Any]) -> Any:  # noqa: ANN401 - bool or array
     """Return whether the orientation turns as the gyro says: by WITNESS of its rate or more.
 
-    `rate` (rad/s), gravity now and filtered (m/s2), each three floats or arrays, in base axes. A
-    gyro in other units, or an orientation that is stuck, differ by far more.
+    `rate` (rad/s) and `gravity` (m/s2, both three floats or arrays), and the x and y of gravity
+    filtered `before`, in base axes. A gyro in other units, or an orientation that is stuck, differ
+    by far more.
     """
-    (px, py, _), (gx, gy, gz), (lx, ly, lz) = rate, gravity, before
-    dx, dy, dz = gx - lx, gy - ly, gz - lz
-    along = px * (dy * gz - dz * gy) + py * (dz * gx - dx * gz)
-    size = FORCE * (gx * gx + gy * gy + gz * gz)
-    return along >= WITNESS * size * (px * px + py * py)
+    (px, py, _), (gx, gy, gz), (lx, ly) = rate, gravity, before
+    along = (py * (gx - lx) - px * (gy - ly)) * -gz
+    return along >= WITNESS * PUSH * (gx * gx + gy * gy + gz * gz) * (px * px + py * py)
 
 
 def reach_of(mechanics: Mechanics, imu: Vector) -> float:
@@ -290,12 +300,9 @@ def reach_of(mechanics: Mechanics, imu: Vector) -> float:
     return max((math.dist(foot, imu) for foot in feet), default=0.0)
 
 
-def rate_of(omega_covariance_0: float, covariance_0: float, imu: ImuInput) -> int:
-    """Return how the rate of a message is known, from the covariances of rate and orientation."""
-    if omega_covariance_0 == -1.0:
-        return NO_RATE
-    alone = covariance_0 == -1.0 or imu.attitude == 'accelerometer' or imu.specific_force
-    return UNWITNESSED if alone else WITNESSED
+def no_witness(imu: ImuInput) -> bool:
+    """Return whether gravity comes from the accelerometer: no orientation witnesses the rate."""
+    return imu.attitude == 'accelerometer' or imu.specific_force
 
 
 def stance_kernel(mechanics: Mechanics, stance: Stance, imu: Vector) -> Kernel:
