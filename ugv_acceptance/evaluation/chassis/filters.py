@@ -27,6 +27,8 @@ LONGEST_STEP, SETTLED, LEARNT = 200_000_000, 100_000_000, 500_000_000
 SLOWEST = 0.0221
 # A force (m/s2) beyond this is a shock, which tips nothing: it counts as one of this size.
 SHOCK = 20.0
+# Rows of a piece of a recursion, and of a block: what fits the processor's cache.
+PIECE, BLOCK = 12, 2048
 # Stamps (ns) that step further than this say nothing about time.
 STAMP_STEP = 1_000_000_000
 
@@ -94,10 +96,8 @@ class ChassisFilter:
         if dt != self.step_s:
             self.step_s, self._keep = dt, (math.exp(-dt / PUSH), math.exp(-dt / RATE))
         f, r = self._keep
-        paced = m = dt / min(self.elapsed * 1e-9 + dt + dt, MEAN)
-        if not self.elapsed:
-            paced = 1.0
         self.elapsed += step
+        m = dt / min(self.elapsed * 1e-9 + dt, MEAN)
         ux, uy, uz, vx, vy, vz, px, py, pz, qx, qy, qz, mx, my, mz, lx, ly, pace = self.state
         ux = ax + f * (ux - ax)
         uy = ay + f * (uy - ay)
@@ -108,7 +108,7 @@ class ChassisFilter:
         vx, vy, vz = ux + f * (vx - ux), uy + f * (vy - uy), uz + f * (vz - uz)
         qx, qy, qz = px + f * (qx - px), py + f * (qy - py), pz + f * (qz - pz)
         mx, my, mz = mx + m * (ux - mx), my + m * (uy - my), mz + m * (uz - mz)
-        lx, ly, pace = gx + f * (lx - gx), gy + f * (ly - gy), pace + paced * (dt - pace)
+        lx, ly, pace = gx + f * (lx - gx), gy + f * (ly - gy), pace + m * (dt - pace)
         of = (ux, uy, uz, vx, vy, vz, px, py, pz, qx, qy, qz, mx, my, mz, lx, ly, pace)
         self.state = of
         if pace > SLOWEST or self.elapsed < SETTLED:
@@ -125,26 +125,30 @@ class ChassisFilter:
         steps, fresh, good = self._steps(time, stamp, omega, force, gravity)
         elapsed, began = self._since(steps, fresh)
         step = steps * 1e-9
-        size = np.sqrt((force * force).sum(axis=0))
-        force = np.where(size > SHOCK, force * (SHOCK / size), force)
-        push = self._turned(force) + gravity
-        x = np.where(good, np.concatenate((push, gravity[:2], self._turned(omega))), 0.0)
-        f = np.where(fresh, 0.0, np.exp(-step / PUSH))
-        r = np.where(fresh, 0.0, np.exp(-step / RATE))
-        new = np.where(fresh, 1.0, step / np.minimum(elapsed * 1e-9 + step, MEAN))
-        before = np.array(self.state)
-        once = recursion(f, x[:5], before[[0, 1, 2, 15, 16]])
-        rate = recursion(r, x[5:], before[6:9])
-        push, lagging = once[:3], np.concatenate((once[:3], rate))
-        twice = recursion(f, lagging, before[[3, 4, 5, 9, 10, 11]])
-        mean = recursion(1.0 - new, push, before[12:15])
-        second = np.concatenate(([self.running and self.elapsed == 0], fresh[:-1])) & ~fresh
-        pace = recursion(np.where(second, 0.0, 1.0 - new), step[None], before[17:])
-        last = (push, twice[:3], rate, twice[3:], mean, once[3:], pace)
-        self.state = tuple(np.concatenate([part[:, -1] for part in last]).tolist())
+        y = np.empty((len(_NO_STATE), len(step)))
+        for first in range(0, len(step), BLOCK):
+            part = slice(first, first + BLOCK)
+            x = (self._pushes(force[:, part], gravity[:, part]), gravity[:2, part])
+            x = np.concatenate((*x, self._turned(omega[:, part]), step[None, part]))
+            if not good[part].all():
+                x = np.where(good[part], x, 0.0)
+            keep = np.empty((3, x.shape[1]))
+            keep[0], keep[1] = np.exp(step[part] / -PUSH), np.exp(step[part] / -RATE)
+            keep[2] = 1.0 - step[part] / np.minimum(elapsed[part] * 1e-9 + step[part], MEAN)
+            keep[:, fresh[part]] = 0.0
+            y[:, part] = _filtered(keep, x, np.array(self.state))
+            self.state = tuple(y[:, part][:, -1].tolist())
         self.elapsed, self.running = int(elapsed[-1]), bool(good[-1])
         self._stamp, self._time = int(stamp[-1]), int(time[-1])
-        return FeltRows(step, elapsed, began, twice[:3], rate, twice[3:], mean, once[3:], pace[0])
+        return FeltRows(step, elapsed, began, y[3:6], y[6:9], y[9:12], y[12:15], y[15:17], y[17])
+
+    def _pushes(self, force: Floats, gravity: Floats) -> Floats:
+        """Return what the accelerometer feels beside gravity (3, n), in base axes."""
+        size = (force * force).sum(axis=0)
+        if (size > SHOCK * SHOCK).any():
+            force = np.where(size > SHOCK * SHOCK, force * (SHOCK / np.sqrt(size)), force)
+        push: Floats = self._turned(force) + gravity
+        return push
 
     def _steps(
         self, time: Times, stamp: Times, omega: Floats, force: Floats, gravity: Floats
@@ -192,28 +196,78 @@ class FeltRows:
     pace: Floats
 
 
+def _filtered(keep: Floats, x: Floats, before: Floats) -> Floats:
+    """Return all filters' outputs (18, n), as ChassisFilter's `state`, for a part of the messages.
+
+    `keep` (3, n) are the shares kept by filters of PUSH, RATE and MEAN; `x` (9, n) is push (3), x
+    and y of gravity, rate (3), and step; `before` (18,) the state before.
+    """
+    n = len(keep[0])
+    f, r, m = (Keep.of(line) for line in keep)
+    x = in_pieces(x, 0.0)
+    once = f.run(x[:, :5], before[[0, 1, 2, 15, 16]])
+    rate = r.run(x[:, 5:8], before[6:9])
+    twice = f.run(np.concatenate((once[:, :3], rate), axis=1), before[[3, 4, 5, 9, 10, 11]])
+    mean = m.run(np.concatenate((once[:, :3], x[:, 8:]), axis=1), before[[12, 13, 14, 17]])
+    push, level = once[:, :3], once[:, 3:]
+    parts = (push, twice[:, :3], rate, twice[:, 3:], mean[:, :3], level, mean[:, 3:])
+    return in_rows(np.concatenate(parts, axis=1), n)
+
+
 def recursion(keep: Floats, x: Floats, before: Floats) -> Floats:
     """Return y[k] = x[k] + keep[k] (y[k - 1] - x[k]) along the last axis, shape (r, n).
 
-    `keep` (n,), `x` (r, n), `before` (r,) is y[-1]. The rows are cut into about sqrt(n) pieces that
-    run side by side, and what each carries on into the next is added after.
+    `keep` (n,), `x` (r, n), `before` (r,) is y[-1].
     """
-    n = len(keep)
-    length = max(1, math.isqrt(n))
-    count = -(-n // length)
-    pad = count * length - n
-    kept = np.concatenate((keep, np.ones(pad))).reshape(count, length).T.copy()
-    gain = x * (1.0 - keep)
-    gain = np.concatenate((gain, np.zeros((len(x), pad))), axis=1)
-    y = gain.reshape(len(x), count, length).transpose(2, 0, 1).copy()
-    product = kept.copy()
-    for k in range(1, length):
-        y[k] += kept[k] * y[k - 1]
-        product[k] *= product[k - 1]
-    carried = np.empty((len(x), count))
-    value = before
-    for c in range(count):
-        carried[:, c] = value
-        value = y[-1, :, c] + product[-1, c] * value
-    y += product[:, None, :] * carried
-    return y.transpose(1, 2, 0).reshape(len(x), -1)[:, :n]
+    return in_rows(Keep.of(keep).run(in_pieces(x, 0.0), before), len(keep))
+
+
+def in_pieces(x: Floats, pad: float) -> Floats:
+    """Return `x` (r, n) cut into pieces of PIECE rows that run side by side: (PIECE, r, pieces)."""
+    rows, n = x.shape
+    count = -(-n // PIECE)
+    padded = np.full((rows, count, PIECE), pad)
+    padded.reshape(rows, -1)[:, :n] = x
+    return padded.transpose(2, 0, 1).copy()
+
+
+def in_rows(y: Floats, n: int) -> Floats:
+    """Return the first `n` rows of pieces in their order: the inverse of `in_pieces`, (r, n)."""
+    found: Floats = y.transpose(1, 2, 0).reshape(y.shape[1], -1)[:, :n]
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """What a filter keeps of its last output at each row, in pieces: (PIECE, 1, pieces).
+
+    `product` is that since the beginning of the piece.
+    """
+
+    share: Floats
+    product: Floats
+
+    @classmethod
+    def of(cls, keep: Floats) -> 'Keep':
+        """Return it for shares (n,)."""
+        share = in_pieces(keep[None], 1.0)
+        return cls(share, np.multiply.accumulate(share, axis=0))
+
+    def run(self, x: Floats, before: Floats) -> Floats:
+        """Return the filter's output for `x` (PIECE, r, pieces); `before` (r,) is that before.
+
+        What a piece carries on into the next is added after; it is a recursion over the pieces.
+        """
+        y = x * (1.0 - self.share)
+        for k in range(1, PIECE):
+            y[k] += self.share[k] * y[k - 1]
+        carried = before[:, None]
+        if y.shape[2] > 1:
+            keep, gain = self.product[-1, 0, :-1], y[-1, :, :-1]
+            inner = Keep.of(keep)
+            # As an input that, weighted by 1 - keep, gives what the piece adds: 0 where all is kept.
+            with np.errstate(all='ignore'):
+                given = np.where(keep < 1.0, gain / (1.0 - keep), 0.0)
+            carried = np.concatenate((carried, in_rows(inner.run(in_pieces(given, 0.0), before), len(keep))), axis=1)
+        y += self.product * carried
+        return y
