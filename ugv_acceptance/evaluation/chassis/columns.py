@@ -143,7 +143,7 @@ def _compare(
     which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
     front, left, rear, right = rows.angle.T
     least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
-    judged = (felt.elapsed >= SETTLED) & (felt.pace <= SLOWEST) & gyro & ~np.isnan(least)
+    judged = (felt.elapsed >= SETTLED) & (felt.pace <= SLOWEST) & gyro & (least > 0.0)
     judged &= rows.known[which]
     (px, py, pz), (mx, my, mz) = felt.rate, felt.mean
     flat, up = px * px + py * py, pz * pz

@@ -192,7 +192,7 @@ class ChassisMotion:
         if stands is None or angles is None or not rate or not self.turned:
             return
         least, stance = min(angles), stands[0]
-        if stance.edges is None or least != least:  # noqa: PLR0124 - NaN
+        if stance.edges is None or not least > 0.0:  # past tipping at rest: TIP_OVER says it all
             return
         square, up, off = found
         if stance.state:  # not flat on its tracks
