@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import feed
-from ugv_acceptance.evaluation.chassis.columns import take_columns
+from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
@@ -73,7 +73,7 @@ class RecordedEvaluator:
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
-    _chassis: ChassisMotion = field(init=False)
+    _chassis: ChassisColumns = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
@@ -87,7 +87,7 @@ class RecordedEvaluator:
         self._mechanics = mechanics_of(robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self._chassis = ChassisMotion(self.settings, self.watch.chassis)
+        self._chassis = ChassisColumns(ChassisMotion(self.settings, self.watch.chassis))
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
@@ -141,7 +141,7 @@ class RecordedEvaluator:
         rows = self._margins(newest, load)
         lost = self._lost(rows)
         self._watch_pairs(rows, lost)
-        chassis = take_columns(self._chassis, batch.imu, rows, load, (lost.place, lost.time))
+        chassis = self._chassis.take(batch.imu, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]

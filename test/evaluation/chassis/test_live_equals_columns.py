@@ -10,7 +10,7 @@ from evaluation.test_live_equals_recorded import compare
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ugv_acceptance.evaluation.chassis.filters import ChassisFilter, recursion
+from ugv_acceptance.evaluation.chassis.filter_columns import recursion
 from ugv_acceptance.evaluation.settings import Delays, ImuInput
 from ugv_acceptance.model.robot import IDENTITY
 

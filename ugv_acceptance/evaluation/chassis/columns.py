@@ -1,18 +1,26 @@
 """motion.py for columns: the IMU messages of a part of a recording, with the same alerts.
 
-Filters and comparison run on whole columns; the margins are computed for the rows in which the
-robot turns or is pushed, and only the episodes of those are gone through one by one.
+What filters could give at most is found for groups of rows; filters and margins are computed only
+where the robot may turn or be pushed, and only the episodes of that are gone through row by row.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import feed
-from ugv_acceptance.evaluation.chassis.filters import LEARNT, PUSH, SETTLED, SLOWEST, FeltRows
+from ugv_acceptance.evaluation.chassis.filter_columns import (
+    GROUP,
+    RawColumns,
+    RawRows,
+    bounds,
+    filtered,
+    stretches,
+)
+from ugv_acceptance.evaluation.chassis.filters import BLOCK, PUSH
 from ugv_acceptance.evaluation.chassis.motion import (
     BACK,
     FALL,
@@ -26,7 +34,6 @@ from ugv_acceptance.evaluation.chassis.motion import (
     NOTHING,
     SPIN,
     SPIN_LESS,
-    TRUE,
     ChassisMotion,
     no_witness,
     stance_kernel,
@@ -43,63 +50,118 @@ from ugv_acceptance.model.tipping import inertia_of
 from ugv_acceptance.type_aliases import Floats, Times
 
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 Lost = tuple[NDArray[np.intp], Times]
-_Standout = tuple[NDArray[np.intp], Floats, Floats, Mask, Mask]
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Columns of a part of a recording, one row an IMU message.
+    """IMU messages of a part of a recording that may be anything but calm, one row each.
 
-    `which` are the rows of margins, `gravity` (3, n) m/s2; `judged` says where all is there that is
-    needed, `alone` where no orientation shows the rate, `true` where the accelerometer shows gravity,
-       `spins` and `pushed` where margins are computed. `trusted_at` and `hard_at` (n,) are those of
-    Episodes after each row.
+    `at` (m,) is which of the part's messages, `which` its row of margins; `elapsed`, `step` (ns)
+    those of the filters, `segment` counts how often these began anew in the part. `y` (11, m) is
+    what they gave, `gravity` (3, m) m/s2. `true` and `alone` say where the accelerometer shows
+    gravity, and where no orientation witnesses the rate.
     """
 
-    time: Times
-    felt: FeltRows
+    at: Indices
+    which: Indices
+    elapsed: Times
+    step: Times
+    segment: Times
+    y: Floats
     gravity: Floats
-    which: NDArray[np.intp]
-    judged: Mask
-    alone: Mask
     true: Mask
-    spins: Mask
-    pushed: Mask
-    trusted_at: Times
-    hard_at: Times
+    alone: Mask
 
 
-def take_columns(
-    motion: ChassisMotion,
-    segments: Sequence[ImuColumns],
-    rows: MarginRows,
-    load: Sequence[Any],
-    lost: Lost,
-) -> ChassisRows:
-    """Take the IMU messages of a part of a recording; feed the signals; return what stands out.
+@dataclass(slots=True)
+class ChassisColumns:
+    """Takes the IMU messages of a recording part by part, with the signals of `motion`."""
 
-    `rows` are the margins of the part, `load` mass and centre of gravity (floats or arrays) of the
-    payload in each row of `rows.pairs.joints`; `lost` when margins became unknown: before which
-    known row, and the time (ns).
-    """
-    columns = [s for s in segments if len(s.log_time)]
-    if not columns:
-        for time in lost[1] if motion.busy else ():
-            motion.lose(int(time))
-        return NO_CHASSIS_ROWS
-    with np.errstate(all='ignore'):
-        time, stamp, vectors, measured, alone = _in_order(columns, motion.settings.imu)
-        felt = motion.filter.columns(
-            time, stamp, vectors[:3], vectors[3:], rows.pairs.imu.gravity[1:].T
+    motion: ChassisMotion
+    raw: RawColumns = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.raw = RawColumns(self.motion.filter.mounting)
+
+    def take(
+        self, segments: Sequence[ImuColumns], rows: MarginRows, load: Sequence[Any], lost: Lost
+    ) -> ChassisRows:
+        """Take a part: feed the signals; return what stands out.
+
+        `rows` are its margins, `load` mass and centre of gravity (floats or arrays) of the payload
+        in each row of `rows.pairs.joints`; `lost` when margins became unknown: before which known
+        row, and the time (ns).
+        """
+        columns = [s for s in segments if len(s.log_time)]
+        motion = self.motion
+        if not columns:
+            for time in lost[1] if motion.busy else ():
+                motion.lose(int(time))
+            return NO_CHASSIS_ROWS
+        with np.errstate(all='ignore'):
+            time, stamp, vectors, measured, alone = _in_order(columns, motion.settings.imu)
+            gravity = rows.pairs.imu.gravity[1:].T
+            raw = self.raw.take(time, stamp, vectors, gravity)
+            gyro = measured & _turned(motion, vectors[:3])
+            which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
+            front, left, rear, right = rows.angle.T
+            least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
+            true, fast = raw.true[raw.lead :], raw.fast[raw.lead :]
+            judged = fast & gyro & (least > 0.0) & rows.known[which]
+            raised = rows.state[which] != STANDING
+            limits = _limits(least, raised, gravity)
+            part = self._part(raw, which, judged, limits, (gravity, alone))
+            found = _judge(motion, part, rows, load, tuple(x[part.at] for x in limits))
+            _go_on(motion, part, int(raw.fresh[raw.lead :].sum()))
+            _feed(motion, (time, judged, which), rows, (part.at, *found.values), lost)
+        known, step = rows.known[which], raw.step[raw.lead :] * 1e-9
+        believed = judged & true
+        believed[part.at] |= found.believed
+        slow = known & ~fast & (raw.elapsed[raw.lead :] >= BLOCK)
+        seconds = (
+            float(step[mask].sum()) for mask in (known, judged, believed, known & ~gyro, slow)
         )
-        gyro = measured & _turned(motion, vectors[:3])
-        part = _compare(motion, (time, felt), rows, (gyro, alone))
-        values, found, believed = _judge(motion, part, rows, load)
-        _feed(motion, part, rows, values, lost)
-    known = rows.known[part.which]
-    masks = (known, part.judged, part.true | believed, known & ~gyro, known & (felt.pace > SLOWEST))
-    return ChassisRows(*found, *(float(felt.step[mask].sum()) for mask in masks))
+        return ChassisRows(*found.columns, *seconds)
+
+    def _part(
+        self,
+        raw: RawRows,
+        which: Indices,
+        judged: Mask,
+        limits: tuple[Floats, Floats, Mask],
+        told: tuple[Floats, Mask],
+    ) -> _Part:
+        """Return the judged rows that may not be calm, filtered."""
+        lead, (gravity, alone) = raw.lead, told
+        spin, hard, raised = limits
+        n = len(which)
+        bound = bounds(raw, self.motion.filter.reach)
+        flat, up, off = (
+            np.repeat(b, GROUP)[lead : lead + n] for b in (bound.flat, bound.up, bound.off)
+        )
+        pushed = judged & (off > hard)
+        elapsed, segment = raw.elapsed[lead:], np.cumsum(raw.fresh[lead:])
+        at = _last(elapsed, segment, pushed, self.motion.episodes.hard_at)
+        wanted = judged & ((np.where(raised, flat + up, flat) > spin) | (elapsed - at < BACK))
+        at = np.flatnonzero(wanted)
+        y = np.empty((11, len(at)))
+        done = 0
+        for warm, first, end in stretches(raw, np.concatenate((np.zeros(lead, np.bool_), wanted))):
+            some = at[done : done + int(wanted[first - lead : end - lead].sum())]
+            y[:, done : done + len(some)] = filtered(raw, warm, end)[:, some + lead - warm]
+            done += len(some)
+        return _Part(
+            at, which[at], elapsed[at], raw.step[lead:][at], segment[at], y, gravity[:, at],
+            raw.true[lead:][at], alone[at],
+        )  # fmt: skip
+
+
+def _limits(least: Floats, raised: Mask, gravity: Floats) -> tuple[Floats, Floats, Mask]:
+    """Return the squared rate and the push from which a row is looked at closer, and `raised`."""
+    spin = SPIN * least * np.abs(least) - SPIN_LESS
+    return spin, HARD * gravity[2] * np.minimum(least - LOW, HARD_UP_TO), raised
 
 
 def _in_order(
@@ -132,145 +194,123 @@ def _turned(motion: ChassisMotion, omega: Floats) -> Mask:
     return turned
 
 
-def _compare(
-    motion: ChassisMotion,
-    felt_at: tuple[Times, FeltRows],
-    rows: MarginRows,
-    known: tuple[Mask, Mask],
-) -> _Part:
-    """Return the part with the rows in which the robot turns, or is or was just pushed."""
-    (time, felt), (gyro, alone) = felt_at, known
-    which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
-    front, left, rear, right = rows.angle.T
-    least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
-    judged = (felt.elapsed >= SETTLED) & (felt.pace <= SLOWEST) & gyro & (least > 0.0)
-    judged &= rows.known[which]
-    (px, py, pz), (mx, my, mz) = felt.rate, felt.mean
-    flat, up = px * px + py * py, pz * pz
-    square = np.where(rows.state[which] == STANDING, flat, flat + up)
-    spins = judged & (square > SPIN * least * np.abs(least) - SPIN_LESS)
-    true = judged & (felt.elapsed >= LEARNT) & (mx * mx + my * my + mz * mz <= TRUE * TRUE)
-    of, gravity = motion.episodes, rows.pairs.imu.gravity[1:].T
-    alpha = np.abs(felt.rate - felt.lagging).sum(axis=0) / PUSH
-    off = np.sqrt((felt.push * felt.push).sum(axis=0)) + motion.filter.reach * (alpha + flat + up)
-    hard = judged & (off > HARD * gravity[2] * np.minimum(least - LOW, HARD_UP_TO))
-    hard_at = _last(felt, hard, of.hard_at)
-    most = (1.0 - FALL) * motion.settings.robot.gravity**2
-    pushed = judged & (felt.elapsed - hard_at < BACK)
-    pushed &= (felt.push * gravity).sum(axis=0) <= most
-    trusted_at = _last(felt, pushed & true, of.trusted_at)
-    pushed &= felt.elapsed - trusted_at <= HELD
-    return _Part(
-        time, felt, gravity, which, judged, alone, true, spins, pushed, trusted_at, hard_at
-    )
+def _last(elapsed: Times, segment: Times, mask: Mask, before: int) -> Times:
+    """Return `elapsed` of when `mask` was last true in the segment; LONG_AGO if it was not.
 
-
-def _last(felt: FeltRows, mask: Mask, before: int) -> Times:
-    """Return `elapsed` of when `mask` was last true, in each row; LONG_AGO if not since the start.
-
-    `before` is that of before these rows.
+    `before` is that of before these rows, in whose segment (0) they begin.
     """
     place = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
-    at = np.where(place >= 0, felt.elapsed[place], LONG_AGO)
-    at[(place < felt.began) & (felt.began >= 0)] = LONG_AGO
-    at[(place < 0) & (felt.began < 0)] = before
-    return at
+    here = (place >= 0) & (segment[place] == segment)
+    return np.where(here, elapsed[place], np.where(segment == 0, before, LONG_AGO))
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """The signals' values in the part's rows, the first fields of ChassisRows, and ...
+
+    ... in which rows the accelerometer was believed, if only for the sake of an episode.
+    """
+
+    values: tuple[Floats, ...]
+    columns: tuple[Indices, Floats, Floats, Mask, Mask]
+    believed: Mask
 
 
 def _judge(
-    motion: ChassisMotion, part: _Part, rows: MarginRows, load: Sequence[Any]
-) -> tuple[list[Floats], _Standout, Mask]:
-    """Return the values of the signals, the first fields of ChassisRows, and ...
-
-    ... where the accelerometer was believed for the sake of an episode. No values: none matters.
-    """
-    some = np.flatnonzero(part.spins | part.pushed)
-    shape = (len(part.time), len(SIDES))
-    values = [np.full(shape, NOTHING) for _ in range(4)] if len(some) or motion.busy else []
-    believed = np.zeros(shape[0], np.bool_)
-    if not len(some):
-        _go_on(motion, part, -1)
-        none = NO_CHASSIS_ROWS.moving
-        return values, (some, none, none, none > 0.0, none > 0.0), believed
-    margin, effective, against, frequency = _margins(motion, part, rows, load, some)
-    turns = part.spins[some, None] & (rows.angle[part.which[some]] - margin > MATTERS)
-    values[0][some] = np.where(turns, -margin, NOTHING)
-    felt = part.felt
-    sure = part.alone[some] | witnessed(
-        felt.rate[:, some], part.gravity[:, some], felt.level[:, some]
-    )
-    values[1][some] = np.where(sure[:, None], values[0][some], NOTHING)
-    denied = (values[0][some] >= 0.0) & ~sure[:, None]
-    of, segment = motion.episodes, -1
-    for k in np.flatnonzero(part.pushed[some]).tolist():
-        row = int(some[k])
-        segment = _begin(motion, part, row, segment)
-        elapsed, of.trusted_at = int(felt.elapsed[row]), int(part.trusted_at[row])
-        if of.believed(elapsed):
-            of.step(elapsed, float(felt.step[row]), effective[k].tolist(), against[k].tolist())
-            believed[row], values[2][row], values[3][row] = True, -effective[k], of.turn
-            denied[k] |= of.contradicted(frequency[k].tolist())
-    _go_on(motion, part, segment)
-    found = part.which[some], -values[1][some], -values[2][some], values[3][some] >= LIFT, denied
-    return values, found, believed
-
-
-def _begin(motion: ChassisMotion, part: _Part, row: int, segment: int) -> int:
-    """Forget the episodes if the filters began anew since `segment`; return in which row."""
-    began = int(part.felt.began[row])
-    if began != segment:
-        motion.episodes.begin()
-    return began
-
-
-def _go_on(motion: ChassisMotion, part: _Part, segment: int) -> None:
-    """Leave the episodes as the last row does."""
-    _begin(motion, part, -1, segment)
-    motion.episodes.trusted_at = int(part.trusted_at[-1])
-    motion.episodes.hard_at = int(part.hard_at[-1])
-
-
-def _margins(
     motion: ChassisMotion,
     part: _Part,
     rows: MarginRows,
     load: Sequence[Any],
-    some: NDArray[np.intp],
+    limits: tuple[Floats, Floats, Mask],
+) -> _Found:
+    """Look closer at a part's rows."""
+    spin, hard, raised = limits
+    push, rate, lagging, level = part.y[:3], part.y[3:6], part.y[6:9], part.y[9:]
+    flat, up = rate[0] * rate[0] + rate[1] * rate[1], rate[2] * rate[2]
+    spins = np.where(raised, flat + up, flat) > spin
+    off = np.sqrt((push * push).sum(axis=0))
+    off += motion.filter.reach * (np.abs(rate - lagging).sum(axis=0) / PUSH + flat + up)
+    of = motion.episodes
+    hard_at = _last(part.elapsed, part.segment, off > hard, of.hard_at)
+    pushed = part.elapsed - hard_at < BACK
+    most = (1.0 - FALL) * motion.settings.robot.gravity**2
+    pushed &= (push * part.gravity).sum(axis=0) <= most
+    trusted_at = _last(part.elapsed, part.segment, pushed & part.true, of.trusted_at)
+    pushed &= part.elapsed - trusted_at <= HELD
+    margin, effective, against, frequency = _margins(motion, part, rows, load, spins | pushed)
+    values = [np.full(margin.shape, NOTHING) for _ in range(4)]
+    turns = spins[:, None] & (rows.angle[part.which] - margin > MATTERS)
+    values[0] = np.where(turns, -margin, NOTHING)
+    sure = part.alone | witnessed(rate, part.gravity, level)
+    values[1] = np.where(sure[:, None], values[0], NOTHING)
+    denied = (values[0] >= 0.0) & ~sure[:, None]
+    believed, segment = np.zeros(len(part.at), np.bool_), 0
+    for k in np.flatnonzero(pushed).tolist():
+        if part.segment[k] != segment:
+            segment = int(part.segment[k])
+            of.begin()
+        elapsed, of.trusted_at = int(part.elapsed[k]), int(trusted_at[k])
+        if of.believed(elapsed):
+            of.step(elapsed, float(part.step[k]) * 1e-9, effective[k].tolist(), against[k].tolist())
+            believed[k], values[2][k], values[3][k] = True, -effective[k], of.turn
+            denied[k] |= of.contradicted(frequency[k].tolist())
+    if len(part.at):
+        if part.segment[-1] != segment:
+            of.begin()
+        of.trusted_at, of.hard_at = int(trusted_at[-1]), int(hard_at[-1])
+    columns = part.which, -values[1], -values[2], values[3] >= LIFT, denied
+    return _Found(tuple(values), columns, believed)
+
+
+def _go_on(motion: ChassisMotion, part: _Part, segment: int) -> None:
+    """Forget the episodes if the filters began anew after the last row that was looked at."""
+    if segment and (not len(part.at) or part.segment[-1] != segment):
+        motion.episodes.begin()
+
+
+def _margins(
+    motion: ChassisMotion, part: _Part, rows: MarginRows, load: Sequence[Any], some: Mask
 ) -> list[Floats]:
-    """Return the four results of model/tipping.py for some IMU rows, each (m, 4)."""
-    j = rows.pairs.of_joints[part.which[some]]
+    """Return the four results of model/tipping.py, each (m, 4); NaN but for `some` rows."""
+    table = np.full((4, len(some), len(SIDES)), np.nan)
+    at = np.flatnonzero(some)
+    if not len(at):
+        return list(table)
+    j = rows.pairs.of_joints[part.which[at]]
     q = list(rows.pairs.joints.q[j].T)
     mass, *cog = [x[j] if isinstance(x, np.ndarray) else x for x in load]
     posture = posture_of(motion.mechanics, q, mass, (cog[0], cog[1], cog[2]))
-    inertia = tuple(
-        np.broadcast_to(x, len(some)) for x in inertia_of(motion.mechanics).run(*q, mass, *cog)
-    )
-    felt = part.felt
-    alpha = (felt.rate - felt.lagging) / PUSH
-    vectors = tuple(np.vstack((part.gravity, felt.push - part.gravity, felt.rate, alpha))[:, some])
-    table = np.full((4, len(some), len(SIDES)), np.nan)
-    for of, stance in stances_of(motion.mechanics, posture, len(some)):
+    inertia = inertia_of(motion.mechanics).run(*q, mass, *cog)
+    gravity, push, rate, lagging = part.gravity, part.y[:3], part.y[3:6], part.y[6:9]
+    felt = np.concatenate((gravity, push - gravity, rate, (rate - lagging) / PUSH))[:, at]
+    for of, stance in stances_of(motion.mechanics, posture, len(at)):
         if stance.edges is None:
             continue
         kernel = stance_kernel(motion.mechanics, stance, motion.settings.imu.position)
-        found = kernel.run(*stance.terms, stance.mass, *pick(inertia, of), *pick(vectors, of))
+        found = kernel.run(*stance.terms, stance.mass, *pick((*inertia, *felt), of))
         for k, values in enumerate(found):
             for side, value in enumerate(values):
-                table[k, of, side] = value
+                table[k, at[of], side] = value
     return list(table)
 
 
 def _feed(
-    motion: ChassisMotion, part: _Part, rows: MarginRows, values: Sequence[Floats], lost: Lost
+    motion: ChassisMotion,
+    judged_at: tuple[Times, Mask, Indices],
+    rows: MarginRows,
+    values: tuple[Any, ...],
+    lost: Lost,
 ) -> None:
-    """Feed the signals with the judged rows; with no `values` nothing is the matter in any."""
-    if not values:
+    """Feed the signals with the judged rows; what is not in `values` is calm."""
+    (time, judged, which), (at, *tables) = judged_at, values
+    if not motion.busy and not any((table > NOTHING).any() for table in tables):
         return
-    judged = part.judged
-    number = np.cumsum(rows.known)[part.which[judged]]
+    number = np.cumsum(rows.known)[which[judged]]
     place = np.searchsorted(number, lost[0], side='right')
-    time = np.insert(part.time[judged], place, lost[1])
-    for signals, table in zip(motion.signals.all(), values, strict=True):
-        for signal, value in zip(signals, table[judged].T, strict=True):
-            feed(signal, time, np.insert(value, place, NOTHING))
+    time = np.insert(time[judged], place, lost[1])
+    for signals, table in zip(motion.signals.all(), tables, strict=True):
+        for signal, value in zip(signals, table.T, strict=True):
+            whole = np.full(len(judged), NOTHING)
+            whole[at] = value
+            feed(signal, time, np.insert(whole[judged], place, NOTHING))
     motion.busy = not motion.signals.quiet()

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.chassis.motion import LIFT, TRUE
+from ugv_acceptance.evaluation.chassis.filters import TRUE
+from ugv_acceptance.evaluation.chassis.motion import LIFT
 from ugv_acceptance.evaluation.criteria.criteria import FAIL, INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.margin_table import ChassisRows, MarginRows

@@ -11,13 +11,7 @@ from itertools import chain
 from typing import Any
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
-from ugv_acceptance.evaluation.chassis.filters import (
-    LEARNT,
-    PUSH,
-    SETTLED,
-    SLOWEST,
-    ChassisFilter,
-)
+from ugv_acceptance.evaluation.chassis.filters import PUSH, ChassisFilter
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.edges import SIDES, corners_of
 from ugv_acceptance.model.kernels import Kernel
@@ -29,9 +23,9 @@ from ugv_acceptance.model.tree import point_of, pose_of
 
 Four = tuple[float, ...]
 
-# The accelerometer is believed while its mean is so near (m/s2) to gravity, and through an episode
-# that began so for at most HELD (ns).
-TRUE, HELD = 1.0, 2_000_000_000
+# The accelerometer is believed while it measures gravity in the mean (filters.py), and through an
+# episode that began so for at most HELD (ns).
+HELD = 2_000_000_000
 # Less specific force against gravity than this share of g tells no direction.
 FALL = 0.3
 # Margins (rad) of a moving robot: caution, and where caution ends.
@@ -185,7 +179,7 @@ class ChassisMotion:
         if not self.turned:
             self.turned = any(omega)
         if found is None:
-            if felt.elapsed < SETTLED:
+            if not felt.blocks.known:
                 self.episodes.begin()
             return
         stands = self.stands
@@ -223,7 +217,7 @@ class ChassisMotion:
             if (
                 rate == UNWITNESSED
                 or no_witness(self.settings.imu)
-                or witnessed(felt.state[6:9], gravity, felt.state[15:17])
+                or witnessed(felt.state[6:9], gravity, felt.state[12:])
             ):
                 certain = turning
         if pushed:
@@ -238,8 +232,7 @@ class ChassisMotion:
         gx, gy, gz = gravity
         if vx * gx + vy * gy + vz * gz > (1.0 - FALL) * self.settings.robot.gravity**2:
             return False
-        mx, my, mz = felt.state[12:15]
-        if mx * mx + my * my + mz * mz <= TRUE * TRUE and felt.elapsed >= LEARNT:
+        if felt.blocks.true:
             of.trusted_at = felt.elapsed
         return of.believed(felt.elapsed)
 
@@ -251,7 +244,7 @@ class ChassisMotion:
         if self._inertia[0] is not self.stands:
             self._inertia = self.stands, inertia_of(self.mechanics).one(*q, load.mass, *load.cog)
         kernel = stance_kernel(self.mechanics, stance, self.settings.imu.position)
-        _, _, _, vx, vy, vz, px, py, pz, qx, qy, qz, *_ = self.filter.state
+        _, _, _, vx, vy, vz, px, py, pz, qx, qy, qz, _, _ = self.filter.state
         gx, gy, gz = gravity
         alpha = ((px - qx) / PUSH, (py - qy) / PUSH, (pz - qz) / PUSH)
         felt = (*gravity, vx - gx, vy - gy, vz - gz, px, py, pz, *alpha)
@@ -259,8 +252,7 @@ class ChassisMotion:
 
     def moving(self, gravity: Vector, angles: Four) -> Four | None:
         """Return the tilt left (rad) to each of SIDES with the energy of the turn; None: no gyro."""
-        felt = self.filter
-        if not (self.turned and felt.elapsed >= SETTLED and felt.state[-1] <= SLOWEST):
+        if not (self.turned and self.filter.blocks.fast):
             return None
         if self.stands is None or self.stands[0].edges is None:
             return None
