@@ -239,20 +239,26 @@ def _judge(
     pushed &= part.elapsed - trusted_at <= HELD
     margin, effective, against, frequency = _margins(motion, part, rows, load, spins | pushed)
     values = [np.full(margin.shape, NOTHING) for _ in range(4)]
-    turns = spins[:, None] & (rows.angle[part.which] - margin > MATTERS)
+    angle = rows.angle[part.which]
+    turns = spins[:, None] & (angle - margin > MATTERS)
+    effective = np.where(angle - effective > MATTERS, effective, np.inf)
     values[0] = np.where(turns, -margin, NOTHING)
     sure = part.alone | witnessed(rate, part.gravity, level)
     values[1] = np.where(sure[:, None], values[0], NOTHING)
     denied = (values[0] >= 0.0) & ~sure[:, None]
     believed, segment = np.zeros(len(part.at), np.bool_), 0
-    for k in np.flatnonzero(pushed).tolist():
+    low_at = _last(part.elapsed, part.segment, (effective < LOW).any(axis=1), of.newest)
+    values[2][pushed] = -effective[pushed]
+    for k in np.flatnonzero(pushed & (part.elapsed - low_at < BACK)).tolist():
         if part.segment[k] != segment:
             segment = int(part.segment[k])
             of.begin()
         elapsed, of.trusted_at = int(part.elapsed[k]), int(trusted_at[k])
-        if of.believed(elapsed):
+        if not of.believed(elapsed):
+            values[2][k] = NOTHING
+        else:
             of.step(elapsed, float(part.step[k]) * 1e-9, effective[k].tolist(), against[k].tolist())
-            believed[k], values[2][k], values[3][k] = True, -effective[k], of.turn
+            believed[k], values[3][k] = True, of.turn
             denied[k] |= of.contradicted(frequency[k].tolist())
     if len(part.at):
         if part.segment[-1] != segment:

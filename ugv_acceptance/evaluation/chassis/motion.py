@@ -30,7 +30,7 @@ HELD = 2_000_000_000
 FALL = 0.3
 # Margins (rad) of a moving robot: caution, and where caution ends.
 CAUTION, CALM = math.radians(5.0), math.radians(6.0)
-# The turn counts if it takes this much (rad) of the static margin: else TIP_OVER says it all.
+# A turn or a push counts if it takes this much (rad) of the static margin: else TIP_OVER says it.
 MATTERS = math.radians(1.0)
 # An edge under effective gravity below LOW (rad) begins an episode, which lasts BACK (ns) longer. A
 # turn towards it of LIFT (rad) meanwhile is a lift, one below NONE (rad) is none.
@@ -115,10 +115,12 @@ class Episodes:
             self.turn, self.past = [0.0] * len(SIDES), [0.0] * len(SIDES)
         self.clock = elapsed
         for k, (margin, w) in enumerate(zip(effective, against, strict=True)):
+            near = elapsed - self.low_at[k] < BACK
+            turn = self.turn[k] if near else 0.0
             if margin < LOW:
                 self.low_at[k] = self.newest = elapsed
-            near = elapsed - self.low_at[k] < BACK
-            self.turn[k] = max(self.turn[k] - w * dt, 0.0) if near else 0.0
+                near = True
+            self.turn[k] = max(turn - w * dt, 0.0) if near else 0.0
             self.past[k] = self.past[k] + dt if margin < 0.0 else 0.0
 
     def contradicted(self, frequency: Sequence[float]) -> list[bool]:
@@ -221,6 +223,9 @@ class ChassisMotion:
             ):
                 certain = turning
         if pushed:
+            effective = tuple(
+                [e if a - e > MATTERS else math.inf for e, a in zip(effective, angles, strict=True)]
+            )
             of.step(felt.elapsed, felt.step_s, effective, against)
             unloaded, lift = tuple([-x for x in effective]), tuple(of.turn)
         self._feed(now, (turning, certain, unloaded, lift))
