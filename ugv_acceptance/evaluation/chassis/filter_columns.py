@@ -86,48 +86,58 @@ class RawColumns:
         """Take messages: `vectors` (6, n) rate and force in sensor axes, `gravity` (3, n)."""
         stepped, received = np.diff(stamp, prepend=self._stamp), np.diff(time, prepend=self._time)
         step = np.where((stepped > 0) & (stepped <= STAMP_STEP), stepped, received)
-        square = vectors * vectors
-        size = square[3:].sum(axis=0)
-        good = square[:3].sum(axis=0) + size + np.abs(gravity[0]) <= BELIEVABLE * BELIEVABLE
-        fresh = ~np.concatenate(([self._running], good[:-1])) | ~good
+        size = _squares(vectors[3:])
+        good = _squares(vectors[:3]) + size + np.abs(gravity[0]) <= BELIEVABLE * BELIEVABLE
+        fresh = ~(good & np.concatenate(([self._running], good[:-1])))
         fresh |= (step <= 0) | (step > LONGEST_STEP)
         step[fresh] = 0
-        x = np.concatenate((vectors[3:], gravity[:2], vectors[:3]))
-        if (size > SHOCK * SHOCK).any():
-            x[:3] = np.where(size > SHOCK * SHOCK, x[:3] * (SHOCK / np.sqrt(size)), x[:3])
-        if self.mounting is not IDENTITY:
-            x[:3], x[5:] = np.array(self.mounting) @ x[:3], np.array(self.mounting) @ x[5:]
-        x[:3] += gravity
+        x = np.empty((8, self.before.lead + len(step)))
+        self._fill(x[:, self.before.lead :], vectors, gravity, size)
         if not good.all():
-            x[:, ~good] = 0.0
+            x[:, self.before.lead :][:, ~good] = 0.0
         elapsed = np.cumsum(step)
-        began = np.maximum.accumulate(np.where(fresh, np.arange(len(step)), -1))
-        elapsed += np.where(began < 0, self._elapsed, -elapsed[began])
-        true, fast = self._tell(x[:3], elapsed, fresh, good)
+        if fresh.any():
+            began = np.maximum.accumulate(np.where(fresh, np.arange(len(step)), -1))
+            elapsed -= np.where(began < 0, -self._elapsed, elapsed[began])
+        else:
+            elapsed += self._elapsed
+        true, fast = self._tell(x[:3, self.before.lead :], elapsed, fresh, good)
         self._running, self._elapsed = bool(good[-1]), int(elapsed[-1])
         self._stamp, self._time = int(stamp[-1]), int(time[-1])
         rows = self._led(x, step, elapsed, fresh, true, fast)
         self.before = rows.newest(MEMORY)
         return rows
 
+    def _fill(self, x: Floats, vectors: Floats, gravity: Floats, size: Floats) -> None:
+        """Fill in push, gravity and rate; `size` (n,) is the square of the force."""
+        force = vectors[3:]
+        if (size > SHOCK * SHOCK).any():
+            force = np.where(size > SHOCK * SHOCK, force * (SHOCK / np.sqrt(size)), force)
+        if self.mounting is IDENTITY:
+            np.add(force, gravity, out=x[:3])
+            x[5:] = vectors[:3]
+        else:
+            np.add(np.array(self.mounting) @ force, gravity, out=x[:3])
+            x[5:] = np.array(self.mounting) @ vectors[:3]
+        x[3:5] = gravity[:2]
+
     def _led(
         self, x: Floats, step: Times, elapsed: Times, fresh: Mask, true: Mask, fast: Mask
     ) -> RawRows:
         old = self.before
         start = int(old.total[-1]) if len(old.total) else 0
+        x[:, : old.lead] = old.x
         # A new beginning counts as a second: nothing of before may be within MEMORY.
         total = start + np.cumsum(np.where(fresh, 2 * MEMORY, step))
-        one = np.concatenate
-        return RawRows(
-            old.lead,
-            one((old.x, x), axis=1),
-            one((old.step, step)),
-            one((old.elapsed, elapsed)),
-            one((old.fresh, fresh)),
-            one((old.total, total)),
-            one((old.true, true)),
-            one((old.fast, fast)),
+        pairs = (
+            (old.step, step),
+            (old.elapsed, elapsed),
+            (old.fresh, fresh),
+            (old.total, total),
+            (old.true, true),
+            (old.fast, fast),
         )
+        return RawRows(old.lead, x, *map(np.concatenate, pairs))
 
     def _tell(self, push: Floats, elapsed: Times, fresh: Mask, good: Mask) -> tuple[Mask, Mask]:
         """Return `true` and `fast` of Blocks at each row."""
@@ -162,11 +172,20 @@ class Bound:
     off: Floats
 
 
+def _squares(v: Floats) -> Floats:
+    """Return the square of the length of vectors (3, n)."""
+    x, y, z = v
+    square: Floats = x * x
+    square += y * y
+    square += z * z
+    return square
+
+
 def bounds(rows: RawRows, reach: float) -> Bound:
     """Return the bound of each group of GROUP rows, from the raw values of the last second."""
     x, n = rows.x, rows.x.shape[1]
     starts = np.arange(0, n, GROUP)
-    push = np.maximum.reduceat((x[:3] * x[:3]).sum(axis=0), starts)
+    push = np.maximum.reduceat(_squares(x[:3]), starts)
     high, low = (
         np.maximum.reduceat(x[5:], starts, axis=1),
         np.minimum.reduceat(x[5:], starts, axis=1),

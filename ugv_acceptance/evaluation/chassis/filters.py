@@ -43,15 +43,22 @@ class Blocks:
 
     def add(self, block: Block) -> None:
         """Take a block that is over."""
-        self.whole = [*self.whole[1 - BLOCKS :], block]
-        x, y, z, count = (sum(column) for column in zip(*self.whole, strict=True))
+        whole = self.whole
+        if len(whole) == BLOCKS:
+            del whole[0]
+        whole.append(block)
+        x = y = z = 0.0
+        count = 0
+        for bx, by, bz, many in whole:
+            x, y, z, count = x + bx, y + by, z + bz, count + many
         self.known = True
         self.true = x * x + y * y + z * z <= (TRUE * count) ** 2
-        self.fast = count >= FEWEST * len(self.whole)
+        self.fast = count >= FEWEST * len(whole)
 
     def forget(self) -> None:
         """Begin anew."""
-        self.whole, self.known, self.true, self.fast = [], False, False, False
+        self.whole.clear()
+        self.known = self.true = self.fast = False
 
 
 @dataclass(slots=True)
