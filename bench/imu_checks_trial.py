@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test'))
 
-from evaluation.imu_runs import (  # noqa: E402
+from evaluation.imu_runs import (
     FAULTS,
     NS,
     ImuRun,
@@ -25,10 +25,10 @@ from evaluation.imu_runs import (  # noqa: E402
     shocked,
 )
 
-from ugv_acceptance.config import load  # noqa: E402
-from ugv_acceptance.evaluation.alerts.rules import RuleSet  # noqa: E402
-from ugv_acceptance.evaluation.alerts.state_machine import Alert  # noqa: E402
-from ugv_acceptance.evaluation.inputs.imu import ImuTracker  # noqa: E402
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 
 AT_REST = ('IMU_GRAVITY', 'IMU_INCONSISTENT', 'IMU_ORIENTATION', 'IMU_FRAME', 'IMU_NO_GRAVITY')
 GOOD: dict[str, Callable[[int], ImuRun]] = {

@@ -94,7 +94,9 @@ PURE_CALLS = {'abs', 'float', 'int', 'len', 'max', 'min', 'sum'}
 LONGEST_MODULE = 400
 LONGEST_FUNCTION = 40
 # 'module' or 'module:function' -> the reason why it is longer.
-LONGER: dict[str, str] = {}
+LONGER: dict[str, str] = {
+    'evaluation/chassis/filters.py:step': 'every IMU message pays for a call, and it has 18 filters',
+}
 
 
 def layer_of(path: Path) -> str:

@@ -91,6 +91,7 @@ class Imu:
     covariance_0: float = 0.0
     stamp: int | None = None
     frame: str = 'imu_link'
+    omega_covariance_0: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +138,14 @@ def give(evaluator: LiveEvaluator, message: Message) -> Margins | None:
     if isinstance(m, Joints):
         return evaluator.joint_state(m.time, stamp_of(m), m.names, m.position, m.velocity, m.effort)
     return evaluator.imu(
-        m.time, stamp_of(m), m.orientation, m.covariance_0, m.omega, m.acceleration, m.frame
+        m.time,
+        stamp_of(m),
+        m.orientation,
+        m.covariance_0,
+        m.omega,
+        m.acceleration,
+        m.frame,
+        m.omega_covariance_0,
     )
 
 
@@ -210,7 +218,6 @@ def joint_columns(messages: Sequence[Joints]) -> JointStateColumns:
 def imu_columns(messages: Sequence[Imu]) -> ImuColumns:
     """Return messages as columns."""
     n = len(messages)
-    zero = np.zeros(n)
     return ImuColumns(
         messages[0].frame if messages else '',
         np.array([m.time for m in messages], np.int64),
@@ -219,8 +226,8 @@ def imu_columns(messages: Sequence[Imu]) -> ImuColumns:
         np.array([m.omega for m in messages]).reshape(n, 3),
         np.array([m.acceleration for m in messages]).reshape(n, 3),
         np.array([m.covariance_0 for m in messages], np.float64),
-        zero,
-        zero,
+        np.array([m.omega_covariance_0 for m in messages], np.float64),
+        np.zeros(n),
     )
 
 

@@ -10,6 +10,12 @@ from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE
+from ugv_acceptance.evaluation.chassis.motion import (
+    NO_RATE,
+    UNWITNESSED,
+    WITNESSED,
+    ChassisMotion,
+)
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
@@ -64,6 +70,7 @@ class LiveEvaluator:
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
+    _chassis: ChassisMotion = field(init=False)
     _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
     _stance: Stance | None = None
@@ -78,6 +85,7 @@ class LiveEvaluator:
         self._mechanics = mechanics_of(self.settings.robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
+        self._chassis = ChassisMotion(self.settings, self.watch.chassis)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
         self._level = not self.settings.hears_imu
@@ -138,8 +146,9 @@ class LiveEvaluator:
             return
         self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
         self._stance = stance_of(self._mechanics, self._posture)
+        self._chassis.stands = self._stance, tuple(self._joints.q), load
 
-    def imu(
+    def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
         now: int,
         stamp: int,
@@ -148,10 +157,12 @@ class LiveEvaluator:
         omega: Sequence[float],
         acceleration: Sequence[float],
         frame: str = '',
+        omega_covariance_0: float = 0.0,
     ) -> Margins | None:
         """Take an Imu message (axes of the sensor `frame`); return as `joint_state` does.
 
-        It is ignored where the base was declared level.
+        It is ignored where the base was declared level. A covariance_0 of -1 says that the
+        orientation, or the rate, was not measured (REP-145).
         """
         if self._level:
             return self.margins
@@ -163,7 +174,24 @@ class LiveEvaluator:
         if unusable or not invalid.quiet:
             invalid.step(now, 1.0 if unusable else 0.0)
         self._gravity = gravity
-        return self._evaluate(now, stamp)
+        margins = self._evaluate(now, stamp)
+        angles: Any = margins.stability.angle if margins else None
+        rate = NO_RATE if omega_covariance_0 == -1.0 else WITNESSED
+        if covariance_0 == -1.0 and rate:
+            rate = UNWITNESSED
+        self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
+        return margins
+
+    @property
+    def moving(self) -> tuple[float, ...] | None:
+        """Tilt left (rad) to each side with the energy of the turn the robot is in now.
+
+        None while margins are unknown, or the IMU's rate cannot be used.
+        """
+        if self.margins is None:
+            return None
+        angles: Any = self.margins.stability.angle
+        return self._chassis.moving(self.margins.gravity, angles)
 
     def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
         """Take a declared payload (kg, m), in force from the next joint state on.

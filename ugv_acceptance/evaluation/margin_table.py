@@ -24,6 +24,34 @@ class Pairs:
 
 
 @dataclass(frozen=True, slots=True)
+class ChassisRows:
+    """What stands out of a part's IMU messages: the chassis turns or is pushed hard.
+
+    `rows` (m,) are rows of the part's margins. `moving` (m, 4) rad is the tilt left to each of
+    SIDES with the energy of the turn, `effective` (m, 4) rad that under effective gravity felt at
+    the edge, infinite where it was not judged; `lifted` (m, 4) says where an end lifts, `denied`
+    (m, 4) where one sensor of the IMU shows it past tipping and another that it does not turn. Seconds of the part
+    with margins; of these judged, and with an accelerometer that shows gravity; without a gyro;
+    with an IMU below 50 Hz.
+    """
+
+    rows: NDArray[np.intp]
+    moving: Floats
+    effective: Floats
+    lifted: NDArray[np.bool_]
+    denied: NDArray[np.bool_]
+    known_s: float = 0.0
+    judged_s: float = 0.0
+    believed_s: float = 0.0
+    no_gyro_s: float = 0.0
+    slow_s: float = 0.0
+
+
+_NONE = np.zeros((0, 4))
+NO_CHASSIS_ROWS = ChassisRows(np.zeros(0, np.intp), _NONE, _NONE, _NONE > 0.0, _NONE > 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class MarginRows:
     """Margins of a part of a recording, one row a message of either input, in order of receipt.
 
@@ -44,6 +72,7 @@ class MarginRows:
     energy: Floats
     zmp: Floats
     pairs: Pairs
+    chassis: ChassisRows = NO_CHASSIS_ROWS
 
     @property
     def q(self) -> Floats:

@@ -4,7 +4,7 @@ By the same rules as live.py: a recording gives the margins and alerts that the 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import feed
+from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
+from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.inputs.payload import (
@@ -40,6 +42,8 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 # A period of silence (ns): from when the input became stale to its next message.
 Gap = tuple[int, int]
+# Mass (kg) and centre of gravity (3, m) of payloads: floats, or arrays of one a joint row.
+Load = tuple[Floats | float, ...]
 
 # Time and row number that stand for "no message yet".
 NEVER = -1
@@ -73,6 +77,7 @@ class RecordedEvaluator:
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
+    _chassis: ChassisColumns = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
@@ -86,6 +91,7 @@ class RecordedEvaluator:
         self._mechanics = mechanics_of(robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
+        self._chassis = ChassisColumns(ChassisMotion(self.settings, self.watch.chassis))
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
@@ -153,8 +159,13 @@ class RecordedEvaluator:
             _lead(self._carry.imu, imu),
             np.concatenate((self._carry.imu_until, imu.time + imu_limits)),
         )
-        rows = self._margins(newest)
-        self._watch_pairs(rows)
+        load = self._payload.at(newest.joints.time)
+        rows = self._margins(newest, load)
+        lost = self._lost(rows)
+        self._watch_pairs(rows, lost)
+        felt = batch.imu if self.settings.hears_imu else ()
+        chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
+        rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
         )
@@ -195,8 +206,11 @@ class RecordedEvaluator:
             if payload:
                 self.first_payload = self.first_payload or (when, payload)
 
-    def _margins(self, newest: _Newest) -> MarginRows:
-        """Return the margins of every message of the batch (not of the preceding rows)."""
+    def _margins(self, newest: _Newest, load: Load) -> MarginRows:
+        """Return the margins of every message of the batch (not of the preceding rows).
+
+        `load` is the payload of each joint row.
+        """
         joints, imu = newest.joints, newest.imu
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
@@ -210,10 +224,9 @@ class RecordedEvaluator:
         pairs = Pairs(joints, imu, of_joints, of_imu)
         j, i = pairs.of_joints, pairs.of_imu
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
-        payload = self._payload.at(joints.time)
-        whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(payload[0])
+        whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(load[0])
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
-        table, state = self._table(pairs, whole, known, payload)
+        table, state = self._table(pairs, load, whole, known)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
             time=time,
@@ -230,15 +243,12 @@ class RecordedEvaluator:
         )
 
     def _table(
-        self,
-        pairs: Pairs,
-        whole: NDArray[np.bool_],
-        known: NDArray[np.bool_],
-        payload: Sequence[Floats | float],
+        self, pairs: Pairs, load: Load, whole: NDArray[np.bool_], known: NDArray[np.bool_]
     ) -> tuple[Floats, NDArray[np.int8]]:
         """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
 
-        `whole` says which joint rows have all positions and a known `payload` (mass and place),
+        `load` is the payload (mass and place) of each joint row, `whole` says which joint rows have
+        all positions and a known load,
         `known` which rows have margins.
         """
         q = pairs.joints.q
@@ -254,7 +264,7 @@ class RecordedEvaluator:
         if not len(j):
             return table, state
         columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
-        mass, x, y, z = (_known(number, whole) for number in payload)
+        mass, x, y, z = (_known(number, whole) for number in load)
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
         gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
         with np.errstate(over='ignore', invalid='ignore'):
@@ -293,9 +303,8 @@ class RecordedEvaluator:
         found = stability_of(stance, gravity)
         return *found.angle, *found.moment, *found.energy, found.zmp, found.state
 
-    def _watch_pairs(self, rows: MarginRows) -> None:
+    def _watch_pairs(self, rows: MarginRows, lost: '_Lost') -> None:
         all_known = rows.known.all()
-        lost = self._lost(rows)
         time = rows.time if all_known else rows.time[rows.known]
         time = _with(time, lost, lost.time)
         values_of = (*rows.torque.T, *rows.angle.T)

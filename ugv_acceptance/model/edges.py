@@ -74,7 +74,7 @@ def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
     moving = tuple(k for k in polygon if frames[contacts[k].link][0] != 0)
 
     def formula(*terms: Scalar) -> list[Any]:
-        points = _points(mechanics, polygon, moving, terms)
+        points = corner_points(mechanics, polygon, moving, terms)
         edges = [subtract(points[j], points[i]) for i, j in pairs(polygon)]
         return [(along[1], -along[0]) for along in edges]
 
@@ -90,7 +90,7 @@ def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> 
 
     def table(inputs: Sequence[Scalar]) -> tuple[list[list[Scalar]], Scalar]:
         *terms, mass, gx, gy, gz = inputs
-        points = _points(mechanics, corners.polygon, corners.moving, terms)
+        points = corner_points(mechanics, corners.polygon, corners.moving, terms)
         cog: Vec = (terms[0], terms[1], terms[2])
         edges = [
             _edge_margins(points[i], points[j], cog, (gx, gy, gz))
@@ -98,25 +98,27 @@ def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> 
         ]
         return edges, mass
 
-    def by_side(values: Sequence[Scalar]) -> tuple[Scalar, ...]:
-        on = [[v for s, v in zip(sides, values, strict=True) if s == k] for k in range(len(SIDES))]
-        return tuple(reduce(minimum, some) if some else _NO_EDGE for some in on)
-
     def angles(*inputs: Scalar) -> tuple[Scalar, ...]:
         edges, _ = table(inputs)
-        return by_side([edge[0] for edge in edges])
+        return least_by_side(sides, [edge[0] for edge in edges])
 
     def margins(*inputs: Scalar) -> tuple[Any, ...]:
         edges, mass = table(inputs)
         angle, moment, energy, zmp = ([edge[k] for edge in edges] for k in range(4))
-        held = by_side([x * mass for x in moment]), by_side([x * mass for x in energy])
-        return by_side(angle), *held, reduce(minimum, zmp)
+        held = [least_by_side(sides, [x * mass for x in of]) for of in (moment, energy)]
+        return least_by_side(sides, angle), *held, reduce(minimum, zmp)
 
     names = [f'x{k}' for k in range(3 + 3 * len(corners.moving) + 4)]
     return Edges(compile_kernel(angles, names), compile_kernel(margins, names))
 
 
-def _points(
+def least_by_side(sides: Sequence[int], values: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """Return the least value of the edges on each of SIDES; infinite on a side without an edge."""
+    on = [[v for s, v in zip(sides, values, strict=True) if s == k] for k in range(len(SIDES))]
+    return tuple(reduce(minimum, some) if some else _NO_EDGE for some in on)
+
+
+def corner_points(
     mechanics: Mechanics, polygon: Cycle, moving: Sequence[int], terms: Sequence[Scalar]
 ) -> dict[int, Vec]:
     """Return the corners' positions (m, `base_link`) by contact number; constant on the base."""
@@ -129,13 +131,22 @@ def _points(
     return points
 
 
-def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
-    """Return angle (rad), moment (N m/kg), energy (J/kg) and ZMP distance (m) of one edge."""
+def lever_of(start: Vec, end: Vec, cog: Vec) -> tuple[Vec, Vec, Vec]:
+    """Return an edge's direction, the vector from the centre of gravity to its nearest point, ...
+
+    ... and one of the same length (m) square to both, upwards and inwards. The robot tips over the
+    edge by turning about its direction, right-handed.
+    """
     edge = subtract(end, start)
     along = scale(edge, 1.0 / sqrt(dot(edge, edge)))
     to_start = subtract(start, cog)
     square = subtract(to_start, scale(along, dot(to_start, along)))
-    side = cross(to_start, along)
+    return along, square, cross(to_start, along)
+
+
+def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
+    """Return angle (rad), moment (N m/kg), energy (J/kg) and ZMP distance (m) of one edge."""
+    along, square, side = lever_of(start, end, cog)
     along_l, along_b = dot(gravity, square), dot(gravity, side)
     rise = sqrt(along_l * along_l + along_b * along_b) - along_l
     flat = 1.0 / sqrt(along[0] * along[0] + along[1] * along[1])

@@ -167,6 +167,7 @@ class LiveEvaluator:
                 message.angular_velocity,
                 message.linear_acceleration,
                 message.frame_id,
+                message.angular_velocity_covariance_0,
             )
         elif not isinstance(message, BadSample):
             self._evaluator.carry(now, message.mass, message.com, message.frame_id)

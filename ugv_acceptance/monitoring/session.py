@@ -32,6 +32,7 @@ IMU_FIELDS = attrgetter(
     'angular_velocity',
     'linear_acceleration',
     'frame_id',
+    'angular_velocity_covariance_0',
 )
 INPUTS = ('joint_states', 'imu', 'payload')
 # Measurements, one a second, over which a rate is averaged, so that bursts are evened out.

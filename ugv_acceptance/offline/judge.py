@@ -8,6 +8,7 @@ from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
+from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
@@ -111,7 +112,7 @@ def _examinations(
     settings: Settings, sources: tuple[Source, ...], evaluator: RecordedEvaluator
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    return ModelCheck(settings, sources), ImuExamination(evaluator.imu)
+    return ModelCheck(settings, sources), ImuExamination(evaluator.imu), ChassisExamination()
 
 
 @dataclass(slots=True)

@@ -133,8 +133,8 @@ class Offline:
                 self.positions.take(names, position)
                 evaluator.joint_state(now, stamp, names, position, velocity, effort)
             else:
-                stamp, _, turned, omega, force, covariance, *_ = self._imu.one(data)
-                evaluator.imu(now, stamp, turned, covariance, omega, force)
+                stamp, _, turned, omega, force, covariance, gyro, _ = self._imu.one(data)
+                evaluator.imu(now, stamp, turned, covariance, omega, force, '', gyro)
         except BadSample:
             return  # as the monitor does; the evaluation of the recording counts it
         self._look()

@@ -83,6 +83,26 @@ ALERTS = {
         FailureSource.INTERACTION,
         'The robot is close to tipping over to the side named.',
     ),
+    'TIP_MOVING': AlertText(
+        '{moving} to the {subject}',
+        'stop smoothly; lower the arm over the tracks before you drive on',
+        FailureSource.INTERACTION,
+        'The robot turns over its edge so fast that it may not come to rest before it tips.',
+    ),
+    'ACCELERATION': AlertText(
+        'braking, turning or a push is {degrees:.1f} degrees more than the robot can stand'
+        ' before it begins to lift and tip to the {subject}',
+        'brake and turn more gently; lower the arm over the tracks, bring the load closer',
+        FailureSource.INTERACTION,
+        'The robot is accelerated so hard that one side carries no weight.',
+    ),
+    'TRACK_LIFT': AlertText(
+        'an end of the tracks lifts: pushed to the {subject}, the robot turned there by'
+        ' {degrees:.1f} degrees',
+        'brake and turn more gently; lower the arm over the tracks, bring the load closer',
+        FailureSource.INTERACTION,
+        'Braking or turning lifts an end of the tracks off the ground.',
+    ),
     'NO_SUPPORT': AlertText(
         'no support polygon: the contact points span no area on the ground, or carry no load',
         'stop; check that the robot stands on its tracks',
@@ -349,6 +369,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         unit=units.effort,
         rate=units.rate,
         tilt=tilt_left(peak),
+        moving=_moving(math.degrees(-alert.peak)),
         degrees=math.degrees(alert.peak),
         slope=max(math.degrees(-alert.peak), 0.0),
         seconds=-rule.on,
@@ -395,6 +416,13 @@ def tilt_left(degrees: float) -> str:
     if degrees >= 0.0:
         return f'{degrees:.1f} degrees of tilt left before the robot tips'
     return f'the robot is {-degrees:.1f} degrees past its tipping point'
+
+
+def _moving(degrees: float) -> str:
+    """Return in words what the turn of a robot leaves of its tilt."""
+    if degrees >= 0.0:
+        return f'at the rate it turns, {degrees:.1f} degrees of tilt are left before it tips'
+    return 'the robot turns so fast that it will tip over'
 
 
 def advice(code: str) -> str:

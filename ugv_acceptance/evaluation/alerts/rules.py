@@ -1,9 +1,11 @@
 """The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
 from dataclasses import dataclass, field
+from itertools import chain
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.chassis.motion import CALM, CAUTION, LIFT, LOW, ChassisSignals
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionSignals
 from ugv_acceptance.evaluation.margin_table import MarginRows
@@ -12,9 +14,11 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
 # Alerts of level ERROR with these codes are failures of the robot; all others are input faults.
-FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
+FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'TIP_MOVING', 'NO_SUPPORT')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
+# Margin (rad) of a moving robot from which DANGER ends.
+MARGIN_BACK = 0.01745
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
 # What confirms a fault of the IMU takes so long (s), and makes as much doubtful: identical values;
@@ -46,6 +50,7 @@ class RuleSet:
     speed: list[Signal] = field(init=False)
     tip: list[tuple[Signal, Signal]] = field(init=False)
     support: Signal = field(init=False)
+    chassis: ChassisSignals = field(init=False)
     joints: 'InputSignals' = field(init=False)
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
@@ -77,6 +82,7 @@ class RuleSet:
             for side in SIDES
         ]
         self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
+        self.chassis = self._chassis()
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
@@ -135,6 +141,19 @@ class RuleSet:
         """Return a tip-over signal; its value is minus the tilt left (rad): larger is worse."""
         at = (-angle, -angle - self.settings.limits.tip_deadband)
         return self._signal('TIP_OVER', side, level, at, self.settings.delays.tip_on)
+
+    def _chassis(self) -> ChassisSignals:
+        """Return the signals of a chassis in motion: without delay, a tip takes no longer."""
+
+        def at(code: str, level: int, on: float, off: float) -> list[Signal]:
+            return [self._signal(code, side, level, (on, off), 0.0) for side in SIDES]
+
+        return ChassisSignals(
+            at('TIP_MOVING', WARN, -CAUTION, -CALM),
+            at('TIP_MOVING', ERROR, 0.0, -MARGIN_BACK),
+            at('ACCELERATION', WARN, 0.0, -LOW),
+            at('TRACK_LIFT', WARN, LIFT, LIFT),
+        )
 
     def _slide(self) -> Signal:
         """Return the sliding signal; its value is minus the slope left (rad), see slides_first."""
@@ -211,7 +230,8 @@ class RuleSet:
     def lose(self, when: int) -> None:
         """Take that margins are unknown from `when` (ns) on: nothing is raised or held by them."""
         of_margins = [s for pair in (*self.torque, *self.tip) for s in pair]
-        for signal in (*of_margins, self.support, self.slide):
+        chassis = chain.from_iterable(self.chassis.all())
+        for signal in (*of_margins, *chassis, self.support, self.slide):
             if not signal.quiet:
                 signal.clear(when)
 
@@ -230,6 +250,7 @@ class RuleSet:
             *self.jump_signals,
             *inputs,
             *faults,
+            *chain.from_iterable(self.chassis.all()),
             self.slide,
             *self.prediction.signals(),
             *self.relaxed.values(),

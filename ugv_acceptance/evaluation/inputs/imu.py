@@ -177,7 +177,7 @@ class ImuTracker:
             known, down = False, NOWHERE
         else:
             up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
-            known, down = up[0] == up[0], (-g * up[0], -g * up[1], -g * up[2])  # noqa: PLR0124
+            known, down = up[0] == up[0], (-g * up[0], -g * up[1], -g * up[2])
         if not (known and of.nothing.quiet):
             of.nothing.step(now, off / g if believable and not known else 0.0)
         return NOWHERE if lost or motion.lost else down, not believable
