@@ -39,7 +39,8 @@ LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 def facts(alerts: list[Alert]) -> Counter[tuple[Any, ...]]:
     """Return what an alert says, as something to compare without its order."""
     return Counter(
-        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}') for a in alerts
+        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}', a.detail)
+        for a in alerts
     )
 
 

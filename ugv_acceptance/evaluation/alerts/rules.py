@@ -1,6 +1,6 @@
 """The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
@@ -14,6 +14,10 @@ from ugv_acceptance.model.stability import SIDES
 FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'NO_SUPPORT')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
+# An input is slow if SLOW (s) or more pass between its messages, one after the other for SLOW_FOR.
+SLOW, SLOW_FOR = 0.3, 2.0
+# An implausible jump is found by positions up to this (ns) before.
+LEAP_REACH = 2_000_000_000
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
 
@@ -36,6 +40,7 @@ class RuleSet:
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
     missing: Signal = field(init=False)
+    repeated: Signal = field(init=False)
     jump_signals: list[Signal] = field(init=False)
     attitude: AttitudeSignals = field(init=False)
     prediction: Prediction = field(init=False)
@@ -65,6 +70,7 @@ class RuleSet:
         self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
+        self.repeated = self._fault('JOINTS_REPEATED', 'joint_states', STALE, 0.0)
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
         self.jump_signals = [self._jump_signal(name) for name in names]
         self.attitude = self._attitude()
@@ -126,7 +132,9 @@ class RuleSet:
     def _jump_signal(self, joint: str) -> Signal:
         limit = LEAP * self.settings.robot.joint(joint).velocity
         delay = self.settings.delays.fault_on
-        return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+        signal = self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+        signal.rule = replace(signal.rule, reach=LEAP_REACH + signal.rule.on_delay)
+        return signal
 
     def _attitude(self) -> AttitudeSignals:
         imu = self.settings.imu
@@ -146,6 +154,7 @@ class RuleSet:
             self._fault('INPUT_STALE', subject, STALE, 0.0),
             self._fault('INPUT_INVALID', subject, ERROR),
             self._fault('CLOCK', subject, WARN),
+            self._warning('INPUT_SLOW', subject, (SLOW, SLOW), SLOW_FOR),
         )
 
     @property
@@ -164,10 +173,10 @@ class RuleSet:
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
-        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
+        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock, i.slow)]
         of = self.attitude
         attitude = [of.frame, of.orientation, of.strange, of.disagreement]
-        faults = [self.support, self.payload, self.missing, *attitude]
+        faults = [self.support, self.payload, self.missing, self.repeated, *attitude]
         return [
             *pairs,
             *self.speed,
@@ -182,8 +191,9 @@ class RuleSet:
 
 @dataclass(frozen=True, slots=True)
 class InputSignals:
-    """The signals of one input: silence, unusable content, and a header clock that is off."""
+    """The signals of one input: silence, unusable content, header clock off, too few messages."""
 
     stale: Signal
     invalid: Signal
     clock: Signal
+    slow: Signal
