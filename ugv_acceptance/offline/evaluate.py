@@ -20,6 +20,7 @@ from ugv_acceptance.config import Config, load
 from ugv_acceptance.config.criteria import load_criteria
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
     INCONCLUSIVE,
@@ -215,6 +216,7 @@ def judge(
     evaluator.finish(bag.end_ns)
     reading.finish(bag.end_ns)
     log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
+    _explain_silence(log, topics, batches.facts)
     data = {
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
         'bag': _bag_result(bag, topics, batches.facts),
@@ -348,6 +350,18 @@ def _together(batches: Sequence[Batch]) -> Batch:
         [s for b in batches for s in b.imu],
         [s for b in batches for s in b.payload],
     )
+
+
+def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None:
+    """Say in the alerts about silent inputs where messages came, but were malformed."""
+    names = {'joint_states': topics.joint_states, 'imu': topics.imu}
+    for alert in log:
+        if alert.rule.code == 'INPUT_STALE' and not alert.detail:
+            topic = names.get(alert.rule.subject) or ''
+            count, reason = facts.malformed.get(topic, (0, ''))
+            if count:
+                total = facts.counts[topic]
+                alert.detail = f'{count} of {total} are malformed; the first: {reason}'
 
 
 def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
