@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
+from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout, clock_words
@@ -94,6 +95,11 @@ class RecordedEvaluator:
     def orientations(self) -> dict[str, int]:
         """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
+
+    @property
+    def rates(self) -> list[JointRate]:
+        """How far the reported rate of each joint can be believed."""
+        return self._joints.rates
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""

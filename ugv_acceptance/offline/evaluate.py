@@ -32,13 +32,16 @@ from ugv_acceptance.evaluation.criteria.safeguards import with_objection
 from ugv_acceptance.evaluation.criteria.statement import Examination, Objection
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
 from ugv_acceptance.evaluation.holding_back import HeldMargins
+from ugv_acceptance.evaluation.input_times import InputTimes
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import limits_hash, relaxed
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.reported_rates import ReportedRates
 from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
@@ -235,10 +238,16 @@ def judge(
     return result, Judgement(settings, topics, evaluator, batches.facts, asked)
 
 
-def _examinations(settings: Settings, evaluator: RecordedEvaluator) -> tuple[Examination, ...]:
+def _examinations(
+    settings: Settings, evaluator: RecordedEvaluator, limits: CriteriaMeasurement
+) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    del settings, evaluator
-    return ()
+    names = settings.robot.joint_names
+    return (
+        DynamicBound(settings, limits.payloads.at),
+        InputTimes(),
+        ReportedRates(names, lambda: evaluator.rates),
+    )
 
 
 @dataclass(slots=True)
@@ -262,7 +271,7 @@ class _Reading:
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
         self.check = ModelCheck(self.settings)
-        self.examinations = _examinations(self.settings, self.evaluator)
+        self.examinations = _examinations(self.settings, self.evaluator, self.limits)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)

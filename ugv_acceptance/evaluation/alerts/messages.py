@@ -141,7 +141,7 @@ ALERTS = {
         'The same joint positions come again and again: no margin is known.',
     ),
     'INPUT_SLOW': AlertText(
-        'messages of {subject} come up to {peak:.2f} s apart: margins are as old as that',
+        'the rate of {subject} is low: messages come up to {peak:.2f} s apart, margins are as old',
         'raise the rate of its driver to at least 10 Hz; check the network',
         FailureSource.COMMUNICATIONS,
         'Too few messages come: margins may be old when they are shown.',

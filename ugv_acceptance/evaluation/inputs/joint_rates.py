@@ -29,13 +29,17 @@ DOUBTED, UNPROVEN, PROVEN = -1, 0, 1
 class JointRate:
     """The slope of one joint's positions, and whether its reported rate can be believed.
 
-    `turn` is the angle (rad) after which positions may be wrapped, 0: they are not.
+    `turn` is the angle (rad) after which positions may be wrapped, 0: they are not. `doubted` counts
+    the cells in which the reported rate contradicted the positions, `factor` is by how much it last
+    was larger (NaN: not known).
     """
 
     turn: float
     cell: int = NEVER
     slope: float = math.nan
     trust: int = UNPROVEN
+    doubted: int = 0
+    factor: float = math.nan
     _time: int = NEVER
     _stamp: int = 0
     _q: float = math.nan
@@ -64,7 +68,8 @@ class JointRate:
         self.slope = plain if whole else wrapped
         if mean == mean:  # noqa: PLR0124 - not NaN
             if not (same or whole):
-                self.trust = DOUBTED
+                self.trust, self.doubted = DOUBTED, self.doubted + 1
+                self.factor = mean / self.slope if self.slope else math.nan
             elif max(abs(mean), abs(self.slope)) > 2.0 * FLOOR:
                 self.trust = PROVEN
 

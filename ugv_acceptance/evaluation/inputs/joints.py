@@ -105,7 +105,8 @@ class JointMerger:
     implausible jumps; while one has an alert, the position of its joint is unknown. `seen` (j,) is
     when each joint was last received (ns), `speed` (j,) its rate where that can be believed.
     `repeated` is for how many seconds the newest message is repeated, `repeating` how many lists of
-    names have such a message. `told` is what the last batch told.
+    names have such a message. `told` is what the last batch told, `rates` (j,) tell which reported
+    rates can be believed.
     """
 
     settings: Settings
@@ -126,7 +127,7 @@ class JointMerger:
     _most: list[float] = field(init=False)
     _turn: list[float] = field(init=False)
     _turns: Turns = field(init=False)
-    _rates: list[JointRate] = field(init=False)
+    rates: list[JointRate] = field(init=False)
     _has_jumped: bool = False
 
     def __post_init__(self) -> None:
@@ -145,7 +146,7 @@ class JointMerger:
         # The most a joint can move (rad, m) between two messages received at the same time.
         self._most = [s.rule.on * SHORTEST / SECOND for s in self.jump_signals] or [math.inf] * n
         self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
-        self._rates = [JointRate(turn) for turn in self._turn]
+        self.rates = [JointRate(turn) for turn in self._turn]
 
     def layout(self, names: tuple[str, ...]) -> Layout:
         """Return where the robot's joints stand among `names`.
@@ -193,7 +194,7 @@ class JointMerger:
             told[j] = q = joint.sign * position[k] + joint.offset
             qd = joint.sign * velocity[k] if rates else math.nan
             qd = qd if -ABSURD <= qd <= ABSURD else math.nan
-            rate = self._rates[j]
+            rate = self.rates[j]
             if fresh and rate.cell != cell:
                 rate.step(now, stamp, q if -ABSURD <= q <= ABSURD else math.nan, qd)
             self.qd[j], self.speed[j] = rate.best(qd)
@@ -204,7 +205,7 @@ class JointMerger:
             else:
                 odd.append(j)
         for j in odd:
-            apart, slope = now - self.seen[j], self._rates[j].slope
+            apart, slope = now - self.seen[j], self.rates[j].slope
             known = self._turns.judge(j, self._told[j], apart, slope)
             self._place(j, now, told[j] if known else math.nan)
         if now // SECOND != layout.second or self._has_jumped:
@@ -337,7 +338,7 @@ class JointMerger:
         _believe(tables[1], (-ABSURD, ABSURD))
         tables[3] = np.nan
         slopes = []
-        for j, rate in enumerate(self._rates):
+        for j, rate in enumerate(self.rates):
             rows = slice(None) if named[j].all() else np.flatnonzero(named[j])
             q = np.where(np.abs(tables[0, j, rows]) <= ABSURD, tables[0, j, rows], np.nan)
             found = rate.columns(time[rows], stamp[rows], q, tables[1, j, rows])

@@ -35,10 +35,12 @@ BALANCED, VERTICAL = 0.01, 0.95
 class Turning:
     """How a joint may come to stand beyond a full turn: `fastest` (rad/s), and if it is `upright`.
 
-    `limited` says whether its positions have to be judged at all.
+    `limited` says whether its positions have to be judged at all, `moves` whether it moves more
+    than itself, as no wheel does.
     """
 
     limited: bool
+    moves: bool
     upright: bool
     fastest: float
 
@@ -53,7 +55,8 @@ def turning_of(robot: Robot) -> list[Turning]:
 def _turning(robot: Robot, tree: Tree, joint: Joint, k: int) -> Turning:
     endless = not joint.slides and math.isinf(joint.lower) and math.isinf(joint.upper)
     fastest = QUICK * joint.velocity if math.isfinite(joint.velocity) else FASTEST
-    return Turning(endless and _moves(robot, tree, k), _upright(tree, k), fastest)
+    moves = _moves(robot, tree, k)
+    return Turning(endless and moves, moves, _upright(tree, k), fastest)
 
 
 def _moves(robot: Robot, tree: Tree, k: int) -> bool:
