@@ -21,7 +21,7 @@ FOLDED = np.array([0.1, 1.117, 1.501, np.pi])
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """Joint states (n,) of a run: receipt and stamp in ns, positions (n, 4); what is None is not told.
+    """Joint states (n,) of a run: receipt and stamp in ns, positions (n, 4); None is not told.
 
     `names` are those of the messages; `seconds` is how long the IMU goes on.
     """
@@ -58,7 +58,9 @@ def write(folder: Path, run: Run) -> Path:
     """Write the recording of a run."""
     messages: list[tuple[int, str, bytes]] = []
     for k, (time, stamp) in enumerate(zip(run.time.tolist(), run.stamp.tolist(), strict=True)):
-        rows = [() if x is None else x[k].tolist() for x in (run.position, run.velocity, run.effort)]
+        rows = [
+            () if x is None else x[k].tolist() for x in (run.position, run.velocity, run.effort)
+        ]
         messages.append((time, '/joint_states', joint_state_cdr(stamp, '', run.names, *rows)))
     for k in range(int(run.seconds * 100)):
         at = EPOCH + k * NS // 100

@@ -1,7 +1,7 @@
 """How much torque the motion of the joints added to the static torques, at most.
 
 The margins are those of a robot at rest. Rates and accelerations are estimated from the positions
-alone, by parabolas fitted to 0.3 s; the Newton-Euler recursion makes torques of them. Where the
+alone, by parabolas fitted to 0.2 s; the Newton-Euler recursion makes torques of them. Where the
 static torque and the sizes of both parts together pass the limit of a joint, the run may have
 needed more than the joint can hold: it is not known.
 """
@@ -30,6 +30,8 @@ FAST = 0.2
 # Positions are looked at once in so many ns to find fast ones, and so much (ns) is kept for the
 # next part of the recording.
 COARSE, KEPT = 100_000_000, 1_000_000_000
+# Accelerations that last 0.1 s are this much larger than a parabola over twice that time shows.
+SMOOTHED = 1.25
 # Steps that are told of one by one.
 MOST = 3
 NO_GRAVITY = np.zeros(3)
@@ -156,7 +158,7 @@ class DynamicBound:
         added = np.empty_like(static)
         for some, payload in self._payloads(rows.time[track.row[cells]]):
             moving = (track.q[cells[some]], rate[cells[some]], acceleration[cells[some]])
-            added[some] = self._added(*moving, payload)
+            added[some] = self._added(*moving, payload, static[some])
         limit = np.array(self.settings.limits.torque) * self.settings.limits.torque_error
         left = limit - np.abs(static) - added
         self._runs(cells, (left < 0.0) & (np.abs(static) <= limit))
@@ -170,14 +172,17 @@ class DynamicBound:
                     float(added[k, j]), rate[cells[k]], acceleration[cells[k]], longest,
                 )  # fmt: skip
 
-    def _added(self, q: Floats, rate: Floats, acceleration: Floats, payload: Payload) -> Floats:
-        """Return the most (n, j) that rates and accelerations add to the torques (N m; N)."""
+    def _added(
+        self, q: Floats, rate: Floats, acceleration: Floats, payload: Payload, static: Floats
+    ) -> Floats:
+        """Return the most (n, j) that rates and accelerations add to `static` torques (N m; N)."""
         robot, rest = self.settings.robot, np.zeros_like(rate)
         parts = (
             inverse_dynamics(robot, q, rate, rest, NO_GRAVITY, payload),
             inverse_dynamics(robot, q, rest, acceleration, NO_GRAVITY, payload),
         )
-        added: Floats = np.abs(parts[0]) + np.abs(parts[1])
+        needed = np.abs(static + parts[0] + SMOOTHED * parts[1])
+        added: Floats = np.maximum(needed - np.abs(static), 0.0)
         return added
 
     def _payloads(self, times: Times) -> Iterator[tuple[NDArray[np.intp], Payload]]:
@@ -203,12 +208,7 @@ class DynamicBound:
         del end
         names = self.settings.robot.joint_names
         found = [(name, w) for name, w in zip(names, self.worst, strict=True) if w.left < math.inf]
-        delay = self.settings.delays.torque_on
-        objections = tuple(
-            self._objection(name, w, start)
-            for name, w in found
-            if w.left < 0.0 and w.longest >= delay
-        )
+        objections = tuple(self._objection(name, w, start) for name, w in found if w.left < 0.0)
         result: Json = {
             'fast_s': self.fast,
             'joints': {name: self._result(name, w, start) for name, w in found},
@@ -224,8 +224,8 @@ class DynamicBound:
         joint = self.settings.robot.joint(self.settings.robot.joint_names[step.joint])
         way = f'{step.way:.3f} m' if joint.slides else f'{math.degrees(step.way):.1f} deg'
         reason = (
-            f'at {(step.time - start) / 1e9:.2f} s: the position of {joint.name} jumps by {way} from '
-            'one message to the next: homed? Its positions before or after are wrong'
+            f'at {(step.time - start) / 1e9:.2f} s: the position of {joint.name} jumps by {way} '
+            'from one message to the next: homed? Its positions before or after are wrong'
         )
         return Objection('joint_positions', INCONCLUSIVE, reason)
 

@@ -43,7 +43,8 @@ def steps_in(
             way = way - turn * np.round(way / turn)
         size = np.abs(way)
         far = (size > LEAST) & (size > most * np.maximum(seconds, 0.01)) & (seconds < LONGEST / 1e9)
-        for k in np.flatnonzero(far[1:-1]) + 1:
-            if max(size[k - 1], size[k + 1]) < SHARE * size[k]:
-                found.append(PositionStep(j, int(time[k + 1]), float(way[k])))
+        alone = np.zeros(len(far), np.bool_)
+        alone[1:-1] = np.maximum(size[:-2], size[2:]) < SHARE * size[1:-1]
+        rows = np.flatnonzero(far & alone).tolist()
+        found += [PositionStep(j, int(time[k + 1]), float(way[k])) for k in rows]
     return found

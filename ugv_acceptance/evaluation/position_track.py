@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ugv_acceptance.type_aliases import Floats, Times
 
 # Length of a cell (s), and number of cells to each side of one that its parabola is fitted to.
-STEP, HALF = 0.02, 7
+STEP, HALF = 0.02, 5
 # Positions further apart than GAP (s) leave cells unsure; further than BREAK (s) they end a track.
 GAP, BREAK = 0.11, 2.0
 # A position that repeats for longer than this (s) ends where it changes, not where it began.
@@ -71,9 +71,7 @@ def _roughness(q: Floats) -> float:
     return float(np.abs(np.diff(q, axis=0)).sum())
 
 
-def _track(
-    seconds: Floats, q: Floats, rows: NDArray[np.intp], turns: Sequence[float]
-) -> Track:
+def _track(seconds: Floats, q: Floats, rows: NDArray[np.intp], turns: Sequence[float]) -> Track:
     start = np.ceil(seconds[0] / STEP) * STEP
     grid = start + STEP * np.arange(int((seconds[-1] - start) / STEP) + 1)
     table = np.empty((len(grid), q.shape[1]))
@@ -107,7 +105,7 @@ def _changes(seconds: Floats, q: Floats) -> NDArray[np.bool_]:
 def _fit(table: Floats) -> tuple[Floats, Floats]:
     """Return rates and accelerations (n, j) of positions on the grid, 0 at its ends."""
     cells = np.arange(-HALF, HALF + 1)
-    t, count = cells * STEP, 2 * HALF + 1
+    t = cells * STEP
     square = t * t - (t * t).mean()
     slope, bend = t / (t @ t), 2.0 * square / (square @ square)
     rate, acceleration = np.zeros_like(table), np.zeros_like(table)
@@ -117,7 +115,7 @@ def _fit(table: Floats) -> tuple[Floats, Floats]:
         bent = np.convolve(q, bend[::-1], 'valid')
         noise = _noise(q, np.abs(rate[:, j]))
         spread = SIGMAS * noise * float(np.sqrt(bend @ bend))
-        acceleration[inner, j] = np.sign(bent) * np.maximum(np.abs(bent) - spread, 0.0)
+        acceleration[inner, j] = np.where(np.abs(bent) > spread, bent, 0.0)
     return rate, acceleration
 
 

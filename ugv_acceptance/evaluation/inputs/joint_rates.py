@@ -29,9 +29,9 @@ DOUBTED, UNPROVEN, PROVEN = -1, 0, 1
 class JointRate:
     """The slope of one joint's positions, and whether its reported rate can be believed.
 
-    `turn` is the angle (rad) after which positions may be wrapped, 0: they are not. `doubted` counts
-    the cells in which the reported rate contradicted the positions, `factor` is by how much it last
-    was larger (NaN: not known).
+    `turn` is the angle (rad) after which positions may be wrapped, 0: they are not. `doubted` is
+    the number of cells in which the reported rate contradicted the positions, `factor` by how much
+    it last was larger (NaN: not known).
     """
 
     turn: float

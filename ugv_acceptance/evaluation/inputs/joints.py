@@ -278,7 +278,9 @@ class JointMerger:
             self._fill(tables[:, :, rows], named[:, rows], segment)
             of[rows] = numbers[segment.names]
             first = rows.stop
-        positions = {x: np.concatenate([s.position for s in useful if s.names == x]) for x in numbers}
+        positions = {
+            x: np.concatenate([s.position for s in useful if s.names == x]) for x in numbers
+        }
         if len(useful) > 1 and (np.diff(time) < 0).any():
             order = np.argsort(time, kind='stable')
             place = np.empty(n, np.intp)
@@ -331,9 +333,7 @@ class JointMerger:
         self.repeating = sum(x.repeats.seconds > 0.0 for x in self._layouts.values())
         return repeated, repeating
 
-    def _rate_rows(
-        self, time: Times, stamp: Times, tables: Floats, named: Mask
-    ) -> list[Floats]:
+    def _rate_rows(self, time: Times, stamp: Times, tables: Floats, named: Mask) -> list[Floats]:
         """Complete the rates (row 1 of `tables`), fill in speeds (row 3); return each slope."""
         _believe(tables[1], (-ABSURD, ABSURD))
         tables[3] = np.nan
