@@ -149,8 +149,8 @@ def test_ordinary_motion_passes(name: str, kind: str, tmp_path: Path) -> None:
 def test_degrees_neither_pass_nor_fail(
     first: float,
     degps: float,
-    zero: bool,
-    tmp_path: Path,  # noqa: FBT001
+    zero: bool,  # noqa: FBT001
+    tmp_path: Path,
 ) -> None:
     """At rest and moving, from the first message on; the unit is named."""
     run = moved(rest(), 1, lambda t: RAD(degps) * t + (RAD(first) if zero else 0.0))
@@ -164,9 +164,9 @@ def test_degrees_neither_pass_nor_fail(
 def test_a_driver_that_repeats_one_message_does_not_pass(
     begin: float, moves: int, tmp_path: Path
 ) -> None:
-    """The arm moves, its driver tells the same message for a second and a half or to the end."""
+    """The arm moves, its driver tells the same message for 0.7 s, for 1.5 s, or to the end."""
     run = moved(rest(noise=1e-4), moves, swing(0.15, 0.4))
-    for end in (begin + 1.5, 10.0):
+    for end in (begin + 0.7, begin + 1.5, 10.0):
         rows = np.arange(500)
         stuck = (rows >= begin * 50) & (rows < end * 50)
         rows[stuck] = rows[stuck][0]

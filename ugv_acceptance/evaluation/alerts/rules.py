@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
+from ugv_acceptance.evaluation.inputs.repeats import ALLOWED as REPEATS_ALLOWED
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
 from ugv_acceptance.evaluation.settings import Settings
@@ -70,7 +71,9 @@ class RuleSet:
         self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
-        self.repeated = self._fault('JOINTS_REPEATED', 'joint_states', STALE, 0.0)
+        self.repeated = _reaching(
+            self._fault('JOINTS_REPEATED', 'joint_states', STALE, 0.0), REPEATS_ALLOWED
+        )
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
         self.jump_signals = [self._jump_signal(name) for name in names]
         self.attitude = self._attitude()
@@ -132,9 +135,8 @@ class RuleSet:
     def _jump_signal(self, joint: str) -> Signal:
         limit = LEAP * self.settings.robot.joint(joint).velocity
         delay = self.settings.delays.fault_on
-        signal = self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
-        signal.rule = replace(signal.rule, reach=LEAP_REACH + signal.rule.on_delay)
-        return signal
+        leap = self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+        return _reaching(leap, LEAP_REACH + leap.rule.on_delay)
 
     def _attitude(self) -> AttitudeSignals:
         imu = self.settings.imu
@@ -187,6 +189,12 @@ class RuleSet:
             *self.prediction.signals(),
             *self.relaxed.values(),
         ]
+
+
+def _reaching(signal: Signal, reach: int) -> Signal:
+    """Return the signal with a rule that reaches back by so much (ns)."""
+    signal.judge_by(replace(signal.rule, reach=reach))
+    return signal
 
 
 @dataclass(frozen=True, slots=True)

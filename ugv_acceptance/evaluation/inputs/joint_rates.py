@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.type_aliases import Floats, Times
 
@@ -63,8 +64,8 @@ class JointRate:
     def _judge(self, way: float, seconds: float, mean: float) -> None:
         plain = way / seconds
         wrapped = (way - self.turn * round(way / self.turn)) / seconds if self.turn else plain
-        same = _agrees(mean, wrapped)
-        whole = not same and _agrees(mean, plain)
+        same = _agree(mean, wrapped)
+        whole = not same and _agree(mean, plain)
         self.slope = plain if whole else wrapped
         if mean == mean:  # noqa: PLR0124 - not NaN
             if not (same or whole):
@@ -89,12 +90,7 @@ class JointRate:
     ) -> tuple[Floats, Floats, Floats]:
         """Take all messages that name the joint (n,); return `best` after each, and the slope."""
         firsts = np.flatnonzero(np.diff(time // CELL, prepend=self.cell))
-        slopes, trusts = [self.slope], [self.trust]
-        columns = (time[firsts], stamp[firsts], q[firsts], reported[firsts])
-        for row in zip(*(column.tolist() for column in columns), strict=True):
-            self.step(*row)
-            slopes.append(self.slope)
-            trusts.append(self.trust)
+        slopes, trusts = self._cells(time[firsts], stamp[firsts], q[firsts], reported[firsts])
         times = np.diff(np.concatenate(([0], firsts, [len(time)])))
         slope, trust = np.repeat(slopes, times), np.repeat(trusts, times)
         told = ~np.isnan(reported)
@@ -104,6 +100,62 @@ class JointRate:
             slope,
         )
 
+    def _cells(
+        self, time: Times, stamp: Times, q: Floats, reported: Floats
+    ) -> tuple[Floats, NDArray[np.int64]]:
+        """Take the first messages of cells (n,): `slope` and `trust` (n + 1,) before and after."""
+        good = np.isfinite(q)
+        slopes, trusts = np.full(len(q), np.nan), np.zeros(len(q), np.int64)
+        kept = np.zeros(len(q), np.bool_)
+        if good.any():
+            found = self._judged(time[good], stamp[good], q[good], reported[good])
+            slopes[good], trusts[good], kept[good] = found
+        slopes, trusts = np.append(self.slope, slopes), np.append(self.trust, trusts)
+        rows = np.arange(len(slopes))
+        slopes = slopes[np.maximum.accumulate(np.where(np.append(False, kept), 0, rows))]
+        trusts = trusts[np.maximum.accumulate(np.where(trusts != UNPROVEN, rows, 0))]
+        if len(q):
+            self.cell = int(time[-1]) // CELL
+            self.slope, self.trust = float(slopes[-1]), int(trusts[-1])
+        return slopes, trusts
 
-def _agrees(a: float, b: float) -> bool:
+    def _judged(
+        self, time: Times, stamp: Times, q: Floats, reported: Floats
+    ) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
+        """Return slopes (n,), what they say of reported rates, and which stay as they were."""
+        times, q = np.append(self._time, time), np.append(self._q, q)
+        stamp, reported = np.append(self._stamp, stamp), np.append(self._reported, reported)
+        self._time, self._stamp = int(times[-1]), int(stamp[-1])
+        self._q, self._reported = float(q[-1]), float(reported[-1])
+        apart, ticks, way = np.diff(times), np.diff(stamp), np.diff(q)
+        mean = (reported[1:] + reported[:-1]) / 2.0
+        span = np.where((np.abs(ticks - apart) <= TOGETHER) & (ticks >= SHORT), ticks, apart)
+        fresh = (times[:-1] == NEVER) | (apart > LONG)
+        judged = ~fresh & (span >= SHORT)
+        seconds = np.where(judged, span, SHORT) / 1e9
+        plain = way / seconds
+        turn = self.turn
+        wrapped = (way - turn * np.round(way / turn)) / seconds if turn else plain
+        same = _agrees(mean, wrapped)
+        whole = ~same & _agrees(mean, plain)
+        slope = np.where(whole, plain, wrapped)
+        wrong = judged & ~(same | whole) & ~np.isnan(mean)
+        right = judged & (same | whole)
+        right &= np.maximum(np.abs(mean), np.abs(slope)) > 2.0 * FLOOR
+        if wrong.any():
+            last = int(np.flatnonzero(wrong)[-1])
+            self.doubted += int(wrong.sum())
+            self.factor = float(mean[last] / slope[last]) if slope[last] else math.nan
+        says = np.where(wrong, DOUBTED, np.where(right, PROVEN, UNPROVEN))
+        return np.where(fresh, np.nan, slope), says, ~fresh & ~judged
+
+
+def _agree(a: float, b: float) -> bool:
+    """Return whether two rates are about the same; False if one is not known."""
     return abs(a - b) <= SHARE * max(abs(a), abs(b)) + FLOOR
+
+
+def _agrees(a: Floats, b: Floats) -> NDArray[np.bool_]:
+    """Return `_agree` of many rates (n,)."""
+    found: NDArray[np.bool_] = abs(a - b) <= SHARE * np.maximum(abs(a), abs(b)) + FLOOR
+    return found

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
-from ugv_acceptance.evaluation.inputs.joint_rates import CELL, JointRate
+from ugv_acceptance.evaluation.inputs.joint_rates import CELL, PROVEN, JointRate
 from ugv_acceptance.evaluation.inputs.joint_words import (
     foreign_words,
     missing_words,
@@ -190,20 +190,26 @@ class JointMerger:
         cell, told, odd = now // CELL, self._turns.told, []
         fresh, layout.cell = cell != layout.cell, cell
         for j, k in pairs:
-            joint, (lower, upper) = self.settings.joints[j], self._range[j]
+            joint, (lower, upper), rate = self.settings.joints[j], self._range[j], self.rates[j]
             told[j] = q = joint.sign * position[k] + joint.offset
             qd = joint.sign * velocity[k] if rates else math.nan
             qd = qd if -ABSURD <= qd <= ABSURD else math.nan
-            rate = self.rates[j]
             if fresh and rate.cell != cell:
                 rate.step(now, stamp, q if -ABSURD <= q <= ABSURD else math.nan, qd)
-            self.qd[j], self.speed[j] = rate.best(qd)
+            # Most messages hold a rate that is believed: as JointRate.best, without a call.
+            if rate.trust == PROVEN and qd == qd:  # noqa: PLR0124 - not NaN
+                self.qd[j] = self.speed[j] = qd
+            else:
+                self.qd[j], self.speed[j] = rate.best(qd)
             scale = joint.effort_sign * joint.effort_scale
             self.effort[j] = scale * effort[k] if efforts else math.nan
-            if lower <= q <= upper:
-                self._place(j, now, q)
-            else:
+            if not lower <= q <= upper:
                 odd.append(j)
+            elif -self._most[j] <= q - self._told[j] <= self._most[j]:
+                self._told[j] = self.q[j] = q
+                self.seen[j] = now
+            else:
+                self._place(j, now, q)
         for j in odd:
             apart, slope = now - self.seen[j], self.rates[j].slope
             known = self._turns.judge(j, self._told[j], apart, slope)
