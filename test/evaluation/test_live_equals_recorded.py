@@ -32,6 +32,7 @@ from hypothesis import strategies as st
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
+from ugv_acceptance.model.robot import Vector
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 
@@ -205,7 +206,7 @@ def test_a_position_that_is_not_a_number_makes_margins_unknown() -> None:
     assert ('INPUT_INVALID', 'joint_states') in {(a.rule.code, a.rule.subject) for a in alerts}
 
 
-def endless(velocity: float = 2.0, axis: tuple[float, ...] = (0.0, -1.0, 0.0)) -> Settings:
+def endless(velocity: float = 2.0, axis: Vector = (0.0, -1.0, 0.0)) -> Settings:
     """Return settings in which the lift has no range, and its axis is another."""
     told = settings()
     lift = replace(
@@ -253,7 +254,7 @@ def stubborn(draw: st.DrawFn) -> list[Message]:
     st.sampled_from([(0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]),
 )
 def test_repeats_turns_and_rates_are_equal_too(
-    messages: list[Message], cuts: list[int], velocity: float, axis: tuple[float, ...]
+    messages: list[Message], cuts: list[int], velocity: float, axis: Vector
 ) -> None:
     """Repeated messages, turns beyond a full one, and rates that contradict, in any batches."""
     compare(endless(velocity, axis), messages, cuts, [T0 + 700 * MS], S)

@@ -27,7 +27,12 @@ def reasons(found: ugv.Evaluation) -> str:
 
 def swing(rate: float, amplitude: float) -> Callable[[Floats], Floats]:
     """Return a way to and fro with a greatest rate (rad/s)."""
-    return lambda t: amplitude * np.sin(rate / amplitude * t)
+
+    def way(t: Floats) -> Floats:
+        result: Floats = amplitude * np.sin(rate / amplitude * t)
+        return result
+
+    return way
 
 
 def stroke(
@@ -117,16 +122,24 @@ def test_what_truly_needs_more_than_the_limit_never_passes(seed: int, tmp_path: 
         assert 'its motion up to' not in reasons(found)
 
 
+def to_and_fro(t: Floats) -> Floats:
+    """Turn at 7.2 deg/s to one side, then to the other, without a pause."""
+    result: Floats = -0.3 * np.abs((0.42 * t) % 2 - 1)
+    return result
+
+
+def through_a_turn(t: Floats) -> Floats:
+    """Turn at 10 deg/s, told within 0 and a full turn."""
+    result: Floats = np.mod(RAD(10) * t + 5.0, math.tau) - 0.1
+    return result
+
+
 GOOD: dict[str, Callable[[], Run]] = {
     'rest': rest,
     'noise of 1 mrad': lambda: rest(20.0, noise=1e-3),
     'noise of 1 mrad at 100 Hz': lambda: rest(20.0, hz=100.0, noise=1e-3),
-    'triangle at 7.2 deg/s': lambda: moved(
-        rest(20.0, noise=1e-3), 1, lambda t: -0.3 * np.abs((0.42 * t) % 2 - 1)
-    ),
-    'turret at 10 deg/s through a turn': lambda: moved(
-        rest(40.0, noise=1e-3), 0, lambda t: np.mod(RAD(10) * t + 5.0, math.tau) - 0.1
-    ),
+    'triangle at 7.2 deg/s': lambda: moved(rest(20.0, noise=1e-3), 1, to_and_fro),
+    'turret at 10 deg/s through a turn': lambda: moved(rest(40.0, noise=1e-3), 0, through_a_turn),
     'swing at 25 deg/s': lambda: moved(rest(20.0, noise=1e-3), 1, swing(RAD(25), 0.3)),
     'stroke of 20 deg/s': lambda: moved(rest(noise=1e-3), 1, stroke(-RAD(20), 2.0, 4.0, 1.0)),
     'elbow at 30 deg/s': lambda: moved(rest(20.0, noise=1e-3), 2, swing(RAD(30), 0.4)),

@@ -27,6 +27,8 @@ from ugv_acceptance.type_aliases import Floats, Json, Times
 # Joints slower than this (rad/s, m/s) are slow: the paper's typical 7 deg/s and its starts and
 # stops belong to the static model.
 FAST = 0.2
+# Between two looks a fast joint moves at QUICK of that rate at least.
+QUICK = 0.75
 # Positions are looked at once in so many ns to find fast ones, and so much (ns) is kept for the
 # next part of the recording.
 COARSE, KEPT = 100_000_000, 1_000_000_000
@@ -69,13 +71,18 @@ class _Rows:
         """Return these rows with those of `other` before them."""
         if other is None:
             return self
-        names = ('time', 'stamp', 'q', 'torque', 'known')
-        return _Rows(*(np.concatenate((getattr(other, n), getattr(self, n))) for n in names))
+        return _Rows(
+            np.concatenate((other.time, self.time)), np.concatenate((other.stamp, self.stamp)),
+            np.concatenate((other.q, self.q)), np.concatenate((other.torque, self.torque)),
+            np.concatenate((other.known, self.known)),
+        )  # fmt: skip
 
     def since(self, time: int) -> '_Rows':
         """Return the rows received at `time` (ns) or later."""
         late = self.time >= time
-        return _Rows(*(x[late] for x in (self.time, self.stamp, self.q, self.torque, self.known)))
+        return _Rows(
+            self.time[late], self.stamp[late], self.q[late], self.torque[late], self.known[late]
+        )
 
 
 @dataclass(slots=True)
@@ -140,7 +147,7 @@ class DynamicBound:
         way = np.abs(np.diff(rows.q[firsts], axis=0))
         turns = np.array(self._turns)
         way = np.minimum(way, np.where(turns > 0.0, np.abs(way - turns), np.inf))
-        return bool((way[:, self._moves] > 0.5 * FAST * seconds[:, np.newaxis]).any())
+        return bool((way[:, self._moves] > QUICK * FAST * seconds[:, np.newaxis]).any())
 
     def _judge(self, track: Track, rows: _Rows) -> None:
         """Judge the part of a track that was not judged before."""
@@ -213,7 +220,7 @@ class DynamicBound:
             'fast_s': self.fast,
             'joints': {name: self._result(name, w, start) for name, w in found},
         }
-        unchecked = ()
+        unchecked: tuple[NotChecked, ...] = ()
         if self.unknown > 0.0:
             why = 'joint states come too seldom, or too irregularly, to tell accelerations'
             unchecked = (NotChecked('dynamic torques of fast joints', why, self.unknown),)

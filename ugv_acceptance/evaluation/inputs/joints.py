@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
-from ugv_acceptance.evaluation.inputs.joint_rates import CELL, PROVEN, JointRate
+from ugv_acceptance.evaluation.inputs.joint_rates import CELL, DOUBTED, PROVEN, JointRate
 from ugv_acceptance.evaluation.inputs.joint_words import (
     foreign_words,
     missing_words,
@@ -185,22 +185,47 @@ class JointMerger:
             layout.first = now
         if not pairs or len(position) != len(names):
             return False
-        self._repeat(layout, now, stamp, position)
-        rates, efforts = len(velocity) == len(names), len(effort) == len(names)
+        repeats = layout.repeats
+        if repeats.seconds or (stamp == repeats.stamp and stamp):
+            self._repeat(repeats, now, stamp, position)
+        else:
+            repeats.stamp, repeats.since, repeats.position = stamp, now, tuple(position)
+            self.repeated = 0.0
+        odd = self._take(now, stamp, layout, position, velocity, effort)
+        for j in odd:
+            apart, slope = now - self.seen[j], self.rates[j].slope
+            known = self._turns.judge(j, self._told[j], apart, slope)
+            self._place(j, now, self._turns.told[j] if known else math.nan)
+        if now // SECOND != layout.second or self._has_jumped:
+            self._look(now, layout)
+        return True
+
+    def _take(
+        self,
+        now: int,
+        stamp: int,
+        layout: Layout,
+        position: Sequence[float],
+        velocity: Sequence[float],
+        effort: Sequence[float],
+    ) -> list[int]:
+        """Take the numbers of a message; return the joints whose positions are out of range."""
+        rates, efforts = len(velocity) == len(position), len(effort) == len(position)
         cell, told, odd = now // CELL, self._turns.told, []
         fresh, layout.cell = cell != layout.cell, cell
-        for j, k in pairs:
+        for j, k in layout.pairs:
             joint, (lower, upper), rate = self.settings.joints[j], self._range[j], self.rates[j]
             told[j] = q = joint.sign * position[k] + joint.offset
             qd = joint.sign * velocity[k] if rates else math.nan
             qd = qd if -ABSURD <= qd <= ABSURD else math.nan
             if fresh and rate.cell != cell:
                 rate.step(now, stamp, q if -ABSURD <= q <= ABSURD else math.nan, qd)
-            # Most messages hold a rate that is believed: as JointRate.best, without a call.
-            if rate.trust == PROVEN and qd == qd:  # noqa: PLR0124 - not NaN
-                self.qd[j] = self.speed[j] = qd
+            # As JointRate.best, without a call.
+            if qd == qd:  # noqa: PLR0124 - not NaN
+                self.qd[j] = rate.slope if rate.trust == DOUBTED else qd
+                self.speed[j] = qd if rate.trust == PROVEN else rate.slope
             else:
-                self.qd[j], self.speed[j] = rate.best(qd)
+                self.qd[j] = self.speed[j] = rate.slope
             scale = joint.effort_sign * joint.effort_scale
             self.effort[j] = scale * effort[k] if efforts else math.nan
             if not lower <= q <= upper:
@@ -210,18 +235,12 @@ class JointMerger:
                 self.seen[j] = now
             else:
                 self._place(j, now, q)
-        for j in odd:
-            apart, slope = now - self.seen[j], self.rates[j].slope
-            known = self._turns.judge(j, self._told[j], apart, slope)
-            self._place(j, now, told[j] if known else math.nan)
-        if now // SECOND != layout.second or self._has_jumped:
-            self._look(now, layout)
-        return True
+        return odd
 
-    def _repeat(self, layout: Layout, now: int, stamp: int, position: Sequence[float]) -> None:
+    def _repeat(self, repeats: Repeats, now: int, stamp: int, position: Sequence[float]) -> None:
         """Note whether a message repeats the one before of the same names."""
-        before = layout.repeats.seconds > 0.0
-        self.repeated = layout.repeats.step(now, stamp, position)
+        before = repeats.seconds > 0.0
+        self.repeated = repeats.step(now, stamp, position)
         self.repeating += (self.repeated > 0.0) - before
 
     def _place(self, j: int, now: int, q: float) -> None:
@@ -305,11 +324,11 @@ class JointMerger:
         looked = [(self.layout(x), rows) for x, rows in rows_of.items()]
         self._look_at(time, raw, tables[0], named, looked)
         before = list(self._turns.told)
-        rows, speed, seen = self._carry(time, stamp, tables, named)
-        self.told = Told(*repeats, speed, rows.q, raw, named, before, seen)
+        merged, speed, seen = self._carry(time, stamp, tables, named)
+        self.told = Told(*repeats, speed, merged.q, raw, named, before, seen)
         for j in range(joints * bool(n)):
             self._turns.told[j] = self._told_at(j, n - 1)
-        return rows
+        return merged
 
     def _note_first(self, segments: Sequence[JointStateColumns]) -> None:
         for segment in segments:

@@ -143,8 +143,8 @@ class Turns:
         size = np.abs(np.delete(told, j, axis=0))
         limited = np.array([of.limited for k, of in enumerate(self.joints) if k != j])
         degrees = (size[limited] > FULL).any(axis=0)
-        some: NDArray[np.bool_] = ((size > SOME) & (size <= FULL)).any(axis=0)
-        return some & ~degrees
+        radians: NDArray[np.bool_] = ((size > SOME) & (size <= FULL)).any(axis=0) & ~degrees
+        return radians
 
 
 def _step(of: Turning, apart: Values) -> Values:
