@@ -328,8 +328,8 @@ def test_another_recording_has_another_hash(papers: Path) -> None:
     [
         ('{', 'expected JSON'),
         ('[]', 'expected the result of one recording'),
-        ('{"version": 99}', 'expected a result of version 1, got 99'),
-        ('{"version": 1}', 'bag: expected a result of evaluate'),
+        ('{"version": 99}', 'expected a result of version 2, got 99'),
+        ('{"version": 2}', 'bag: expected a result of evaluate'),
     ],
 )
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -24,7 +24,8 @@ from ugv_acceptance.evaluation.inputs.timeouts import WINDOW, InputTimeout
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.permitted_limits import RANGES, Permitted, limits_hash, relaxed
 from ugv_acceptance.evaluation.settings import Delays
-from ugv_acceptance.offline.evaluate import evaluate, judge
+from ugv_acceptance.offline.evaluate import evaluate
+from ugv_acceptance.offline.judge import judge
 from ugv_acceptance.report.format import doubts_of
 
 MS, S = 1_000_000, 1_000_000_000

@@ -28,7 +28,8 @@ def test_a_result_is_told_in_seconds_newton_metres_and_degrees() -> None:
     """What was never seen is None; the least tilt names its edge."""
     found = result_of(gathered(), [], T0 - S, 4 * S)
     assert found['coverage'] == {
-        'evaluated_s': 3.0, 'duration_s': 4.0, 'fraction': 0.75, 'messages_judged': 77
+        'evaluated_s': 3.0, 'duration_s': 4.0, 'fraction': 0.75, 'messages_judged': 77,
+        'longest_unseen_s': 0.0, 'unseen_s': [], 'unseen_stretches': 0, 'unseen_total_s': 0.0,
     }  # fmt: skip
     assert found['torque']['lift'] == {
         'limit': 40.0, 'unit': 'N m', 'max_abs': 35.0, 'min_margin': 5.0, 'time_of_min_s': 1.5,

@@ -24,7 +24,7 @@ from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
-from ugv_acceptance.offline.evaluate import judge
+from ugv_acceptance.offline.judge import judge
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,9 +124,21 @@ def test_what_is_wrong_with_a_topic_is_named(
 ) -> None:
     """Absent, of another type, not matching, shared, slow, with gaps: each with what to do."""
     around = healthy()
+    assert around.joint_states is not None
     changed = replace(around, joint_states=replace(around.joint_states, **change))
     found = findings(changed)
     assert [f for f in found if f.level == level and advice in f.do], found
+
+
+@pytest.mark.parametrize(
+    ('absent', 'said'), [('imu', 'tip-over is not checked'), ('joint_states', 'no torque is')]
+)
+def test_an_input_that_is_not_used_is_no_fault(absent: str, said: str) -> None:
+    """Of an input that the configuration does without, the doctor says what is not checked."""
+    around = replace(healthy(), **{absent: None})
+    assert [f for f in examine(around, CONFIG) if f.level != OK] == []
+    (found,) = [f for f in examine(around, CONFIG) if f.about == absent]
+    assert said in found.seen
 
 
 LIFT = YAML.replace('limit_nm: 30', 'limit_nm: 30\n    sign: -1\n    offset_deg: 10')

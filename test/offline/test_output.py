@@ -11,7 +11,7 @@ from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.bag.recording import Recording, open_recording
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
-from ugv_acceptance.offline.evaluate import Options, judge
+from ugv_acceptance.offline.judge import Options, judge
 from ugv_acceptance.offline.output import CsvSink, ParquetSink
 
 SETTINGS = load().settings

@@ -15,7 +15,8 @@ from ugv_acceptance.campaign.run_table import Row, row_of
 from ugv_acceptance.campaign.sources import Source, local_paths
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
-from ugv_acceptance.offline.evaluate import RESULT_VERSION, Options, evaluate
+from ugv_acceptance.offline.evaluate import evaluate
+from ugv_acceptance.offline.judge import RESULT_VERSION, Options
 from ugv_acceptance.type_aliases import Json
 
 

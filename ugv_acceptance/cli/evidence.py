@@ -68,7 +68,8 @@ def evaluate_files(
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.evaluation.downsampling import StripRecorder
-    from ugv_acceptance.offline.evaluate import Options, evaluate
+    from ugv_acceptance.offline.evaluate import evaluate
+    from ugv_acceptance.offline.judge import Options
     from ugv_acceptance.offline.output import CsvSink, ParquetSink
 
     recording, settings = open_recording(paths), config.settings

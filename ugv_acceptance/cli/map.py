@@ -95,7 +95,8 @@ def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':
     import numpy as np
 
     from ugv_acceptance import BadBag
-    from ugv_acceptance.offline.evaluate import Options, evaluate
+    from ugv_acceptance.offline.evaluate import evaluate
+    from ugv_acceptance.offline.judge import Options
 
     parts: list[Floats] = []
     take = Options(takers=(lambda rows: parts.append(rows.q),))

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
 
@@ -18,6 +18,7 @@ COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yello
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
 _MOST_EFFORTS = 11
+_MOST_WARNINGS = 6
 # More messages than this have a rate, if they can be used.
 _FEW = 100
 # A payload (kg) estimated below minus this means that the arm rests on something.
@@ -75,6 +76,7 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'      {escape(line)}', soft_wrap=True)
     for doubt in doubts_of(result):
         console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
+    _print_warnings(result['robot']['warnings'] if 'robot' in result else (), console)
     if result['criteria']['path'] is not None:
         _print_criteria(result['criteria']['results'], console)
     console.print(_margins(result))
@@ -82,6 +84,15 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     _print_alerts(result, console)
     if 'effort' in result:
         _print_effort(result, console)
+
+
+def _print_warnings(warnings: Sequence[str], console: Console) -> None:
+    """Print what is odd with the robot's own files: margins are only as good as these."""
+    for text in warnings[:_MOST_WARNINGS]:
+        console.print(f'    [bold yellow]warning:[/] {escape(text)}', soft_wrap=True)
+    more = len(warnings) - _MOST_WARNINGS
+    if more > 0:
+        console.print(f'    and {more} more warnings (`ugv-acceptance model` lists them)')
 
 
 def _print_criteria(outcomes: list[dict[str, Any]], console: Console) -> None:
@@ -107,8 +118,10 @@ def _margins(result: dict[str, Any]) -> Table:
             _number(joint['time_in_violation_s'], 's', 2),
         )
     stability = result['stability']
+    unread = result['inputs']['imu']['topic'] is None
+    edge = 'not checked' if unread else stability['edge'] or 'no polygon'
     table.add_row(
-        f'tip-over ({stability["edge"] or "no polygon"})',
+        f'tip-over ({edge})',
         '',
         '',
         _number(stability['min_angle_deg'], 'deg'),
@@ -134,6 +147,9 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
     )
     for key in ('joint_states', 'imu'):
         source = result['inputs'][key]
+        if source['topic'] is None:
+            console.print(f'  {key}: not read')
+            continue
         rate = source['rate_hz']
         faults = ', '.join([*source['faults'], *_malformed(source)])
         missing = missing_text(source, coverage['duration_s'])

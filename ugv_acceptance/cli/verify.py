@@ -61,7 +61,7 @@ def read_result(path: Path) -> Json:
     """Return a result of one recording. Raises AcceptanceError where the file is none of ours."""
     import json
 
-    from ugv_acceptance.offline.evaluate import RESULT_VERSION
+    from ugv_acceptance.offline.judge import RESULT_VERSION
 
     try:
         told = json.loads(path.read_text('utf-8'))
@@ -107,7 +107,8 @@ def again(
     import json
 
     from ugv_acceptance.config import load
-    from ugv_acceptance.offline.evaluate import Options, evaluate
+    from ugv_acceptance.offline.evaluate import evaluate
+    from ugv_acceptance.offline.judge import Options
 
     try:
         paths = bag or [_near(path, folder, '--bag') for path in told['bag']['path']]

@@ -23,8 +23,9 @@ from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.offline.evaluate import Options, evaluate
+from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.offline.evaluation import Evaluation
+from ugv_acceptance.offline.judge import Options
 from ugv_acceptance.type_aliases import Times
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -114,8 +115,13 @@ class ShownRecording:
             int(track.state[k]) if known else nothing.state,
             payload,
             alerts,
-            (*(self._input(w, k, when) for w in range(2)), self._payload_input(when)),
+            (*(self._input(w, k, when) for w in self._used()), self._payload_input(when)),
         )
+
+    def _used(self) -> list[int]:
+        """Return the numbers of the inputs that the configuration uses."""
+        used = (self.settings.hears_joints, self.settings.hears_imu)
+        return [which for which in range(2) if used[which]]
 
     def _near(self, when: int) -> list[tuple[int, Alert]]:
         return [

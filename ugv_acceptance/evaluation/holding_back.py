@@ -8,10 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.model.stability import UNKNOWN
+from ugv_acceptance.type_aliases import Floats
 
 # The longest time (ns) that a contradiction reaches back.
 LONGEST_REACH = 12_000_000_000
@@ -39,17 +41,24 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
     doubtful &= rows.known
     if not doubtful.any():
         return rows
-    blank = {
-        name: np.where(doubtful.reshape(-1, *[1] * (table.ndim - 1)), np.nan, table)
-        for name in ('torque', 'angle', 'moment', 'energy', 'zmp')
-        if len(table := getattr(rows, name))
-    }
     return replace(
         rows,
         known=rows.known & ~doubtful,
         state=np.where(doubtful, np.int8(UNKNOWN), rows.state),
-        **blank,
+        torque=_blank(rows.torque, doubtful),
+        angle=_blank(rows.angle, doubtful),
+        moment=_blank(rows.moment, doubtful),
+        energy=_blank(rows.energy, doubtful),
+        zmp=_blank(rows.zmp, doubtful),
     )
+
+
+def _blank(table: Floats, some: NDArray[np.bool_]) -> Floats:
+    """Return a table (n, ...) in which some of the rows are NaN; an empty one as it is."""
+    if not len(table):
+        return table
+    blank = np.where(some.reshape(-1, *[1] * (table.ndim - 1)), np.nan, table)
+    return blank.astype(np.float64, copy=False)
 
 
 @dataclass(slots=True)

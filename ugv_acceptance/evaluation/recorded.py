@@ -15,8 +15,12 @@ from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
-from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout, clock_words
+from ugv_acceptance.evaluation.inputs.payload import (
+    PayloadHistory,
+    payload_fault,
+    payload_from,
+)
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -90,6 +94,16 @@ class RecordedEvaluator:
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
         imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0)
         self._carry = _Newest(joints, never, imu, never)
+        if not self.settings.hears_imu:
+            down = ImuRows(never, never, np.array([[0.0, 0.0, -robot.gravity]]), never > 0)
+            self._carry = _Newest(joints, never, down, never + FOREVER)
+        for fresh in self._unheard():
+            fresh.last = FOREVER
+
+    def _unheard(self) -> Iterator[InputTimeout]:
+        """Yield the timeouts of inputs that are not needed: they are never stale."""
+        heard = (self.settings.hears_joints, self.settings.hears_imu)
+        yield from (fresh for fresh, need in zip(self.fresh, heard, strict=True) if not need)
 
     @property
     def orientations(self) -> dict[str, int]:
@@ -125,9 +139,12 @@ class RecordedEvaluator:
 
         It is when an input becomes stale, unless the next batch brings a message before.
         """
-        joints = self._joints.merge_columns(batch.joints)
-        imu = self._imu.columns(batch.imu)
-        joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+        imu = self._imu.columns(batch.imu if self.settings.hears_imu else ())
+        if self.settings.hears_joints:
+            joints = self._joints.merge_columns(batch.joints)
+            joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+        else:
+            joints, joint_limits = _without_joints(imu), np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
         self._watch_inputs(joints, joint_limits, imu)
         self._take_payloads(batch.payload)
@@ -188,10 +205,11 @@ class RecordedEvaluator:
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
-            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
-            self.watch.payload.step(when, 0.0 if payload else 1.0)
+            told = self.settings.robot, s.mass[k], s.com[k], s.frame_id
+            payload = payload_from(*told)
+            self.watch.declared(when, '' if payload else payload_fault(*told))
+            self._payload.declare(when, payload)
             if payload:
-                self._payload.declare(when, payload)
                 self.first_payload = self.first_payload or (when, payload)
 
     def _margins(self, newest: _Newest) -> MarginRows:
@@ -200,13 +218,18 @@ class RecordedEvaluator:
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
         from_joints = order < len(joints.time) - 1
+        of_joints, of_imu = np.cumsum(from_joints), np.cumsum(~from_joints)
+        if not self.settings.hears_joints:  # only IMU messages bring margins
+            order, of_joints = order[~from_joints], of_joints[~from_joints]
+            of_imu = of_imu[~from_joints]
         time = time[order]
-        pairs = Pairs(joints, imu, np.cumsum(from_joints), np.cumsum(~from_joints))
+        pairs = Pairs(joints, imu, of_joints, of_imu)
         j, i = pairs.of_joints, pairs.of_imu
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
-        whole = np.asarray(np.isfinite(joints.q).all(axis=1))
+        payload = self._payload.at(joints.time)
+        whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(payload[0])
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
-        table, state = self._table(pairs, whole, known)
+        table, state = self._table(pairs, whole, known, payload)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
             time=time,
@@ -223,31 +246,38 @@ class RecordedEvaluator:
         )
 
     def _table(
-        self, pairs: Pairs, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+        self,
+        pairs: Pairs,
+        whole: NDArray[np.bool_],
+        known: NDArray[np.bool_],
+        payload: Sequence[Floats | float],
     ) -> tuple[Floats, NDArray[np.int8]]:
         """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
 
-        `whole` says which joint rows have all positions, `known` which rows have margins.
+        `whole` says which joint rows have all positions and a known `payload` (mass and place),
+        `known` which rows have margins.
         """
         q = pairs.joints.q
-        payload = self._payload.at(pairs.joints.time)
         n = q.shape[1]
         table = np.empty((n + (13 if self.detail else 4), len(known)))
         state = np.full(len(known), UNKNOWN, np.int8)
         rows: Rows = ALL
-        if not known.all():
+        if not self.settings.hears_imu or not known.all():
             table.fill(np.nan)
+        if not known.all():
             rows = np.flatnonzero(known)
         j, i = pairs.of_joints[rows], pairs.of_imu[rows]
         if not len(j):
             return table, state
         columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
-        mass, x, y, z = payload
+        mass, x, y, z = (_known(number, whole) for number in payload)
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
         gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
         with np.errstate(over='ignore', invalid='ignore'):
             for line, torque_gradient in zip(table, posture.torque_gradients, strict=False):
                 line[rows] = _product(torque_gradient, j, gravity)
+        if not self.settings.hears_imu:
+            return table, state
         for some, stance in self._stances(posture, len(q), j):
             found = self._stability(stance, pick(gravity, some))
             place = some if isinstance(rows, slice) else rows[some]
@@ -294,14 +324,19 @@ class RecordedEvaluator:
             worse = _with(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
-        state = rows.state if all_known else rows.state[rows.known]
+        if self.settings.hears_imu:
+            self._watch_stand(rows, time, lost)
+        self.watch.predict_rows(rows)
+
+    def _watch_stand(self, rows: MarginRows, time: Times, lost: '_Lost') -> None:
+        """Judge how the robot stands, in the rows with margins; `time` has `lost` among them."""
+        state = rows.state[rows.known]
         feed(self.watch.support, time, _with(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
         if self.watch.slide.on < np.inf:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
             slope = slides_first(tuple(gravity.T), least, friction)
             feed(self.watch.slide, time, _with(slope, lost))
-        self.watch.predict_rows(rows)
 
     def _lost(self, rows: MarginRows) -> '_Lost':
         """Return when margins became unknown that were known before."""
@@ -310,7 +345,8 @@ class RecordedEvaluator:
         before, known, until = self._known_until, rows.known, rows.until
         self._known_until = int(until[-1]) if known[-1] else None
         ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
-        place, time = np.cumsum(known)[ends], until[ends]
+        place = np.cumsum(known, dtype=np.intp)[ends]
+        time = until[ends]
         if before is not None and (rows.time[0] > before or not known[0]):
             first = min(before, int(rows.time[0]))
             place, time = np.append(0, place), np.append(first, time)
@@ -335,6 +371,17 @@ def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floa
     x, y, z = pick(torque_gradient, rows)
     product: Floats = x * gravity[0] + y * gravity[1] + z * gravity[2]
     return product
+
+
+def _known(number: Floats | float, whole: NDArray[np.bool_]) -> Floats | float:
+    """Return a number of the payload with 0 where it is not known, so that it can be computed."""
+    return number if isinstance(number, float) else np.where(whole, number, 0.0)
+
+
+def _without_joints(imu: ImuRows) -> JointRows:
+    """Return the joint states of a robot without measured joints, one row an IMU message."""
+    none, no = np.empty((len(imu.time), 0)), np.zeros(len(imu.time), np.bool_)
+    return JointRows(imu.time, imu.stamp, none, none, none, imu.time, no)
 
 
 def _lead(before: Any, rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows

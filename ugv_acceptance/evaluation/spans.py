@@ -68,7 +68,7 @@ class UnseenStretches:
     spans: Spans = field(default_factory=Spans)
     longest: int = 0
     _seen_until: int = field(init=False)
-    _provisional: int | None = None
+    _last: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         self._seen_until = self.start
@@ -78,30 +78,33 @@ class UnseenStretches:
         if not len(rows.time):
             return
         self._settle(int(rows.time[0]))
-        some = np.flatnonzero(rows.known)
-        if not len(some):
-            return
-        begin, end = rows.time[some], np.maximum.accumulate(rows.until[some])
-        before = np.append(self._seen_until, np.maximum(end[:-1], self._seen_until))
-        self._note(before, begin)
-        if some[-1] == len(rows.time) - 1:
-            self._seen_until = max(int(before[-1]), int(begin[-1]))
-            self._provisional = int(rows.until[-1])
-        else:
-            self._seen_until = max(self._seen_until, int(end[-1]))
+        some = rows.known[:-1]
+        self._see(rows.time[:-1][some], rows.until[:-1][some])
+        if rows.known[-1]:
+            self._last = int(rows.time[-1]), int(rows.until[-1])
 
     def finish(self, now: int) -> None:
         """Finish at the end of the recording, `now` (ns)."""
         self._settle(now)
-        if now > self._seen_until:
-            self._note(np.array([self._seen_until]), np.array([now]))
+        self._note(np.array([self._seen_until]), np.array([now]))
         self.spans.close()
 
     def _settle(self, now: int) -> None:
         """Count the last row, now that the next message or the end (`now`, ns) is known."""
-        if self._provisional is not None:
-            self._seen_until = max(self._seen_until, min(self._provisional, now))
-        self._provisional = None
+        if self._last is not None:
+            start, until = self._last
+            self._see(np.array([start]), np.array([min(until, now)]))
+        self._last = None
+
+    def _see(self, start: Times, end: Times) -> None:
+        """Take spans (n,) with margins, in order; one without length shows nothing."""
+        some = end > start
+        if not some.any():
+            return
+        start, end = start[some], np.maximum.accumulate(end[some])
+        before = np.append(self._seen_until, np.maximum(end[:-1], self._seen_until))
+        self._note(before, start)
+        self._seen_until = max(self._seen_until, int(end[-1]))
 
     def _note(self, start: Times, end: Times) -> None:
         length = end - start

@@ -136,7 +136,7 @@ class Advisory:
     def slide(self) -> float:
         """Return the slope (rad) left until the tracks slide; infinite if it is not known."""
         margins, settings = self.evaluator.margins, self.evaluator.settings
-        if margins is None:
+        if margins is None or not settings.hears_imu:
             return math.inf
         return float(slide_left(margins.gravity, settings.limits.friction))
 

@@ -13,7 +13,8 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import pattern_words
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.offline.evaluate import Options, evaluate
+from ugv_acceptance.offline.evaluate import evaluate
+from ugv_acceptance.offline.judge import Options
 from ugv_acceptance.plan.plan import Step, matches
 from ugv_acceptance.type_aliases import Floats
 

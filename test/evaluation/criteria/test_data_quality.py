@@ -7,7 +7,7 @@ import pytest
 from ugv_acceptance.evaluation.criteria.quantities import DATA, measured_of, unit_of
 
 RESULT: dict[str, Any] = {
-    'coverage': {'fraction': 0.97, 'duration_s': 61.5},
+    'coverage': {'fraction': 0.97, 'duration_s': 61.5, 'longest_unseen_s': 1.8},
     'bag': {
         'protected': 'all', 'salvaged': None, 'lost_messages': 7,
         'findings': ['one', 'two', 'three'],
@@ -26,7 +26,7 @@ RESULT: dict[str, Any] = {
 }  # fmt: skip
 OF_RUN = {
     'coverage': 0.97, 'duration': 61.5, 'protected': 1.0, 'salvaged': 0.0, 'findings': 3.0,
-    'late_messages': 4.0, 'lost_messages': 7.0,
+    'late_messages': 4.0, 'lost_messages': 7.0, 'longest_unseen': 1.8,
 }  # fmt: skip
 OF_INPUTS = {
     'messages': (500.0, 900.0), 'rate': (49.5, None), 'gaps': (2.0, 0.0),
@@ -35,7 +35,7 @@ OF_INPUTS = {
 
 
 def test_every_quantity_is_of_the_run_or_of_an_input() -> None:
-    """There are thirteen: seven of the run, six of each input."""
+    """There are fourteen: eight of the run, six of each input."""
     assert {*DATA} == {*OF_RUN, *OF_INPUTS}
 
 
@@ -72,4 +72,4 @@ def test_a_file_that_breaks_off_counts_one() -> None:
 def test_only_times_and_rates_have_a_unit() -> None:
     """Of the data quantities only times and rates have a unit."""
     units = {name: unit_of(name) for name in DATA if unit_of(name)}
-    assert units == {'duration': 's', 'rate': 'Hz', 'longest_gap': 's'}
+    assert units == {'longest_unseen': 's', 'duration': 's', 'rate': 'Hz', 'longest_gap': 's'}

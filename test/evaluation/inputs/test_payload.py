@@ -20,7 +20,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 )
 from ugv_acceptance.evaluation.criteria.messages import demand_words
 from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
-from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
+from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_fault, payload_from
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 
@@ -91,10 +91,30 @@ def test_only_a_load_that_can_be_is_taken(
     assert found == (Payload(mass, com) if known else None)
 
 
+@pytest.mark.parametrize('frame', ['hand', '/hand', 'ra/hand', '/ra/hand', 'a/b/hand', ''])
+def test_a_tf_prefix_makes_no_other_frame(frame: str) -> None:
+    """A namespace before the payload link's name, or no frame at all, is that link."""
+    assert payload_from(TOLD.robot, 1.0, (0.0, 0.0, 0.0), frame) == Payload(1.0)
+
+
+@pytest.mark.parametrize('frame', ['hand2', 'left_hand', 'hand/base', 'base', 'ra/', ' hand'])
+def test_what_only_looks_like_the_frame_is_another(frame: str) -> None:
+    """A frame whose last part is not the payload link's name is another frame."""
+    assert payload_from(TOLD.robot, 1.0, (0.0, 0.0, 0.0), frame) is None
+
+
 def test_a_robot_without_a_hand_carries_nothing() -> None:
-    """A robot without a payload link takes no payload, whatever the frame."""
+    """A robot without a payload link takes no payload but 0 kg, whatever the frame."""
     robot = Robot('r', TOLD.robot.links[:1], (), ())
     assert payload_from(robot, 1.0, (0.0, 0.0, 0.0), '') is None
+    assert payload_from(robot, 0.0, (0.0, 0.0, 0.0), 'hand') == Payload()
+
+
+def test_a_long_frame_is_told_in_one_short_line() -> None:
+    """A frame of any length or letters stays one readable line in an alert."""
+    words = payload_fault(TOLD.robot, 1.0, (0.0, 0.0, 0.0), 'x\n' * 500)
+    assert words.isprintable()
+    assert len(words) < 200
 
 
 @given(st.lists(st.integers(0, 50), max_size=6), st.lists(st.integers(0, 50), min_size=1))

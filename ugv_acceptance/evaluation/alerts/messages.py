@@ -195,10 +195,10 @@ ALERTS = {
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
     'PAYLOAD_INVALID': AlertText(
-        'the declared payload cannot be used',
+        'the declared payload cannot be used: {detail}',
         'declare a mass of 0 kg or more, in the frame of the payload link',
         FailureSource.INTERACTION,
-        'The load that was declared cannot be used.',
+        'The load that was declared cannot be used: no margin is known until a good one comes.',
     ),
     'LIMITS_RELAXED': AlertText(
         '{relaxed}',
@@ -255,6 +255,12 @@ ALERTS = {
         FailureSource.INTERACTION,
         level=WARN,
     ),
+    'MARGIN_UNCERTAIN': AlertText(
+        '{detail}',
+        'treat this margin as used up: bring the load closer, lower the arm, face the slope',
+        FailureSource.INTERACTION,
+        level=WARN,
+    ),
     'MONITOR_FAULT': AlertText(
         'the monitor could not evaluate a message of {subject}: {detail}',
         'internal error of the program: report it with the log of the node',
@@ -278,7 +284,9 @@ def describe(alert: Alert, settings: Settings) -> str:
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
-    text = ALERTS[rule.code].happened + (f': {_plain(alert.detail)}' if alert.detail else '')
+    text = ALERTS[rule.code].happened
+    if alert.detail and '{detail}' not in text:
+        text += ': {detail}'
     return text.format(
         subject=rule.subject,
         peak=peak,
@@ -292,12 +300,8 @@ def describe(alert: Alert, settings: Settings) -> str:
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
         relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
+        detail=alert.detail,
     )
-
-
-def _plain(text: str) -> str:
-    """Return text as a template that says just this."""
-    return text.replace('{', '{{').replace('}', '}}')
 
 
 def _relaxed(name: str, settings: Settings) -> str:

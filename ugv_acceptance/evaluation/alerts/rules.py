@@ -23,6 +23,16 @@ LEAP_REACH = 2_000_000_000
 LEAP = 10.0
 
 
+def urgency(code: str, level: int) -> int:
+    """Return how urgent an alert is among those of its level: the larger, the sooner it is told.
+
+    What contradicts the IMU comes before a tip-over that was drawn from it, and that before others.
+    """
+    if code.startswith('IMU_') and level > WARN:
+        return 2
+    return 1 if code in ('TIP_OVER', 'NO_SUPPORT') else 0
+
+
 @dataclass(slots=True)
 class RuleSet:
     """The signals of all alert rules of a robot; `log` receives every alert that is raised.
@@ -88,6 +98,12 @@ class RuleSet:
             found = {breach.name for breach in relaxed(self.settings)}
             for name, signal in self.relaxed.items():
                 signal.step(now, 1.0 if name in found else 0.0)
+
+    def declared(self, now: int, fault: str) -> None:
+        """Take a declared payload at `now` (ns); `fault` says why it cannot be used; '': it can."""
+        if fault:
+            self.payload.detail = fault
+        self.payload.step(now, 1.0 if fault else 0.0)
 
     def predict(self) -> None:
         """Judge the live samples kept for the prediction; call it before time passes."""

@@ -40,7 +40,7 @@ class Rule:
 class Alert:
     """An alert that was raised: times in ns; `peak` is the worst value; `end` None while active.
 
-    `detail` says in words what was found when its value became bad; '' if its code says it all.
+    `detail` says in words what the numbers do not: which value came, and which was expected.
     """
 
     rule: Rule
@@ -56,8 +56,8 @@ class Signal:
 
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
     when the state changes unless the value does first. While `quiet`, only a value of `on` or more
-    can change anything, so callers may skip smaller ones. `detail` goes to the next alert: set it
-    before a value that is bad while `raw` is not.
+    can change anything, so callers may skip smaller ones. `detail` is what an alert raised next
+    says in words: set it before a value that is bad while `raw` is not.
     """
 
     rule: Rule

@@ -312,6 +312,7 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
 
 def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: Bounds) -> None:
     """Add the bound at the worst moment to each joint's and to the tip-over margin of `result`."""
+    result['stability']['uncertainty'] = None  # there is no demand on it without an IMU
     for measure in limits.measures.values():
         if not isinstance(measure, ValueMeasure):
             continue

@@ -34,6 +34,7 @@ from ugv_acceptance.evaluation.criteria.messages import (
     missing_reasons,
     violation_words,
 )
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.criteria.quantities import measured_of, shown, unit_of
 from ugv_acceptance.evaluation.criteria.safeguards import (
     Safeguarded,
@@ -263,7 +264,9 @@ def _overall(
         if reasons:
             return word, list(dict.fromkeys(reasons))
     share = findings.data['coverage']['fraction']
-    text = 'all margins kept' if findings.measurement.criteria.path is None else 'all criteria met'
+    text = 'all criteria met'
+    if findings.measurement.criteria.path is None:
+        text = kept_words(findings.settings)
     wider = relaxed_words(findings.settings)
     return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Signal, feed
+from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
@@ -230,9 +231,8 @@ def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[fl
 
 def _foreign(frame: str, expected: str) -> float:
     """Return 1 if a message names another frame than `expected` (a namespace may precede)."""
-    named = frame.lstrip('/')
-    same = named in ('', expected) or named.endswith(f'/{expected}')
-    return 0.0 if same or not expected else 1.0
+    told = expected and frame.lstrip('/')
+    return 1.0 if told and not same_frame(frame, expected) else 0.0
 
 
 def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:

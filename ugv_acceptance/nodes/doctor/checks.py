@@ -1,7 +1,7 @@
 """Checks a set-up: turns what `probe.py` received into findings, each with what to do."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
 
@@ -27,6 +27,11 @@ SLOWEST = 10.0
 LEVEL = math.radians(15)
 # A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
 OUTSIDE = 0.1
+# What is said of an input that the configuration does not use.
+ABSENT = {
+    'joint_states': 'not needed: the robot has no measured joints, so no torque is checked',
+    'imu': 'none: the base was declared level, so tip-over is not checked',
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +54,17 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
     if len(around.monitors) > 1:
         text = f'{len(around.monitors)} monitors of the same name run'
         yield Finding(WARN, 'monitor', text, 'stop all but one, or give them namespaces')
-    yield from _topic('joint_states', around.joint_states, around.seconds)
-    if around.joint_states.samples:
-        yield from _joints(around.joint_states.samples, config)
-    yield from _topic('imu', around.imu, around.seconds)
-    if around.imu.samples:
-        yield from _imu(around.imu.samples, config)
+    looks: tuple[tuple[str, Heard | None, Callable[..., Iterator[Finding]]], ...] = (
+        ('joint_states', around.joint_states, _joints),
+        ('imu', around.imu, _imu),
+    )
+    for name, heard, look in looks:
+        if heard is None:
+            yield Finding(OK, name, ABSENT[name])
+            continue
+        yield from _topic(name, heard, around.seconds)
+        if heard.samples:
+            yield from look(heard.samples, config)
 
 
 def _topic(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:

@@ -61,11 +61,12 @@ class Inputs:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._soon: Timer = node.create_timer(_SOON, self._look, clock=steady)
         self.publishers: dict[str, list[str]] = {}
-        rows = (
-            ('joint_states', JointState, topics.joint_states, session.take_joint_state),
-            ('imu', Imu, topics.imu, session.take_imu),
-            ('payload', InertiaStamped, topics.payload, session.take_payload),
-        )
+        every: dict[str, tuple[Any, Callable[[bytes], None]]] = {
+            'joint_states': (JointState, session.take_joint_state),
+            'imu': (Imu, session.take_imu),
+            'payload': (InertiaStamped, session.take_payload),
+        }
+        rows = [(name, topic, *every[name]) for name, topic in topics.used.items()]
         self.voices = {name: Voices() for name, _, _, _ in rows}
         self.subscriptions: dict[str, Subscription] = {
             name: node.create_subscription(
@@ -76,7 +77,7 @@ class Inputs:
                 event_callbacks=self._events(name),
                 raw=True,
             )
-            for name, kind, topic, take in rows
+            for name, topic, kind, take in rows
         }
         self._malformed = dict.fromkeys(self.subscriptions, 0)
 

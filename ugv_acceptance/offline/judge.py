@@ -1,0 +1,274 @@
+"""Judges a recording: reads it once, and makes the part of a result that needs no files but it."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.bag.reading import Facts
+from ugv_acceptance.bag.recording import Recording
+from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
+from ugv_acceptance.evaluation.criteria.criteria import (
+    CriteriaSet,
+    default_criteria,
+)
+from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
+from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
+from ugv_acceptance.evaluation.criteria.statement import Examination
+from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
+from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
+from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.holding_back import HeldMargins
+from ugv_acceptance.evaluation.input_times import InputTimes
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.permitted_limits import limits_hash, relaxed
+from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.reported_rates import ReportedRates
+from ugv_acceptance.evaluation.samples import Batch
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
+from ugv_acceptance.offline.evaluation import Judgement
+from ugv_acceptance.type_aliases import Json
+
+# Version of the result's layout; it changes when programs that read results must change.
+RESULT_VERSION = 2
+
+# Messages evaluated at a time, so that the arrays of a kernel stay in the processor's cache.
+STRETCH = 16384
+
+
+Taker = Callable[[MarginRows], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How a recording is read, and what else is done with its margins.
+
+    Each of `takers` is called with the margins of every part of the recording in order; they hold
+    moments, energies and ZMP if `detail` asks for them. `progress` is called with the log time (ns)
+    reached. With `compare_effort` the result compares measured efforts at rest. `readers` is the
+    number of threads that read, by default two if there is more than one core.
+    """
+
+    takers: tuple[Taker, ...] = ()
+    progress: Callable[[int], None] = lambda _: None
+    detail: bool = False
+    compare_effort: bool = False
+    readers: int | None = None
+
+
+DEFAULTS = Options()
+
+
+def judge(
+    recording: Recording,
+    settings: Settings,
+    criteria: CriteriaSet | None = None,
+    sources: tuple[Source, ...] = (),
+    options: Options = DEFAULTS,
+) -> tuple[Json, Judgement]:
+    """Read a recording once; return its result for JSON and the objects it was made from.
+
+    The result holds what follows from margins, alerts and data, without robot, software and
+    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
+    """
+    bag, topics = recording.bag, recording.chosen(imu_required=False)
+    span = bag.start_ns, bag.end_ns
+    limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
+    asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
+    evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
+    reading = _Reading(settings, evaluator, limits, asked, options)
+    batches = bag.batches(topics, workers=options.readers)
+    evaluator.start(bag.start_ns)
+    for batch in _stretches(batches):
+        reading.take(batch)
+    evaluator.finish(bag.end_ns)
+    reading.finish(bag.end_ns)
+    log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
+    _explain_silence(log, topics, batches.facts)
+    data = {
+        **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
+        'bag': _bag_result(bag, topics, batches.facts),
+        'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
+        'model_check': reading.check.result(),
+    }
+    statements = [e.statement(*span) for e in reading.examinations]
+    absent = absent_imu(settings, topics.imu)
+    statements.append(absent)
+    statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
+    for statement in statements:
+        data |= statement.result
+    findings = Findings(
+        asked, ordered(log), data, Bounds(settings, sources), statements, reading.held.doubtful
+    )
+    margin_bounds(data, limits, findings.bounds)
+    result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
+    # The cause goes before what follows from it.
+    causes = [objection.reason for objection in absent.objections]
+    result['reasons'].sort(key=lambda reason: reason not in causes)
+    return result, Judgement(settings, topics, evaluator, batches.facts, asked)
+
+
+def _examinations(
+    settings: Settings, evaluator: RecordedEvaluator, limits: CriteriaMeasurement
+) -> tuple[Examination, ...]:
+    """Return what looks at a run beside its criteria."""
+    return (
+        DynamicBound(settings, limits.payloads.at),
+        InputTimes(),
+        ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
+    )
+
+
+@dataclass(slots=True)
+class _Reading:
+    """Gives each part of a recording's margins to all that needs them, while it is read.
+
+    What decides gets them held back: without the margins that a later contradiction reaches.
+    """
+
+    settings: Settings
+    evaluator: RecordedEvaluator
+    limits: CriteriaMeasurement
+    asked: CriteriaMeasurement
+    options: Options
+    summary: Summary = field(init=False)
+    check: ModelCheck = field(init=False)
+    told: AlertAdvice = field(init=False)
+    held: HeldMargins = field(init=False)
+    examinations: tuple[Examination, ...] = field(init=False)
+    _load_told: bool = False
+
+    def __post_init__(self) -> None:
+        self.summary = Summary(self.settings, self.limits.start)
+        self.check = ModelCheck(self.settings)
+        self.examinations = _examinations(self.settings, self.evaluator, self.limits)
+        log = self.evaluator.watch.log
+        self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
+        self.held = HeldMargins(log)
+
+    def take(self, batch: Batch) -> None:
+        """Take the messages of the next part of the recording."""
+        for measurement in self._measurements:
+            measurement.payloads.take(batch.payload)
+        rows = self.evaluator.batch(batch)
+        for take in (self.told.add, *self.options.takers):
+            take(rows)
+        self._distrust_first_load(rows)
+        for believed in self.held.add(rows):
+            self._judge(believed)
+        if len(rows.time):
+            self.options.progress(int(rows.time[-1]))
+
+    def finish(self, now: int) -> None:
+        """Finish at the end of the recording, `now` (ns)."""
+        for believed in self.held.finish():
+            self._judge(believed)
+        for finish in (self.summary.finish, *(e.finish for e in self._measurements)):
+            finish(now)
+
+    def _distrust_first_load(self, rows: MarginRows) -> None:
+        """Distrust the margins before a load that was told at once: they rest on another one."""
+        span = unknown_load(self.settings, self.evaluator.first_payload, self.limits)
+        if span is None or self._load_told:
+            return
+        used = rows.pairs.joints.time[rows.pairs.of_joints] >= span[1]
+        self._load_told = bool(used.any())
+        until = int(rows.time[used.argmax()]) if self._load_told else span[1]
+        self.held.distrust((span[0], until))
+
+    @property
+    def _measurements(self) -> list[CriteriaMeasurement]:
+        return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
+
+    def _judge(self, rows: MarginRows) -> None:
+        parts = (self.summary.add, self.check.add, *(e.add for e in self._measurements))
+        for take in (*parts, *(e.add for e in self.examinations)):
+            take(rows)
+
+
+def _limits(settings: Settings) -> dict[str, Any]:
+    """Return the hash of the limits in force, and which are wider than permitted, and why."""
+    found = [breach.words for breach in relaxed(settings)]
+    told = {'reason': settings.unsafe, 'limits': found} if found else None
+    return {'limits_hash': limits_hash(settings), 'limits_relaxed': told}
+
+
+def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:
+    """Yield batches merged to at least STRETCH messages each, to save calls."""
+    held: list[Batch] = []
+    count = 0
+    for batch in batches:
+        held.append(batch)
+        count += sum(len(s.log_time) for s in batch.joints)
+        count += sum(len(s.log_time) for s in batch.imu)
+        if count >= STRETCH:
+            yield _together(held)
+            held, count = [], 0
+    if held:
+        yield _together(held)
+
+
+def _together(batches: Sequence[Batch]) -> Batch:
+    return Batch(
+        [s for b in batches for s in b.joints],
+        [s for b in batches for s in b.imu],
+        [s for b in batches for s in b.payload],
+    )
+
+
+def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None:
+    """Say in the alerts about silent inputs where messages came, but were malformed."""
+    names = {'joint_states': topics.joint_states, 'imu': topics.imu}
+    for alert in log:
+        if alert.rule.code == 'INPUT_STALE' and not alert.detail:
+            topic = names.get(alert.rule.subject) or ''
+            count, reason = facts.malformed.get(topic, (0, ''))
+            if count:
+                total = facts.counts[topic]
+                alert.detail = f'{count} of {total} are malformed; the first: {reason}'
+
+
+def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
+    names = (topics.joint_states, topics.imu, topics.payload)
+    held = {name: bag.topics[name].count for name in names if name in bag.topics}
+    return {
+        'path': [str(path) for path in bag.paths],
+        'sha256': bag.sha256(),
+        'duration_s': bag.duration_s,
+        'messages': {name: topic.count for name, topic in bag.topics.items()},
+        'protected': bag.protected,
+        'salvaged': bag.salvaged,
+        # Only of the topics read here: losing a camera's messages does not affect the verdict.
+        'lost_messages': sum(max(0, bag.promised.get(n, 0) - k) for n, k in held.items()),
+        'findings': [*bag.findings, *facts.findings],
+    }
+
+
+def _inputs_result(
+    evaluator: RecordedEvaluator, topics: Topics, facts: Facts, start: int
+) -> dict[str, Any]:
+    names = {'joint_states': topics.joint_states, 'imu': topics.imu}
+    result: dict[str, Any] = {}
+    for which, (key, topic) in enumerate(names.items()):
+        period, gaps = evaluator.fresh[which].period, evaluator.gaps[which]
+        lengths = [(end - begin) / 1e9 for begin, end in gaps]
+        faults = {a.rule.code for a in evaluator.watch.log if a.rule.subject == key}
+        malformed = facts.malformed.get(topic or '', (0, ''))
+        result[key] = {
+            'topic': topic,
+            'messages': facts.counts.get(topic or '', 0),
+            'rate_hz': 1e9 / period if period > 0 else None,
+            'malformed': malformed[0],
+            'malformed_reason': malformed[1] or None,
+            'gaps': len(gaps),
+            'longest_gap_s': max(lengths, default=0.0),
+            'first_gaps_s': [[(a - start) / 1e9, (b - start) / 1e9] for a, b in gaps[:20]],
+            'faults': sorted(faults),
+        }
+    result['imu']['orientation'] = evaluator.orientations
+    result['late_messages'] = facts.late
+    return result
