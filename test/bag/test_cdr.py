@@ -140,8 +140,28 @@ def test_error_says_which_field() -> None:
 def test_array_of_another_length_than_names() -> None:
     """Three positions for two names are malformed, not cut to fit."""
     message = joint_state(names=('a', 'b'), arrays=((1, 2, 3), (), ()))
-    with pytest.raises(BadSample, match='position: expected 0 or 2 values'):
+    with pytest.raises(BadSample, match='position: expected 2 values'):
         joint_state_decoder().one(cdr(message))
+
+
+def test_positions_without_names() -> None:
+    """A driver that leaves the names out is told that they are empty."""
+    message = joint_state(names=(), arrays=((1, 2), (), ()))
+    with pytest.raises(BadSample, match='the names are empty, but there are 2 positions'):
+        joint_state_decoder().one(cdr(message))
+
+
+@pytest.mark.parametrize('effort', [(), (5.0,), (5.0, 6.0), (5.0, 6.0, 7.0)])
+@pytest.mark.parametrize('velocity', [(), (3.0,), (3.0, 4.0), (3.0, 4.0, 5.0)])
+def test_rates_and_efforts_that_are_not_one_a_name_count_as_not_given(
+    velocity: tuple[float, ...], effort: tuple[float, ...]
+) -> None:
+    """The positions are whole and stay; the two ways of decoding agree."""
+    data = cdr(joint_state(names=('a', 'b'), arrays=((1.0, 2.0), velocity, effort)))
+    sample = joint_state_decoder().one(data)
+    assert sample.position == (1.0, 2.0)
+    assert sample.velocity == (velocity if len(velocity) == 2 else ())
+    assert sample.effort == (effort if len(effort) == 2 else ())
 
 
 def test_huge_counts_do_not_allocate() -> None:

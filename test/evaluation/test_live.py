@@ -60,14 +60,22 @@ def _facts(a: Alert) -> tuple[str, int, int | None, float]:
 @pytest.mark.parametrize(
     ('rate', 'found'),
     [
-        (0.6, [('lift', 100, None, 0.6)]), (-0.6, [('lift', 100, None, 0.6)]), (0.5999, []),
+        (0.6, [('lift', 300, None, 0.6)]), (-0.6, [('lift', 300, None, 0.6)]), (0.5999, []),
         (-0.5999, []), (math.nan, []),
     ],
 )  # fmt: skip
 def test_a_speed_at_its_limit_is_too_fast(rate: float, found: Any) -> None:
-    """A joint speed equal to its limit raises the alert after its delay, in both directions."""
+    """A joint speed equal to its limit raises the alert after its delay, in both directions.
+
+    A reported rate is believed as soon as the positions of 0.2 s have proven it.
+    """
     limits = replace(FREE, speed=(0.6, math.inf))
-    run = run_of(1.0, joints=Joints(0, velocity=(rate, 9.0)))
+    run = [
+        replace(m, position=(0.1 + rate * (m.time - T0) / S, 0.0))
+        if isinstance(m, Joints) and rate == rate  # noqa: PLR0124 - not NaN
+        else m
+        for m in run_of(1.0, joints=Joints(0, velocity=(rate, 9.0)))
+    ]
     chosen = settings(limits=limits, delays=QUICK)
     assert told(run, T0 + S, 'STATIC_MODEL', chosen) == found
 
@@ -369,7 +377,8 @@ def test_a_live_robot_tells_its_level_rates_efforts_and_orientations() -> None:
     evaluator = LiveEvaluator(settings(limits=replace(FREE, speed=(0.6, math.inf)), delays=QUICK))
     evaluator.start(T0)
     for m in run_of(0.5, joints=Joints(0, velocity=(0.5, 0.1), effort=(0.02, 7.0))):
-        give(evaluator, m)
+        at = 0.1 + 0.5 * (m.time - T0) / S
+        give(evaluator, replace(m, position=(at, 0.0)) if isinstance(m, Joints) else m)
     assert evaluator.level == OK
     assert evaluator.evaluated == 74  # all but the first message
     assert evaluator.measured == ((-0.5, 0.1), (-20.0, 7.0))

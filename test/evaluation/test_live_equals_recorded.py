@@ -32,6 +32,7 @@ from hypothesis import strategies as st
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
+from ugv_acceptance.model.robot import Vector
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 
@@ -39,7 +40,8 @@ LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 def facts(alerts: list[Alert]) -> Counter[tuple[Any, ...]]:
     """Return what an alert says, as something to compare without its order."""
     return Counter(
-        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}') for a in alerts
+        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}', a.detail)
+        for a in alerts
     )
 
 
@@ -202,3 +204,57 @@ def test_a_position_that_is_not_a_number_makes_margins_unknown() -> None:
     seen, alerts = live(settings(), messages, T0 + S + MS)
     assert [margins for _, margins in seen[-2:]] == [None, None]
     assert ('INPUT_INVALID', 'joint_states') in {(a.rule.code, a.rule.subject) for a in alerts}
+
+
+def endless(velocity: float = 2.0, axis: Vector = (0.0, -1.0, 0.0)) -> Settings:
+    """Return settings in which the lift has no range, and its axis is another."""
+    told = settings()
+    lift = replace(
+        told.robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf,
+        velocity=velocity, axis=axis,
+    )  # fmt: skip
+    return replace(told, robot=replace(told.robot, joints=(lift, told.robot.joints[1])))
+
+
+_held = st.sampled_from([T0, T0 + 123, 0])
+
+
+@st.composite
+def stubborn(draw: st.DrawFn) -> list[Message]:
+    """Return streams whose joint states repeat stamps and positions, turn, and jump in units."""
+    at = st.sampled_from([0.0, 0.3, 1.0, 6.0, 6.5, 7.0, 12.0, 60.0, -90.0])
+    slides = st.sampled_from([0.0, 0.2, 0.3])
+    names = st.sampled_from(
+        [('lift', 'hand_slide'), ('lift',), ('hand_slide', 'lift'), ('a_lift',)]
+    )
+    found: list[Message] = []
+    now = T0
+    for _ in range(draw(st.integers(1, 8))):
+        kind, count = draw(st.sampled_from(['held', 'whole', 'new'])), draw(st.integers(1, 40))
+        wait = draw(st.sampled_from([20, 20, 50, 300])) * MS
+        which, values = draw(names), {'lift': draw(at), 'hand_slide': draw(slides), 'a_lift': 0.0}
+        turn, rate = draw(st.sampled_from([0.0, 0.0, 0.02, -0.2])), draw(st.floats(-60.0, 60.0))
+        constant = draw(_held)
+        for _ in range(count):
+            now += wait
+            values['lift'] += turn
+            stamp = {'held': constant, 'whole': now // S * S, 'new': now}[kind]
+            position = tuple(values[name] for name in which)
+            rates = tuple(rate for _ in which) if draw(st.booleans()) else ()
+            found.append(Joints(now, which, position, rates, stamp=stamp))
+            found.append(Imu(now + MS))
+    return found
+
+
+@hypothesis.settings(max_examples=60)
+@given(
+    stubborn(),
+    st.lists(st.integers(0, 300), max_size=5),
+    st.sampled_from([2.0, 0.1, math.inf]),
+    st.sampled_from([(0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]),
+)
+def test_repeats_turns_and_rates_are_equal_too(
+    messages: list[Message], cuts: list[int], velocity: float, axis: Vector
+) -> None:
+    """Repeated messages, turns beyond a full one, and rates that contradict, in any batches."""
+    compare(endless(velocity, axis), messages, cuts, [T0 + 700 * MS], S)

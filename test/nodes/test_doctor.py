@@ -190,11 +190,29 @@ def test_degrees_are_asked_of_a_joint_that_they_would_bring_within_its_limits(
 
 
 @pytest.mark.parametrize('angle', [3 * math.tau, -3 * math.tau, 114.6, 1e4])
-@pytest.mark.parametrize('which', range(len(NAMES)))
-def test_an_endless_joint_may_stand_at_any_angle(angle: float, which: int) -> None:
-    """A wheel at three turns, or many, is no sign of degrees: nothing is said."""
+def test_an_upright_endless_joint_may_stand_at_any_angle(angle: float) -> None:
+    """A turret at three turns, or many, beside an arm in radians is no sign of degrees."""
+    assert findings(healthy(joint=joint_state(position=(angle, *FOLDED[1:])))) == []
+
+
+@pytest.mark.parametrize('angle', [3 * math.tau, -3 * math.tau, 114.6, 1e4])
+@pytest.mark.parametrize('which', range(1, len(NAMES)))
+def test_an_arm_beyond_a_full_turn_may_be_told_in_degrees(angle: float, which: int) -> None:
+    """Shoulder, elbow and flipper FAIL there, with the unit and the key that takes turns off."""
     position = tuple(angle if k == which else q for k, q in enumerate(FOLDED))
-    assert findings(healthy(joint=joint_state(position=position))) == []
+    (found,) = findings(healthy(joint=joint_state(position=position)))
+    assert (found.level, found.about) == (FAIL, NAMES[which])
+    assert 'degrees instead of radians?' in found.seen
+    assert f'joints.{NAMES[which]}.offset_rad' in found.seen
+
+
+def test_names_with_a_prefix_are_shown_with_the_keys_to_set() -> None:
+    """The near match of every joint stands in the advice, and that they share a prefix."""
+    names = tuple(f'r1_{name}' for name in NAMES)
+    (found,) = findings(healthy(joint=joint_state(names=names, position=FOLDED)))
+    assert found.level == FAIL
+    assert f'joints.{NAMES[1]}.topic_name: r1_{NAMES[1]}' in found.do
+    assert 'all with the prefix r1_' in found.do
 
 
 def doctor(*options: str) -> 'subprocess.Popen[str]':

@@ -31,7 +31,8 @@ _MAX_LAYOUTS = 256
 class JointStateSample(NamedTuple):
     """A decoded sensor_msgs/JointState; SI, radians, `stamp` in ns.
 
-    Each of `position`, `velocity`, `effort` is empty or as long as `names`. Messages with equal
+    Each of `position`, `velocity`, `effort` is empty or as long as `names`; velocities and efforts
+    of another length are left out. Messages with equal
     names share one `names` object.
     """
 

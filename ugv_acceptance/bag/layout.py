@@ -114,7 +114,11 @@ class Cursor:
 
 
 def joint_state_body(cursor: Cursor) -> tuple[Names, Blocks]:
-    """Walk the body of a sensor_msgs/JointState: names and three blocks."""
+    """Walk the body of a sensor_msgs/JointState: names and three blocks.
+
+    Velocities or efforts that are not one a name belong to nobody knows which: they count as not
+    given, and the positions are whole all the same.
+    """
     number = cursor.count('name')
     if number * 4 > len(cursor.data):
         msg = f'name: {number} names do not fit in {len(cursor.data)} bytes'
@@ -123,11 +127,18 @@ def joint_state_body(cursor: Cursor) -> tuple[Names, Blocks]:
     blocks = []
     for where in ('position', 'velocity', 'effort'):
         values = cursor.count(where)
-        if values not in (0, number):
-            msg = f'{where}: expected 0 or {number} values (one a name), got {values}'
-            raise BadSample(msg)
-        blocks.append(cursor.floats(values, where))
+        if where == 'position' and values not in (0, number):
+            raise BadSample(_unequal(number, values))
+        at = cursor.floats(values, where)
+        blocks.append(at if values == number else (at[0], 0))
     return names, blocks
+
+
+def _unequal(names: int, positions: int) -> str:
+    """Return in words that there are not as many positions as names."""
+    if not names:
+        return f'name: the names are empty, but there are {positions} positions'
+    return f'position: expected {names} values (one a name) or none, got {positions}'
 
 
 def imu_body(cursor: Cursor) -> tuple[Names, Blocks]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
-from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE
+from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Signal
 from ugv_acceptance.evaluation.chassis.motion import (
     NO_RATE,
     UNWITNESSED,
@@ -20,7 +20,7 @@ from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
@@ -116,7 +116,7 @@ class LiveEvaluator:
         A message that names none of the robot's joints is ignored.
         """
         joints, watch = self._joints, self.watch
-        if not joints.merge(now, names, position, velocity, effort):
+        if not joints.merge(now, names, position, velocity, effort, stamp):
             return self.margins
         self._arrived(0, now, stamp, watch.joints)
         known = all(map(math.isfinite, joints.q))
@@ -125,11 +125,18 @@ class LiveEvaluator:
         )
         # Here and below: a small value cannot change a quiet signal, so most calls are saved.
         if unusable or not watch.joints.invalid.quiet:
+            if unusable and not watch.joints.invalid.raw:
+                watch.joints.invalid.detail = joints.unusable_words()
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
-        old = now - min(joints.seen) > self._fresh[0].limit
+        limit = self._fresh[0].limit
+        old = now - min(joints.seen) > limit
         if old or not watch.missing.quiet:
+            if old and not watch.missing.raw:
+                watch.missing.detail = joints.missing_words(now, limit)
             watch.missing.step(now, 1.0 if old else 0.0)
-        for signal, rate in zip(watch.speed, joints.qd, strict=True):
+        if joints.repeated or not watch.repeated.quiet:
+            watch.repeated.step(now, joints.repeated)
+        for signal, rate in zip(watch.speed, joints.speed, strict=True):
             if rate >= signal.on or rate <= -signal.on or not signal.quiet:
                 signal.step(now, abs(rate))
         if known:
@@ -224,10 +231,8 @@ class LiveEvaluator:
 
     def tick(self, now: int) -> None:
         """Let time pass to `now` (ns) without a message: judge silence, delays and predictions."""
-        for fresh, signals in zip(self._fresh, (self.watch.joints, self.watch.imu), strict=True):
-            due = fresh.deadline
-            if due is not None and now > due:
-                signals.stale.set(due, 1.0)
+        for which, signals in enumerate((self.watch.joints, self.watch.imu)):
+            self._silent(which, now, signals.stale)
         if self.load_known and self.watch.payload.raw:  # a person declared another since
             self.watch.declared(now, '')
         self.watch.relax(now if self._began is None else self._began)
@@ -256,22 +261,34 @@ class LiveEvaluator:
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
         fresh = self._fresh[which]
-        stale, clock = signals.stale, signals.clock
-        due = fresh.deadline
-        if due is not None and now > due:
-            stale.set(due, 1.0)
+        stale, clock, slow = signals.stale, signals.clock, signals.slow
+        self._silent(which, now, stale)
         if not stale.quiet:
             stale.clear(now)
         wrong = fresh.clock(now, stamp)
         if wrong or not clock.quiet:
+            if wrong and not clock.raw:
+                clock.detail = clock_words(now, stamp)
             clock.step(now, wrong)
+        if fresh.last is not None:
+            apart = (now - fresh.last) / 1e9
+            if apart >= slow.on or not slow.quiet:
+                slow.step(now, apart)
         fresh.message(now)
+
+    def _silent(self, which: int, now: int, stale: Signal) -> None:
+        """Judge whether an input has been silent for too long at `now` (ns)."""
+        due = self._fresh[which].deadline
+        if due is not None and now > due:
+            if which == 0 and not stale.raw:
+                stale.detail = self._joints.foreign_words(due)
+            stale.set(due, 1.0)
 
     def _alive_until(self) -> int:
         """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
         joints, imu = self._fresh
         seen = min(self._joints.seen, default=FOREVER)
-        if seen == NEVER or imu.last is None:
+        if seen == NEVER or imu.last is None or self._joints.repeating:
             return NEVER
         return min(seen + joints.limit, imu.last + imu.limit)
 

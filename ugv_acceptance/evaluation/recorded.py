@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
-from ugv_acceptance.evaluation.alerts.state_machine import feed
+from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
+from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
 from ugv_acceptance.evaluation.inputs.payload import (
     PayloadHistory,
     payload_fault,
     payload_from,
 )
-from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -120,6 +121,11 @@ class RecordedEvaluator:
         """The tracker of the IMU, with what its checks judged."""
         return self._imu
 
+    @property
+    def rates(self) -> list[JointRate]:
+        """How far the reported rate of each joint can be believed."""
+        return self._joints.rates
+
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
         for fresh in self.fresh:
@@ -134,7 +140,7 @@ class RecordedEvaluator:
         for fresh, signals, gaps in zip(self.fresh, inputs, self.gaps, strict=True):
             due = fresh.deadline
             if due is not None and now > due:
-                signals.stale.set(due, 1.0)
+                self._silent(signals.stale, due)
                 gaps.append((due, now))
         for signal in self.watch.signals():
             signal.advance(now)
@@ -153,9 +159,11 @@ class RecordedEvaluator:
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
         self._watch_inputs(joints, joint_limits, imu)
         self._take_payloads(batch.payload)
+        until = joints.oldest + joint_limits
+        until[self._joints.told.repeating] = NEVER
         newest = _Newest(
             _lead(self._carry.joints, joints),
-            np.concatenate((self._carry.joints_until, joints.oldest + joint_limits)),
+            np.concatenate((self._carry.joints_until, until)),
             _lead(self._carry.imu, imu),
             np.concatenate((self._carry.imu_until, imu.time + imu_limits)),
         )
@@ -177,21 +185,35 @@ class RecordedEvaluator:
         if not len(time):
             return time
         due = fresh.deadline
+        apart = np.diff(time, prepend=time[0] if fresh.last is None else fresh.last) / 1e9
         wrong = fresh.clocks(time, stamp)
         before, limits = fresh.messages(time)
         deadlines = np.append(time[0] if due is None else due, time[:-1] + before[1:])
         for k in np.flatnonzero(time > deadlines):
-            signals.stale.set(int(deadlines[k]), 1.0)
+            self._silent(signals.stale, int(deadlines[k]))
             signals.stale.clear(int(time[k]))
             self.gaps[which].append((int(deadlines[k]), int(time[k])))
         signals.stale.clear(int(time[-1]))
-        feed(signals.clock, time, wrong)
+        feed(signals.clock, time, wrong, lambda row: clock_words(int(time[row]), int(stamp[row])))
+        feed(signals.slow, time, apart)
         return limits
 
+    def _silent(self, stale: Signal, due: int) -> None:
+        """Take that an input was silent from `due` (ns) on."""
+        if stale is self.watch.joints.stale and not stale.raw:
+            stale.detail = self._joints.foreign_words(due)
+        stale.set(due, 1.0)
+
     def _watch_inputs(self, joints: JointRows, limits: Times, imu: ImuRows) -> None:
-        feed(self.watch.joints.invalid, joints.time, joints.unusable)
-        feed(self.watch.missing, joints.time, joints.time - joints.oldest > limits)
-        for signal, rate in zip(self.watch.speed, joints.qd.T, strict=True):
+        merger, time = self._joints, joints.time
+        feed(self.watch.joints.invalid, time, joints.unusable, merger.unusable_words)
+        old = time - joints.oldest > limits
+        feed(
+            self.watch.missing, time, old,
+            lambda row: merger.missing_words(int(time[row]), int(limits[row]), row),
+        )  # fmt: skip
+        feed(self.watch.repeated, time, merger.told.repeated)
+        for signal, rate in zip(self.watch.speed, merger.told.speed.T, strict=True):
             if signal.on < np.inf:
                 feed(signal, joints.time, np.abs(rate))
         feed(self.watch.imu.invalid, imu.time, imu.unusable)

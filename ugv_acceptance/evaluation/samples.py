@@ -17,8 +17,8 @@ class JointStateColumns:
     """Messages of sensor_msgs/JointState that all carry the same `names`.
 
     `position`, `velocity`, `effort` have shape (n, len(names)), or (n, 0) where the messages
-    leave that array empty. Messages whose arrays have any other length are left out: the decoder
-    counts them as malformed.
+    leave that array empty. Velocities and efforts of any other length count as not given; messages
+    whose positions have another length are left out: the decoder counts them as malformed.
     """
 
     names: tuple[str, ...]

@@ -8,6 +8,7 @@ from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -20,11 +21,14 @@ from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
 from ugv_acceptance.evaluation.holding_back import HeldMargins
+from ugv_acceptance.evaluation.input_times import InputTimes
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import limits_hash, relaxed
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.reported_rates import ReportedRates
 from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
@@ -86,6 +90,7 @@ def judge(
     evaluator.finish(bag.end_ns)
     reading.finish(bag.end_ns)
     log, length = evaluator.watch.log, bag.end_ns - bag.start_ns
+    _explain_silence(log, topics, batches.facts)
     data = {
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
         'bag': _bag_result(bag, topics, batches.facts),
@@ -109,10 +114,20 @@ def judge(
 
 
 def _examinations(
-    settings: Settings, sources: tuple[Source, ...], evaluator: RecordedEvaluator
+    settings: Settings,
+    sources: tuple[Source, ...],
+    evaluator: RecordedEvaluator,
+    limits: CriteriaMeasurement,
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    return ModelCheck(settings, sources), ImuExamination(evaluator.imu), ChassisExamination()
+    return (
+        ModelCheck(settings, sources),
+        ImuExamination(evaluator.imu),
+        ChassisExamination(),
+        DynamicBound(settings, limits.payloads.at),
+        InputTimes(),
+        ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
+    )
 
 
 @dataclass(slots=True)
@@ -136,7 +151,7 @@ class _Reading:
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
-        self.examinations = _examinations(self.settings, self.sources, self.evaluator)
+        self.examinations = _examinations(self.settings, self.sources, self.evaluator, self.limits)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)
@@ -209,6 +224,18 @@ def _together(batches: Sequence[Batch]) -> Batch:
         [s for b in batches for s in b.imu],
         [s for b in batches for s in b.payload],
     )
+
+
+def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None:
+    """Say in the alerts about silent inputs where messages came, but were malformed."""
+    names = {'joint_states': topics.joint_states, 'imu': topics.imu}
+    for alert in log:
+        if alert.rule.code == 'INPUT_STALE' and not alert.detail:
+            topic = names.get(alert.rule.subject) or ''
+            count, reason = facts.malformed.get(topic, (0, ''))
+            if count:
+                total = facts.counts[topic]
+                alert.detail = f'{count} of {total} are malformed; the first: {reason}'
 
 
 def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:

@@ -157,6 +157,18 @@ ALERTS = {
         FailureSource.COMMUNICATIONS,
         'Messages of a sensor have stopped: no margin is known.',
     ),
+    'JOINTS_REPEATED': AlertText(
+        '{subject} repeats one message: its stamp and all positions stand still for {peak:.1f} s',
+        'check its driver: it sends old positions, or does not set its header stamp',
+        FailureSource.SENSOR,
+        'The same joint positions come again and again: no margin is known.',
+    ),
+    'INPUT_SLOW': AlertText(
+        'the rate of {subject} is low: messages come up to {peak:.2f} s apart, margins are as old',
+        'raise the rate of its driver to at least 10 Hz; check the network',
+        FailureSource.COMMUNICATIONS,
+        'Too few messages come: margins may be old when they are shown.',
+    ),
     'INPUT_INCOMPLETE': AlertText(
         'at least one joint is missing from {subject}, or is no longer updated',
         'compare the joint names in the configuration with those on the topic',
@@ -362,7 +374,10 @@ def describe(alert: Alert, settings: Settings) -> str:
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
-    return ALERTS[rule.code].happened.format(
+    text = ALERTS[rule.code].happened
+    if alert.detail and '{detail}' not in text:
+        text += ': {detail}'
+    return text.format(
         subject=rule.subject,
         peak=peak,
         limit=limit,

@@ -1,6 +1,6 @@
 """The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
@@ -8,6 +8,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, A
 from ugv_acceptance.evaluation.chassis.motion import CALM, CAUTION, LIFT, LOW, ChassisSignals
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionSignals
+from ugv_acceptance.evaluation.inputs.repeats import ALLOWED as REPEATS_ALLOWED
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
 from ugv_acceptance.evaluation.settings import Settings
@@ -19,6 +20,10 @@ FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'TIP_MOVING', 'NO_SUPPORT')
 STRANGE = 0.15
 # Margin (rad) of a moving robot from which DANGER ends.
 MARGIN_BACK = 0.01745
+# An input is slow if SLOW (s) or more pass between its messages, one after the other for SLOW_FOR.
+SLOW, SLOW_FOR = 0.3, 2.0
+# An implausible jump is found by positions up to this (ns) before.
+LEAP_REACH = 2_000_000_000
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
 # What confirms a fault of the IMU takes so long (s), and makes as much doubtful: identical values;
@@ -55,6 +60,7 @@ class RuleSet:
     imu: 'InputSignals' = field(init=False)
     payload: Signal = field(init=False)
     missing: Signal = field(init=False)
+    repeated: Signal = field(init=False)
     jump_signals: list[Signal] = field(init=False)
     attitude: AttitudeSignals = field(init=False)
     prediction: Prediction = field(init=False)
@@ -85,6 +91,9 @@ class RuleSet:
         self.chassis = self._chassis()
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
+        self.repeated = _reaching(
+            self._fault('JOINTS_REPEATED', 'joint_states', STALE, 0.0), REPEATS_ALLOWED
+        )
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
         self.jump_signals = [self._jump_signal(name) for name in names]
         self.attitude = self._attitude()
@@ -174,7 +183,8 @@ class RuleSet:
     def _jump_signal(self, joint: str) -> Signal:
         limit = LEAP * self.settings.robot.joint(joint).velocity
         delay = self.settings.delays.fault_on
-        return self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+        leap = self._signal('POSITION_LEAP', joint, ERROR, (limit, limit), delay)
+        return _reaching(leap, LEAP_REACH + leap.rule.on_delay)
 
     def _attitude(self) -> AttitudeSignals:
         imu = self.settings.imu
@@ -219,6 +229,7 @@ class RuleSet:
             self._fault('INPUT_STALE', subject, STALE, 0.0),
             self._fault('INPUT_INVALID', subject, ERROR),
             self._fault('CLOCK', subject, WARN),
+            self._warning('INPUT_SLOW', subject, (SLOW, SLOW), SLOW_FOR),
         )
 
     @property
@@ -238,12 +249,12 @@ class RuleSet:
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
-        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
+        inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock, i.slow)]
         of = self.attitude
         attitude = [
             of.frame, of.orientation, of.strange, of.disagreement, of.nothing, *of.motion.all()
         ]  # fmt: skip
-        faults = [self.support, self.payload, self.missing, *attitude]
+        faults = [self.support, self.payload, self.missing, self.repeated, *attitude]
         return [
             *pairs,
             *self.speed,
@@ -257,10 +268,17 @@ class RuleSet:
         ]
 
 
+def _reaching(signal: Signal, reach: int) -> Signal:
+    """Return the signal with a rule that reaches back by so much (ns)."""
+    signal.judge_by(replace(signal.rule, reach=reach))
+    return signal
+
+
 @dataclass(frozen=True, slots=True)
 class InputSignals:
-    """The signals of one input: silence, unusable content, and a header clock that is off."""
+    """The signals of one input: silence, unusable content, header clock off, too few messages."""
 
     stale: Signal
     invalid: Signal
     clock: Signal
+    slow: Signal

@@ -4,7 +4,7 @@ The machine has no clock. An alert that becomes due between two samples is dated
 due, so the same data give the same alerts whether they come one at a time or in columns.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,7 +57,7 @@ class Signal:
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
     when the state changes unless the value does first. While `quiet`, only a value of `on` or more
     can change anything, so callers may skip smaller ones. `detail` is what an alert raised next
-    says in words.
+    says in words: set it before a value that is bad while `raw` is not.
     """
 
     rule: Rule
@@ -149,10 +149,16 @@ def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, 
             yield first, last, bool(sides[k])
 
 
-def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[Any]) -> None:
+def feed(
+    signal: Signal,
+    times: NDArray[np.int64],
+    values: NDArray[Any],
+    detail: Callable[[int], str] | None = None,
+) -> None:
     """Give a signal many samples (n,) at `times` (n,) in ns: the same alerts as `step` for each.
 
-    `values` are numbers, or booleans: whether the value is bad.
+    `values` are numbers, or booleans: whether the value is bad. `detail` returns the words for the
+    row at which the value became bad.
     """
     if not len(values):
         return
@@ -160,6 +166,8 @@ def feed(signal: Signal, times: NDArray[np.int64], values: NDArray[Any]) -> None
         return
     for first, last, bad in runs(signal.rule, values, raw=signal.raw):
         if bad:
+            if detail is not None and not signal.raw:
+                signal.detail = detail(first)
             signal.set(int(times[first]), float(np.fmax.reduce(values[first:last])))
         else:
             signal.clear(int(times[first]))

@@ -38,6 +38,7 @@ SAFEGUARDS = {
 # Alerts that are objections by themselves: code -> safeguard and verdict.
 ALERT_OBJECTIONS: dict[str, tuple[str, str]] = {
     'ENCODER_FROZEN': ('joint_positions', INCONCLUSIVE),
+    'INPUT_SLOW': ('unseen_stretches', INCONCLUSIVE),
 }
 # What a criterion on values is about, and the safeguard that would say the same again.
 _SAID_BY = {

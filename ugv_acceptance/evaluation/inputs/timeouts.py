@@ -122,3 +122,13 @@ class InputTimeout:
     def _silence(self, period: float) -> int:
         own = min(period * self.delays.stale_periods, LONGEST_SILENCE * 1e9)
         return int(max(own, self.delays.stale_after * 1e9))
+
+
+def clock_words(time: int, stamp: int) -> str:
+    """Return how far a header stamp is from the time of receipt (ns), or that it is 0."""
+    if not stamp:
+        return 'the stamp is 0'
+    behind = (time - stamp) / 1e9
+    if abs(behind) * 1e9 <= CLOCK_SLACK:
+        return ''
+    return f'{abs(behind):.1f} s {"before" if behind > 0.0 else "after"} receipt'

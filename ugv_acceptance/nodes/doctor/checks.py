@@ -10,6 +10,9 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.effort.facts import NONE, TORQUE, UNKNOWN
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests
 from ugv_acceptance.evaluation.effort.understanding import understand
+from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
+from ugv_acceptance.evaluation.inputs.joint_words import position_words
+from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import (
@@ -168,9 +171,9 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
     }
     missing = sorted(set(wanted) - names)
     if missing:
-        do = (
-            f'set joints.<joint>.topic_name; the topic has {", ".join(sorted(names)) or "no names"}'
-        )
+        pairs = [(wanted[topic_name][0], topic_name) for topic_name in missing]
+        do = what_to_set(pairs, names) or 'set joints.<joint>.topic_name'
+        do += f'; the topic has {names_words(sorted(names))}'
         yield Finding(FAIL, 'joint names', f'not on the topic: {", ".join(missing)}', do)
     else:
         text = f'all {len(wanted)} of the robot, {len(names) - len(wanted)} others'
@@ -187,11 +190,24 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
         if not _within(joint, q):
             text = f'at {q:.3f}, limits {joint.lower:.3f} to {joint.upper:.3f}'
             do = f'check joints.{name}.sign and offset'
-            # A continuous joint has no limits: its angle does not show a wrong unit.
             in_degrees = how.sign * math.radians(told) + how.offset
             if not joint.slides and _within(joint, in_degrees):
                 do += '; are degrees sent in place of radians?'
             yield Finding(FAIL, name, text, do)
+    yield from _beyond_a_turn(config, newest)
+
+
+def _beyond_a_turn(config: Config, newest: dict[str, float]) -> Iterator[Finding]:
+    """Yield the joints without a range whose positions are beyond a turn, and may be degrees."""
+    settings = config.settings
+    robot, turns = settings.robot, Turns(turning_of(settings.robot))
+    for j, how in enumerate(settings.joints):
+        turns.told[j] = how.sign * newest.get(how.topic_name, math.nan) + how.offset
+    for j, how in enumerate(settings.joints):
+        q = turns.told[j]
+        if turns.joints[j].limited and abs(q) > FULL and not turns.judge(j, math.nan, 0, 0.0):
+            joint = robot.joint(robot.joint_names[j])
+            yield Finding(FAIL, joint.name, position_words(joint, how, q))
 
 
 def _within(joint: Joint, q: float) -> bool:
