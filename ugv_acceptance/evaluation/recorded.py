@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
+from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
-from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
+from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
+from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.payload import (
     PayloadHistory,
     payload_fault,
@@ -143,13 +145,14 @@ class RecordedEvaluator:
         if self.settings.hears_joints:
             joints = self._joints.merge_columns(batch.joints)
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+            self._watch_joints(joints, joint_limits)
+            until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
-            joints, joint_limits = _without_joints(imu), np.full(len(imu.time), FOREVER)
+            joints = _without_joints(imu)
+            until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
-        self._watch_inputs(joints, joint_limits, imu)
+        feed(self.watch.imu.invalid, imu.time, imu.unusable)
         self._take_payloads(batch.payload)
-        until = joints.oldest + joint_limits
-        until[self._joints.told.repeating] = NEVER
         newest = _Newest(
             _lead(self._carry.joints, joints),
             np.concatenate((self._carry.joints_until, until)),
@@ -185,22 +188,26 @@ class RecordedEvaluator:
     def _silent(self, stale: Signal, due: int) -> None:
         """Take that an input was silent from `due` (ns) on."""
         if stale is self.watch.joints.stale and not stale.raw:
-            stale.detail = self._joints.foreign_words(due)
+            stale.detail = words.why_foreign(self._joints, due)
         stale.set(due, 1.0)
 
-    def _watch_inputs(self, joints: JointRows, limits: Times, imu: ImuRows) -> None:
+    def _watch_joints(self, joints: JointRows, limits: Times) -> None:
         merger, time = self._joints, joints.time
-        feed(self.watch.joints.invalid, time, joints.unusable, merger.unusable_words)
+        feed(
+            self.watch.joints.invalid,
+            time,
+            joints.unusable,
+            lambda row: words.why_unusable(merger, row),
+        )
         old = time - joints.oldest > limits
         feed(
             self.watch.missing, time, old,
-            lambda row: merger.missing_words(int(time[row]), int(limits[row]), row),
+            lambda row: words.what_is_missing(merger, int(time[row]), int(limits[row]), row),
         )  # fmt: skip
         feed(self.watch.repeated, time, merger.told.repeated)
         for signal, rate in zip(self.watch.speed, merger.told.speed.T, strict=True):
             if signal.on < np.inf:
                 feed(signal, joints.time, np.abs(rate))
-        feed(self.watch.imu.invalid, imu.time, imu.unusable)
 
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
