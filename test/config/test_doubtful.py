@@ -201,3 +201,17 @@ def test_public_robots_are_compared_rightly(tmp_path: Path, name: str) -> None:
         config = load(path)
         found.append(sum('outside of the collision' in text for text in config.warnings))
     assert found == [0, 4]
+
+
+@pytest.mark.parametrize(
+    ('place', 'warned', 'unknown'),
+    [('[1, 1, 0]', 0, ()), ('[1.5, 1, 0]', 0, ('a',)), ('[6, 1, 0]', 1, ())],
+)
+def test_beside_a_mesh_a_contact_is_not_compared_and_far_from_it_is_warned_of(
+    tmp_path: Path, place: str, warned: int, unknown: tuple[str, ...]
+) -> None:
+    """A mesh on a robot whose wheels are known reaches no further than about the robot's size."""
+    mesh = '<collision><geometry><mesh filename="package://x/top.stl"/></geometry></collision>'
+    config = config_of(tmp_path, YAML.replace('[1, 1, 0]', place), with_shape(BOX + mesh))
+    assert len(of(config, 'contacts.a.position')) == warned
+    assert config.not_compared == unknown

@@ -17,7 +17,7 @@ from ugv_acceptance import BadBag
 from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, PAYLOAD, Kind
 from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES
 from ugv_acceptance.bag.foreign import ForeignIndex, open_ros1, open_sqlite
-from ugv_acceptance.bag.mcap_index import Channel, McapIndex
+from ugv_acceptance.bag.mcap_index import SIMULATED, Channel, McapIndex
 from ugv_acceptance.bag.mcap_source import open_mcap
 from ugv_acceptance.bag.metadata import Metadata, files_of
 from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
@@ -79,6 +79,12 @@ class Bag:
     def duration_s(self) -> float:
         """Seconds from the first to the last log time."""
         return (self.end_ns - self.start_ns) * 1e-9
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the recording itself says of any of its topics that it was simulated."""
+        channels = (c for m in self.members for c in m.index.channels.values())
+        return any(channel.origin == SIMULATED for channel in channels)
 
     def sha256(self) -> str:
         """Return the SHA-256 of the file; of several, that of their digests in order of `paths`.

@@ -174,6 +174,29 @@ def _known(build: Build, path: Path, name: str, known: Sequence[str], what: str)
         raise build.refuse(path, f'the URDF has no {what} {shown(name)}; {hint}')
 
 
+def assumed_numbers(build: Build) -> tuple[tuple[str, str], ...] | None:
+    """Return the numbers that are only assumed, with the reasons; None if the file says nothing.
+
+    BadConfig for a name that begins with no link, joint or section of the file.
+    """
+    said, urdf = build.file.assumed, build.urdf
+    if said is None:
+        return None
+    of = [link.name for link in urdf.links] + [joint.name for joint in urdf.joints]
+    sections = [name for name in type(build.file).model_fields if name != 'assumed']
+    for name in said:
+        subject, _, what = name.partition('.')
+        if not what or subject not in (*of, *sections):
+            near = get_close_matches(subject, [*of, *sections], 1, 0.5)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            raise build.refuse(
+                ('assumed', name),
+                'expected a link, joint or section of this file, a point, and which number of it, '
+                f'such as shoulder_joint.limit, got {shown(name)}{hint}',
+            )
+    return tuple(said.items())
+
+
 def _list(names: Sequence[str]) -> str:
     return ', '.join(names[:8]) + (', ...' if len(names) > 8 else '') if names else 'none'
 

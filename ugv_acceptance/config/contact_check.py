@@ -52,19 +52,21 @@ def compared(robot: Robot, shapes: Sequence[Shape]) -> Compared:
         body, point = in_body(tree, contact.link, contact.position)
         axes = slice(2) if body == 0 else slice(3)
         at = np.array(point, dtype=np.float64)
-        boxes = _boxes(tree, pose, shapes, body, float(at[2]))
-        if boxes is None:
+        known, perhaps = _boxes(tree, pose, shapes, body, float(at[2]))
+        if known and _off(at, known, axes) <= SLACK:
+            continue
+        if perhaps is None or (off := _off(at, known + perhaps, axes)) <= SLACK:
             unknown.append(contact)
-        elif (off := _off(at[axes], [(low[axes], high[axes]) for low, high in boxes])) > SLACK:
+        else:
             outside.append((contact, off))
     return Compared(tuple(outside), tuple(unknown))
 
 
-def _off(point: Floats, boxes: Sequence[Box]) -> float:
-    """Return how far (m) a point lies outside the extent of all boxes together."""
+def _off(point: Floats, boxes: Sequence[Box], axes: slice) -> float:
+    """Return how far (m) a point lies outside the extent of all boxes together, along some axes."""
     low, high = _together(boxes)
     away = np.maximum(np.maximum(low - point, point - high), 0.0)
-    return float(np.linalg.norm(away))
+    return float(np.linalg.norm(away[axes]))
 
 
 def _together(boxes: Sequence[Box]) -> Box:
@@ -75,12 +77,12 @@ def _together(boxes: Sequence[Box]) -> Box:
 
 def _boxes(
     tree: Tree, pose: Pose, shapes: Sequence[Shape], body: int, height: float
-) -> list[Box] | None:
-    """Return the extents to compare a contact of `body` with; None if too little is known of them.
+) -> tuple[list[Box], list[Box] | None]:
+    """Return the extents to compare a contact of `body` with: those known, and those of meshes.
 
     They are its body's own, in its axes; for the base also what reaches down to the contact's
     `height` (m), such as a wheel that turns on a joint of its own. A mesh is taken as at most
-    about as large as the rest of a robot whose wheels or tracks are known.
+    about as large as the rest of a robot whose wheels or tracks are known; None where they are not.
     """
     placed = list(_placed(tree, pose, shapes, body))
     found = [
@@ -93,13 +95,12 @@ def _boxes(
         for place, centre, half in placed
         if half is None and (place == body or tree.bodies[place].parent == 0)
     ]
-    if not found or (meshes and body != 0):
-        return None
-    if meshes and not any(low[2] <= height + SLACK for low, _ in found):
-        return None
+    stands = body == 0 and any(low[2] <= height + SLACK for low, _ in found)
+    if not found or (meshes and not stands):
+        return found, None
     low, high = _together(found)
     reach = AS_LARGE * np.linalg.norm(high - low)
-    return found + [(centre - reach, centre + reach) for centre in meshes]
+    return found, [(centre - reach, centre + reach) for centre in meshes]
 
 
 def _placed(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.build import Build, checked, settings_from
+from ugv_acceptance.config.build import Build, assumed_numbers, checked, settings_from
 from ugv_acceptance.config.contact_check import compared
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.schema import File
@@ -33,6 +33,8 @@ class Config:
     `sha256` is that of both files' bytes. `uncertainty` pairs the names of numbers with their +/-
     as written in the file. `warnings` do not stop an evaluation; each names file and field.
     `not_compared` are the contact points that no collision geometry of the URDF could confirm.
+    `assumed` pairs the names of numbers that nobody measured with the reason for their values; None
+    if the file does not say which those are.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Config:
     uncertainty: tuple[tuple[str, float], ...]
     warnings: tuple[str, ...]
     not_compared: tuple[str, ...] = ()
+    assumed: tuple[tuple[str, str], ...] | None = None
 
 
 def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> Config:
@@ -91,6 +94,7 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
         tuple(file.uncertainty.items()),
         tuple(build.warnings),
         doubts,
+        assumed=assumed_numbers(build),
     )
 
 

@@ -247,3 +247,4 @@ class File(Section):
     unsafe_limits: Reason | None = None
     gravity: Annotated[Positive, _number('acceleration')] = _ROBOT.gravity
     uncertainty: dict[str, Annotated[NotNegative, _number()]] = {}
+    assumed: dict[str, Reason] | None = None

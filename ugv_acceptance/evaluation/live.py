@@ -196,7 +196,8 @@ class LiveEvaluator:
         carried = settings.robot.payload
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
-        self.settings = self.watch.settings = self._imu.settings = settings
+        self.settings = self.watch.settings = settings
+        self._imu.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
         for fresh in self._fresh:

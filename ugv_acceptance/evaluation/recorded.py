@@ -23,6 +23,7 @@ from ugv_acceptance.evaluation.inputs.payload import (
     payload_from,
 )
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
+from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -94,7 +95,7 @@ class RecordedEvaluator:
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
-        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0)
+        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0, never < 0)
         self._carry = _Newest(joints, never, imu, never)
         if not self.settings.hears_imu:
             down = ImuRows(never, never, np.array([[0.0, 0.0, -robot.gravity]]), never > 0)
@@ -116,6 +117,11 @@ class RecordedEvaluator:
     def rates(self) -> list[JointRate]:
         """How far the reported rate of each joint can be believed."""
         return self._joints.rates
+
+    @property
+    def imu(self) -> ImuTracker:
+        """The tracker of the IMU, with what its checks judged."""
+        return self._imu
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
@@ -225,7 +231,8 @@ class RecordedEvaluator:
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
         from_joints = order < len(joints.time) - 1
-        of_joints, of_imu = np.cumsum(from_joints), np.cumsum(~from_joints)
+        of_joints = np.cumsum(from_joints, dtype=np.intp)
+        of_imu = np.cumsum(~from_joints, dtype=np.intp)
         if not self.settings.hears_joints:  # only IMU messages bring margins
             order, of_joints = order[~from_joints], of_joints[~from_joints]
             of_imu = of_imu[~from_joints]
@@ -320,7 +327,7 @@ class RecordedEvaluator:
         all_known = rows.known.all()
         lost = self._lost(rows)
         time = rows.time if all_known else rows.time[rows.known]
-        time = _with(time, lost, lost.time)
+        time = with_lost(time, lost, lost.time)
         values_of = (*rows.torque.T, *rows.angle.T)
         signals = (*self.watch.torque, *self.watch.tip)
         for k, (values, (warn, error)) in enumerate(zip(values_of, signals, strict=True)):
@@ -328,27 +335,27 @@ class RecordedEvaluator:
                 continue
             some = values if all_known else values[rows.known]
             worse = np.abs(some) if k < len(self.watch.torque) else -some
-            worse = _with(worse, lost)
+            worse = with_lost(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
         if self.settings.hears_imu:
             self._watch_stand(rows, time, lost)
         self.watch.predict_rows(rows)
 
-    def _watch_stand(self, rows: MarginRows, time: Times, lost: '_Lost') -> None:
+    def _watch_stand(self, rows: MarginRows, time: Times, lost: Lost) -> None:
         """Judge how the robot stands, in the rows with margins; `time` has `lost` among them."""
         state = rows.state[rows.known]
-        feed(self.watch.support, time, _with(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
+        feed(self.watch.support, time, with_lost(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
         if self.watch.slide.on < np.inf:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
             slope = slides_first(tuple(gravity.T), least, friction)
-            feed(self.watch.slide, time, _with(slope, lost))
+            feed(self.watch.slide, time, with_lost(slope, lost))
 
-    def _lost(self, rows: MarginRows) -> '_Lost':
+    def _lost(self, rows: MarginRows) -> Lost:
         """Return when margins became unknown that were known before."""
         if not len(rows.time):
-            return _Lost(np.empty(0, np.intp), rows.time)
+            return Lost(np.empty(0, np.intp), rows.time)
         before, known, until = self._known_until, rows.known, rows.until
         self._known_until = int(until[-1]) if known[-1] else None
         ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
@@ -357,20 +364,7 @@ class RecordedEvaluator:
         if before is not None and (rows.time[0] > before or not known[0]):
             first = min(before, int(rows.time[0]))
             place, time = np.append(0, place), np.append(first, time)
-        return _Lost(place, time)
-
-
-@dataclass(frozen=True, slots=True)
-class _Lost:
-    """When margins became unknown: `time` (k,) in ns, and before which known row, `place` (k,)."""
-
-    place: NDArray[np.intp]
-    time: Times
-
-
-def _with(values: NDArray[Any], lost: _Lost, inserted: Times | float = -np.inf) -> NDArray[Any]:
-    """Return values of known rows with one inserted wherever margins became unknown."""
-    return np.insert(values, lost.place, inserted) if len(lost.place) else values
+        return Lost(place, time)
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

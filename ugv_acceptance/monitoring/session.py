@@ -151,7 +151,7 @@ class Session:
             self.faults.set(now, CODE, subject, 1.0, doubt.sentence)
 
     def feel(self) -> None:
-        """Check the declared payload against the measured efforts; to be called once a second."""
+        """Check payload and sign of efforts by the measured ones; to be called once a second."""
         self.advisory.feel()
         now, found = self.clock.now(), self.advisory.estimate
         if found is None:
@@ -159,6 +159,12 @@ class Session:
         else:
             more = abs(found.mass - found.declared)
             self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
+        opposed = {joint.joint for joint in self.advisory.opposed}
+        for name in self.settings.robot.joint_names:
+            if name in opposed:
+                self.faults.set(now, 'EFFORT_SIGN', name, 1.0)
+            else:
+                self.faults.clear(now, 'EFFORT_SIGN', name)
 
     def measure_rates(self) -> None:
         """Measure the `rates` (Hz) of the inputs; to be called once a second."""

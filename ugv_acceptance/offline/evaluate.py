@@ -30,6 +30,7 @@ from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.offline.acknowledgements import add_acknowledgements
+from ugv_acceptance.offline.circumstances import assumed_of, load_of, origin_of
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
 from ugv_acceptance.offline.not_read import not_read
@@ -95,6 +96,7 @@ def evaluate(
     result |= _circumstances(opened, robot, identity)
     unread = [not_checked_json(one) for one in not_read(opened, robot)]
     result['not_checked'] = [*result['not_checked'], *unread]
+    result['load'] = load_of(judgement.measurement.payloads, opened.start_ns)
     if payload is not None:
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
@@ -163,6 +165,7 @@ def _circumstances(
     began = datetime.fromtimestamp(start // 10**9, timezone.utc)
     return {
         'identity': dict(identity or {}),
+        'origin': origin_of(recording.bag),
         'robot': {
             'name': config.name,
             'serial': config.serial,
@@ -170,6 +173,7 @@ def _circumstances(
             'urdf': str(config.urdf_path),
             'sha256': config.sha256,
             'warnings': list(config.warnings),
+            'assumed': assumed_of(config),
         },
         'software': {
             'version': __version__,

@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
     default_criteria,
 )
+from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
@@ -80,7 +81,7 @@ def judge(
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
     evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
-    reading = _Reading(settings, evaluator, limits, asked, options)
+    reading = _Reading(settings, sources, evaluator, limits, asked, options)
     batches = bag.batches(topics, workers=options.readers)
     evaluator.start(bag.start_ns)
     for batch in _stretches(batches):
@@ -93,7 +94,6 @@ def judge(
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
         'bag': _bag_result(bag, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
-        'model_check': reading.check.result(),
     }
     statements = [e.statement(*span) for e in reading.examinations]
     absent = absent_imu(settings, topics.imu)
@@ -113,10 +113,15 @@ def judge(
 
 
 def _examinations(
-    settings: Settings, evaluator: RecordedEvaluator, limits: CriteriaMeasurement
+    settings: Settings,
+    sources: tuple[Source, ...],
+    evaluator: RecordedEvaluator,
+    limits: CriteriaMeasurement,
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
     return (
+        ModelCheck(settings, sources),
+        ImuExamination(evaluator.imu),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
@@ -131,12 +136,12 @@ class _Reading:
     """
 
     settings: Settings
+    sources: tuple[Source, ...]
     evaluator: RecordedEvaluator
     limits: CriteriaMeasurement
     asked: CriteriaMeasurement
     options: Options
     summary: Summary = field(init=False)
-    check: ModelCheck = field(init=False)
     told: AlertAdvice = field(init=False)
     held: HeldMargins = field(init=False)
     examinations: tuple[Examination, ...] = field(init=False)
@@ -144,8 +149,7 @@ class _Reading:
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
-        self.check = ModelCheck(self.settings)
-        self.examinations = _examinations(self.settings, self.evaluator, self.limits)
+        self.examinations = _examinations(self.settings, self.sources, self.evaluator, self.limits)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)
@@ -185,7 +189,7 @@ class _Reading:
         return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
 
     def _judge(self, rows: MarginRows) -> None:
-        parts = (self.summary.add, self.check.add, *(e.add for e in self._measurements))
+        parts = (self.summary.add, *(e.add for e in self._measurements))
         for take in (*parts, *(e.add for e in self.examinations)):
             take(rows)
 

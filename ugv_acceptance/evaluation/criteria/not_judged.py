@@ -63,7 +63,8 @@ def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
     known = [(name, heavy.get(name, math.inf)) for name in names]
     found = [_with_size(robot, name, size) for name, size in known if size > 0.0]
     if found:
-        yield NotChecked(f'torque of {", ".join(found)}', 'no limit in the configuration')
+        why = 'no limit in the configuration, so it is not judged'
+        yield NotChecked(f'torque of {", ".join(found)}', why)
 
 
 def _with_size(robot: Robot, name: str, size: float) -> str:

@@ -7,9 +7,13 @@ from statistics import fmean, median
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.effort.facts import NONE, TORQUE, UNKNOWN
+from ugv_acceptance.evaluation.effort.live_rests import LiveRests
+from ugv_acceptance.evaluation.effort.understanding import understand
 from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
 from ugv_acceptance.evaluation.inputs.joint_words import position_words
 from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import (
     angle_between,
@@ -17,6 +21,7 @@ from ugv_acceptance.model.attitude import (
     up_from_orientation,
 )
 from ugv_acceptance.model.robot import Joint, Vector
+from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
 OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
@@ -25,6 +30,8 @@ CLOCK_SLACK = 1.0
 # The slowest input (Hz) that leaves time to react, and the tilt (rad) a floor may have.
 SLOWEST = 10.0
 LEVEL = math.radians(15)
+# Efforts are looked at this often (ns).
+LOOK = 200_000_000
 # A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
 OUTSIDE = 0.1
 # What is said of an input that the configuration does not use.
@@ -65,6 +72,32 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
         yield from _topic(name, heard, around.seconds)
         if heard.samples:
             yield from look(heard.samples, config)
+    if around.joint_states is not None:
+        yield from _efforts(around.joint_states, around.imu, config)
+
+
+def _efforts(joints: Heard, imu: Heard | None, config: Config) -> Iterator[Finding]:
+    """Yield efforts that surely are no torques, or of the other sign, by the seconds heard."""
+    evaluator, rests = LiveEvaluator(config.settings), LiveRests(config.settings)
+    heard: list[tuple[int, JointStateSample | ImuSample]] = [
+        *zip(joints.times, joints.samples, strict=False),
+        *(zip(imu.times, imu.samples, strict=False) if imu else ()),
+    ]
+    due = 0
+    for now, sample in sorted(heard, key=lambda one: one[0]):
+        if isinstance(sample, JointStateSample):
+            evaluator.joint_state(now, now, *JOINT_FIELDS(sample))
+        else:
+            evaluator.imu(now, now, *IMU_FIELDS(sample))
+        margins = evaluator.margins
+        if margins is not None and now >= due:
+            due = now + LOOK
+            rests.see(now, margins.q, *evaluator.measured, margins.gravity, margins.torque)
+    if not due:
+        return
+    for joint in understand(config.settings, (), rests.rests()).joints:
+        if joint.opposed or joint.meaning not in {TORQUE, NONE, UNKNOWN}:
+            yield Finding(WARN, f'effort of {joint.joint}', joint.sentence, joint.do)
 
 
 def _topic(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
