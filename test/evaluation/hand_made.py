@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings
 from ugv_acceptance.evaluation.inputs.imu import ImuRows
-from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.settings import Settings
 

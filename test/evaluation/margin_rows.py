@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ugv_acceptance.evaluation.inputs.imu import ImuRows
-from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 
 S = 1_000_000_000

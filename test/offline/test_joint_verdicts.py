@@ -237,7 +237,7 @@ def test_a_position_beyond_its_range_is_named_with_the_range(tmp_path: Path) -> 
 
 def test_a_position_that_steps_once_is_told(tmp_path: Path) -> None:
     """An encoder homed in the run: wrong before or after, so the run does not pass."""
-    run = moved(rest(noise=5e-4), 2, lambda t: 0.2 * (t > 5.0))
+    run = moved(rest(noise=5e-4), 2, lambda t: np.where(t > 5.0, 0.2, 0.0))
     found = judged(tmp_path, run)
     assert found.verdict == 'INCONCLUSIVE'
     assert 'at 5.02 s: the position of elbow_joint jumps by 11.4 deg' in reasons(found).replace(

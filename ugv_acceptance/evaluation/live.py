@@ -16,8 +16,10 @@ from ugv_acceptance.evaluation.chassis.motion import (
     WITNESSED,
     ChassisMotion,
 )
+from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
-from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
+from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
+from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
@@ -126,13 +128,13 @@ class LiveEvaluator:
         # Here and below: a small value cannot change a quiet signal, so most calls are saved.
         if unusable or not watch.joints.invalid.quiet:
             if unusable and not watch.joints.invalid.raw:
-                watch.joints.invalid.detail = joints.unusable_words()
+                watch.joints.invalid.detail = words.why_unusable(joints)
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
         limit = self._fresh[0].limit
         old = now - min(joints.seen) > limit
         if old or not watch.missing.quiet:
             if old and not watch.missing.raw:
-                watch.missing.detail = joints.missing_words(now, limit)
+                watch.missing.detail = words.what_is_missing(joints, now, limit)
             watch.missing.step(now, 1.0 if old else 0.0)
         if joints.repeated or not watch.repeated.quiet:
             watch.repeated.step(now, joints.repeated)
@@ -281,7 +283,7 @@ class LiveEvaluator:
         due = self._fresh[which].deadline
         if due is not None and now > due:
             if which == 0 and not stale.raw:
-                stale.detail = self._joints.foreign_words(due)
+                stale.detail = words.why_foreign(self._joints, due)
             stale.set(due, 1.0)
 
     def _alive_until(self) -> int:

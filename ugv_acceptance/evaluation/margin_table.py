@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.inputs.imu import ImuRows
-from ugv_acceptance.evaluation.inputs.joints import JointRows
+from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.type_aliases import Floats, Times
 
 

@@ -5,6 +5,7 @@ around it. Time is that of the header stamps where positions are smoother by the
 delivers in bursts), else that of receipt. What noise alone would show is taken off accelerations.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -126,5 +127,7 @@ def _noise(q: Floats, rate: Floats) -> float:
     """
     third = np.abs(np.diff(q, n=3))
     moving = rate[: len(third)] > rate.max() / 4.0
-    typical = max(np.median(third), np.median(third[moving])) if moving.any() else np.median(third)
-    return float(typical) / (0.6745 * np.sqrt(20.0))
+    typical = float(np.median(third))
+    if moving.any():
+        typical = max(typical, float(np.median(third[moving])))
+    return typical / (0.6745 * math.sqrt(20.0))

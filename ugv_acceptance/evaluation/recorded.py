@@ -14,15 +14,18 @@ from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
+from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
-from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
+from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
+from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.payload import (
     PayloadHistory,
     payload_fault,
     payload_from,
 )
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
+from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -154,13 +157,14 @@ class RecordedEvaluator:
         if self.settings.hears_joints:
             joints = self._joints.merge_columns(batch.joints)
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+            self._watch_joints(joints, joint_limits)
+            until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
-            joints, joint_limits = _without_joints(imu), np.full(len(imu.time), FOREVER)
+            joints = _without_joints(imu)
+            until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
-        self._watch_inputs(joints, joint_limits, imu)
+        feed(self.watch.imu.invalid, imu.time, imu.unusable)
         self._take_payloads(batch.payload)
-        until = joints.oldest + joint_limits
-        until[self._joints.told.repeating] = NEVER
         newest = _Newest(
             _lead(self._carry.joints, joints),
             np.concatenate((self._carry.joints_until, until)),
@@ -201,22 +205,26 @@ class RecordedEvaluator:
     def _silent(self, stale: Signal, due: int) -> None:
         """Take that an input was silent from `due` (ns) on."""
         if stale is self.watch.joints.stale and not stale.raw:
-            stale.detail = self._joints.foreign_words(due)
+            stale.detail = words.why_foreign(self._joints, due)
         stale.set(due, 1.0)
 
-    def _watch_inputs(self, joints: JointRows, limits: Times, imu: ImuRows) -> None:
+    def _watch_joints(self, joints: JointRows, limits: Times) -> None:
         merger, time = self._joints, joints.time
-        feed(self.watch.joints.invalid, time, joints.unusable, merger.unusable_words)
+        feed(
+            self.watch.joints.invalid,
+            time,
+            joints.unusable,
+            lambda row: words.why_unusable(merger, row),
+        )
         old = time - joints.oldest > limits
         feed(
             self.watch.missing, time, old,
-            lambda row: merger.missing_words(int(time[row]), int(limits[row]), row),
+            lambda row: words.what_is_missing(merger, int(time[row]), int(limits[row]), row),
         )  # fmt: skip
         feed(self.watch.repeated, time, merger.told.repeated)
         for signal, rate in zip(self.watch.speed, merger.told.speed.T, strict=True):
             if signal.on < np.inf:
                 feed(signal, joints.time, np.abs(rate))
-        feed(self.watch.imu.invalid, imu.time, imu.unusable)
 
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
@@ -328,7 +336,7 @@ class RecordedEvaluator:
     def _watch_pairs(self, rows: MarginRows, lost: '_Lost') -> None:
         all_known = rows.known.all()
         time = rows.time if all_known else rows.time[rows.known]
-        time = _with(time, lost, lost.time)
+        time = with_lost(time, lost, lost.time)
         values_of = (*rows.torque.T, *rows.angle.T)
         signals = (*self.watch.torque, *self.watch.tip)
         for k, (values, (warn, error)) in enumerate(zip(values_of, signals, strict=True)):
@@ -336,27 +344,27 @@ class RecordedEvaluator:
                 continue
             some = values if all_known else values[rows.known]
             worse = np.abs(some) if k < len(self.watch.torque) else -some
-            worse = _with(worse, lost)
+            worse = with_lost(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
         if self.settings.hears_imu:
             self._watch_stand(rows, time, lost)
         self.watch.predict_rows(rows)
 
-    def _watch_stand(self, rows: MarginRows, time: Times, lost: '_Lost') -> None:
+    def _watch_stand(self, rows: MarginRows, time: Times, lost: Lost) -> None:
         """Judge how the robot stands, in the rows with margins; `time` has `lost` among them."""
         state = rows.state[rows.known]
-        feed(self.watch.support, time, _with(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
+        feed(self.watch.support, time, with_lost(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
         if self.watch.slide.on < np.inf:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
             slope = slides_first(tuple(gravity.T), least, friction)
-            feed(self.watch.slide, time, _with(slope, lost))
+            feed(self.watch.slide, time, with_lost(slope, lost))
 
-    def _lost(self, rows: MarginRows) -> '_Lost':
+    def _lost(self, rows: MarginRows) -> Lost:
         """Return when margins became unknown that were known before."""
         if not len(rows.time):
-            return _Lost(np.empty(0, np.intp), rows.time)
+            return Lost(np.empty(0, np.intp), rows.time)
         before, known, until = self._known_until, rows.known, rows.until
         self._known_until = int(until[-1]) if known[-1] else None
         ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
@@ -365,20 +373,7 @@ class RecordedEvaluator:
         if before is not None and (rows.time[0] > before or not known[0]):
             first = min(before, int(rows.time[0]))
             place, time = np.append(0, place), np.append(first, time)
-        return _Lost(place, time)
-
-
-@dataclass(frozen=True, slots=True)
-class _Lost:
-    """When margins became unknown: `time` (k,) in ns, and before which known row, `place` (k,)."""
-
-    place: NDArray[np.intp]
-    time: Times
-
-
-def _with(values: NDArray[Any], lost: _Lost, inserted: Times | float = -np.inf) -> NDArray[Any]:
-    """Return values of known rows with one inserted wherever margins became unknown."""
-    return np.insert(values, lost.place, inserted) if len(lost.place) else values
+        return Lost(place, time)
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

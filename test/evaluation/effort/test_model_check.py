@@ -180,13 +180,16 @@ def test_a_clipped_effort_does_not_count() -> None:
 def test_the_share_of_slow_samples_is_counted() -> None:
     """A quarter of the messages above 0.6 rad/s leaves three quarters."""
     run: list[Message] = []
-    for message in run_of(40.0, joints_hz=10.0, imu_hz=20.0):
+    each = (0.7, -0.5, 0.3, -0.5)
+    for message in run_of(32.0, joints_hz=10.0, imu_hz=20.0):
         if isinstance(message, Joints):
-            fast = (message.time - T0) // S % 4 == 0
-            message = replace(message, velocity=(0.7 if fast else 0.5, 9.0))  # noqa: PLW2901
+            step, part = divmod((message.time - T0) / S % 16.0, 4.0)
+            rate = each[int(step)]
+            at = -1.2 + 4.0 * sum(each[: int(step)]) + rate * part
+            message = replace(message, position=(at, 0.0), velocity=(rate, 9.0))  # noqa: PLW2901
         run.append(message)
     found = check(run)['speed_validity']
-    assert found['share'] == pytest.approx(0.75, abs=0.01)
+    assert found['share'] == pytest.approx(0.75, abs=0.02)
     assert found['joints'] == ['lift']
 
 

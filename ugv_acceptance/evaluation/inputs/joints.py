@@ -1,100 +1,36 @@
 """From JointState messages to the robot's joints: names, signs, offsets, partial messages merged.
 
-Implausible jumps are found as well. Once a second every joint's position is compared with that of
-the second before: one that moved faster than the joint can has another unit or belongs to another
-joint, and is unknown. So is one that jumps back and forth between messages: two robots publish the
-same joint.
+What cannot be a position is unknown: out of its range, beyond a turn (turns.py), an implausible
+jump (leaps.py). Messages that are repeated are told apart (repeats.py), and rates are completed
+from positions (joint_rates.py). joint_state_words.py says in words what is wrong.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
 from ugv_acceptance.evaluation.inputs.joint_rates import CELL, DOUBTED, PROVEN, JointRate
-from ugv_acceptance.evaluation.inputs.joint_words import (
-    foreign_words,
-    missing_words,
-    unusable_words,
+from ugv_acceptance.evaluation.inputs.joint_rows import (
+    NEVER,
+    Indices,
+    JointRows,
+    Layout,
+    Mask,
+    Told,
 )
+from ugv_acceptance.evaluation.inputs.leaps import SECOND, Leaps
 from ugv_acceptance.evaluation.inputs.repeats import Repeats
-from ugv_acceptance.evaluation.inputs.turns import ABSURD, FULL, Turns, beyond, turning_of
+from ugv_acceptance.evaluation.inputs.turns import ABSURD, FULL, Turns, turning_of
 from ugv_acceptance.evaluation.samples import JointStateColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Joint
-from ugv_acceptance.model.row_selection import Values
 from ugv_acceptance.type_aliases import Floats, Times
-
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 # A position further than this (rad or m) beyond a joint's limits is not the joint's.
 BEYOND = 0.1
-NEVER = -1
-# Positions are compared once in every SECOND (ns), if at least APART (ns) lies between them.
-SECOND, APART = 1_000_000_000, 500_000_000
-# Two messages may hold positions measured up to SHORTEST (ns) further apart than their receipt: one
-# was late, or overtook the other. A joint that was homed jumps once, a wrong reading twice (there
-# and back); MANY jumps within a second mean two publishers.
-SHORTEST, MANY = 10_000_000, 3
-
-
-@dataclass(frozen=True, slots=True)
-class JointRows:
-    """Merged joint states, one row a message that names at least one of the robot's joints.
-
-    `q` (n, j) in rad (m) is NaN where a joint is unknown or its value unusable; `qd` in rad/s (m/s)
-    and `effort` in N m (N) where not reported or implausible; `oldest` (n,) is the receipt time
-    (ns) of the oldest position in the row; `unusable` (n,) marks a value that cannot be used.
-    Rates that are not reported, or contradict the positions, are those of the positions.
-    """
-
-    time: Times
-    stamp: Times
-    q: Floats
-    qd: Floats
-    effort: Floats
-    oldest: Times
-    unusable: Mask
-
-
-@dataclass(slots=True)
-class Layout:
-    """Where the robot's joints stand in messages with one list of names.
-
-    `pairs` are (joint number, place in the message); `second` is the last second in which their
-    positions were checked for jumps, `cell` the last cell of time (joint_rates.py) with a message,
-    `first` when such a message first came (ns).
-    """
-
-    pairs: list[tuple[int, int]]
-    second: int = NEVER
-    cell: int = NEVER
-    first: int = NEVER
-    repeats: Repeats = field(default_factory=Repeats)
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """What messages (n,) of a batch told, beside their JointRows.
-
-    `repeated` (n,) are the seconds for which the message is repeated (0: it is new), `repeating`
-    says that some joint's newest message is; `speed` (n, j) are rates to be believed, NaN where
-    unknown. The rest is for words: positions (n, j), and as told (j, n), which were named, those
-    told before the batch, and when each was received.
-    """
-
-    repeated: Floats
-    repeating: Mask
-    speed: Floats
-    q: Floats
-    raw: Floats
-    named: Mask
-    before: list[float]
-    seen: list[Times]
 
 
 @dataclass(slots=True)
@@ -105,8 +41,8 @@ class JointMerger:
     implausible jumps; while one has an alert, the position of its joint is unknown. `seen` (j,) is
     when each joint was last received (ns), `speed` (j,) its rate where that can be believed.
     `repeated` is for how many seconds the newest message is repeated, `repeating` how many lists of
-    names have such a message. `told` is what the last batch told, `rates` (j,) tell which reported
-    rates can be believed.
+    names have such a message. `told` is what the last batch told, `turns` what messages told,
+    `rates` (j,) tell which reported rates can be believed, `layouts` the lists of names that came.
     """
 
     settings: Settings
@@ -119,16 +55,11 @@ class JointMerger:
     repeated: float = 0.0
     repeating: int = 0
     told: Told = field(init=False)
-    _layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
-    _range: list[tuple[float, float]] = field(init=False)
-    _before: list[tuple[int, float]] = field(init=False)
-    _told: list[float] = field(init=False)
-    _jumps: list[int] = field(init=False)
-    _most: list[float] = field(init=False)
-    _turn: list[float] = field(init=False)
-    _turns: Turns = field(init=False)
+    layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
+    turns: Turns = field(init=False)
     rates: list[JointRate] = field(init=False)
-    _has_jumped: bool = False
+    _range: list[tuple[float, float]] = field(init=False)
+    _leaps: Leaps = field(init=False)
 
     def __post_init__(self) -> None:
         n = len(self.settings.joints)
@@ -136,24 +67,21 @@ class JointMerger:
         self.seen = [NEVER] * n
         robot = self.settings.robot
         joints = [robot.joint(name) for name in robot.joint_names]
-        self._turns = Turns(turning_of(robot))
+        self.turns = Turns(turning_of(robot))
         self._range = [
             (-FULL, FULL) if of.limited else _believable(joint)
-            for joint, of in zip(joints, self._turns.joints, strict=True)
+            for joint, of in zip(joints, self.turns.joints, strict=True)
         ]
-        self._before = [(NEVER, math.nan)] * n
-        self._told, self._jumps = [math.nan] * n, [0] * n
-        # The most a joint can move (rad, m) between two messages received at the same time.
-        self._most = [s.rule.on * SHORTEST / SECOND for s in self.jump_signals] or [math.inf] * n
-        self._turn = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
-        self.rates = [JointRate(turn) for turn in self._turn]
+        turns = [math.tau if joint.kind == 'continuous' else 0.0 for joint in joints]
+        self._leaps = Leaps(self.jump_signals, self.turns, turns)
+        self.rates = [JointRate(turn) for turn in turns]
 
     def layout(self, names: tuple[str, ...]) -> Layout:
         """Return where the robot's joints stand among `names`.
 
         A name that occurs twice in a message is ambiguous and left out.
         """
-        found = self._layouts.get(names)
+        found = self.layouts.get(names)
         if found is None:
             found = Layout(
                 [
@@ -162,8 +90,8 @@ class JointMerger:
                     if names.count(joint.topic_name) == 1
                 ]
             )
-            if len(self._layouts) < 64:
-                self._layouts[names] = found
+            if len(self.layouts) < 64:
+                self.layouts[names] = found
         return found
 
     def merge(
@@ -194,10 +122,10 @@ class JointMerger:
         odd = self._take(now, stamp, layout, position, velocity, effort)
         for j in odd:
             apart, slope = now - self.seen[j], self.rates[j].slope
-            known = self._turns.judge(j, self._told[j], apart, slope)
-            self._place(j, now, self._turns.told[j] if known else math.nan)
-        if now // SECOND != layout.second or self._has_jumped:
-            self._look(now, layout)
+            known = self.turns.judge(j, self._leaps.told[j], apart, slope)
+            self._place(j, now, self.turns.told[j] if known else math.nan)
+        if now // SECOND != layout.second or self._leaps.busy:
+            self._leaps.look(now, layout, self.q)
         return True
 
     def _take(
@@ -211,8 +139,9 @@ class JointMerger:
     ) -> list[int]:
         """Take the numbers of a message; return the joints whose positions are out of range."""
         rates, efforts = len(velocity) == len(position), len(effort) == len(position)
-        cell, told, odd = now // CELL, self._turns.told, []
+        cell, told, odd = now // CELL, self.turns.told, []
         fresh, layout.cell = cell != layout.cell, cell
+        before, most = self._leaps.told, self._leaps.most
         for j, k in layout.pairs:
             joint, (lower, upper), rate = self.settings.joints[j], self._range[j], self.rates[j]
             told[j] = q = joint.sign * position[k] + joint.offset
@@ -230,8 +159,8 @@ class JointMerger:
             self.effort[j] = scale * effort[k] if efforts else math.nan
             if not lower <= q <= upper:
                 odd.append(j)
-            elif -self._most[j] <= q - self._told[j] <= self._most[j]:
-                self._told[j] = self.q[j] = q
+            elif -most[j] <= q - before[j] <= most[j]:
+                before[j] = self.q[j] = q
                 self.seen[j] = now
             else:
                 self._place(j, now, q)
@@ -245,48 +174,8 @@ class JointMerger:
 
     def _place(self, j: int, now: int, q: float) -> None:
         """Take the position of joint j (NaN: unknown); count if it jumped there."""
-        way = abs(q - self._told[j])
-        if way > self._most[j] and self._jumped(j, way, now - self.seen[j]):
-            self._jumps[j] += 1
-        self._told[j] = self.q[j] = q
-        self.seen[j] = now
-
-    def _look(self, now: int, layout: Layout) -> None:
-        """Check the joints that a message named for implausible jumps; drop positions with one."""
-        if now // SECOND != layout.second:
-            layout.second = now // SECOND
-            for j, _ in layout.pairs:
-                self._compare(j, now, self._seen_at(j, self._turns.told[j], self.q[j]))
-        for j, _ in layout.pairs:
-            if self.jump_signals:
-                self.jump_signals[j].advance(now)
-                if self.jump_signals[j].alert is not None:
-                    self.q[j] = math.nan
-        self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
-
-    def _seen_at(self, j: int, told: float, q: float) -> float:
-        """Return the position of joint j that is compared with others: also beyond a turn."""
-        return told if self._turns.joints[j].limited and abs(told) <= ABSURD else q
-
-    def _compare(self, j: int, now: int, q: float) -> None:
-        """Compare joint j's position with that of the second before; a full turn may be wrapped."""
-        then, before = self._before[j]
-        if not self.jump_signals or math.isnan(q) or (then != NEVER and now - then < APART):
-            return
-        self._before[j] = now, q
-        jumps, self._jumps[j] = self._jumps[j], 0
-        if then != NEVER:
-            way = abs(q - before)
-            rate = min(way, abs(way - self._turn[j])) / (now - then) * SECOND
-            rate = beyond(self.jump_signals[j], rate, self._turns.joints[j], q)
-            self.jump_signals[j].step(
-                now, max(rate, self.jump_signals[j].on if jumps >= MANY else 0.0)
-            )
-
-    def _jumped(self, j: int, way: Values, apart: Values) -> Values:
-        """Return whether joint j cannot have moved by `way` (rad, m; wrapped) in `apart` (ns)."""
-        way = np.minimum(way, abs(way - self._turn[j]))
-        return way > self._most[j] * np.maximum(apart / SHORTEST, 1.0)
+        self._leaps.place(j, q, now - self.seen[j])
+        self.q[j], self.seen[j] = q, now
 
     def merge_columns(self, segments: Sequence[JointStateColumns]) -> JointRows:
         """Take many messages: the same rows as `merge` one at a time, in order of receipt."""
@@ -322,12 +211,12 @@ class JointMerger:
             _believe(tables[0, j], limits)
             self._turn_rows(j, time, raw, tables[0], (named, slopes[j]))
         looked = [(self.layout(x), rows) for x, rows in rows_of.items()]
-        self._look_at(time, raw, tables[0], named, looked)
-        before = list(self._turns.told)
+        self._leaps.columns(time, raw, tables[0], named, looked, self.seen)
+        before = list(self.turns.told)
         merged, speed, seen = self._carry(time, stamp, tables, named)
         self.told = Told(*repeats, speed, merged.q, raw, named, before, seen)
         for j in range(joints * bool(n)):
-            self._turns.told[j] = self._told_at(j, n - 1)
+            self.turns.told[j] = self.told.told_at(j, n - 1)
         return merged
 
     def _note_first(self, segments: Sequence[JointStateColumns]) -> None:
@@ -345,8 +234,8 @@ class JointMerger:
     ) -> tuple[Floats, Mask]:
         """Return for how long each message is repeated, and whether any joint's newest one is."""
         repeated, repeating = np.zeros(len(time)), np.zeros(len(time), np.bool_)
-        others = [x for x in self._layouts if x not in rows_of]
-        repeating |= any(self._layouts[x].repeats.seconds > 0.0 for x in others)
+        others = [x for x in self.layouts if x not in rows_of]
+        repeating |= any(self.layouts[x].repeats.seconds > 0.0 for x in others)
         for names, rows in rows_of.items():
             repeats = self.layout(names).repeats
             before = repeats.seconds > 0.0
@@ -355,7 +244,7 @@ class JointMerger:
                 newest = np.zeros(len(time), np.intp)
                 newest[rows] = np.arange(1, len(rows) + 1)
                 repeating |= np.append(before, repeated[rows] > 0.0)[np.maximum.accumulate(newest)]
-        self.repeating = sum(x.repeats.seconds > 0.0 for x in self._layouts.values())
+        self.repeating = sum(x.repeats.seconds > 0.0 for x in self.layouts.values())
         return repeated, repeating
 
     def _rate_rows(self, time: Times, stamp: Times, tables: Floats, named: Mask) -> list[Floats]:
@@ -379,71 +268,17 @@ class JointMerger:
         `of` says which messages (j, n) name a joint, and how fast this one turns at its own.
         """
         named, slope = of
-        if not self._turns.joints[j].limited or not (np.abs(raw[j]) > FULL).any():
+        if not self.turns.joints[j].limited or not (np.abs(raw[j]) > FULL).any():
             return
         rows = np.flatnonzero(named[j])
         told = np.array([self._newest(k, raw[k], named[k])[rows] for k in range(len(raw))])
         apart = np.diff(time[rows], prepend=self.seen[j])
-        q[j, rows] = self._turns.columns(j, told, q[j, rows], self._told[j], apart, slope)
+        q[j, rows] = self.turns.columns(j, told, q[j, rows], self._leaps.told[j], apart, slope)
 
     def _newest(self, j: int, raw: Floats, named: Mask) -> Floats:
         """Return the newest told position of joint number j at every row."""
         newest = np.maximum.accumulate(np.where(named, np.arange(1, len(raw) + 1), 0))
-        return np.append(self._turns.told[j], raw)[newest]
-
-    def _look_at(
-        self,
-        time: Times,
-        raw: Floats,
-        q: Floats,
-        named: Mask,
-        rows_of: Sequence[tuple[Layout, Indices]],
-    ) -> None:
-        """Check the positions (j, n) for implausible jumps, as `_look` does for each message.
-
-        Positions with a jump become NaN in place. `raw` (j, n) are they as told; `rows_of` pairs
-        each layout with its rows.
-        """
-        jumps = [self._jump_rows(j, time, q[j], named[j]) for j in range(len(q))]
-        if not self.jump_signals or not len(time):
-            return
-        before, seen = [signal.alert for signal in self.jump_signals], len(self.jump_signals[0].log)
-        looks: list[tuple[int, int]] = []
-        for layout, rows in rows_of:
-            seconds = time[rows] // SECOND
-            firsts = rows[np.flatnonzero(np.diff(seconds, prepend=layout.second))]
-            layout.second = int(seconds[-1])
-            looks += [(row, j) for row in firsts.tolist() for j, _ in layout.pairs]
-        for row, j in sorted(looks):
-            if len(jumps[j]):
-                count = int(np.searchsorted(jumps[j], row, 'right'))
-                self._jumps[j], jumps[j] = self._jumps[j] + count, jumps[j][count:]
-            at = self._seen_at(j, float(raw[j, row]), float(q[j, row]))
-            self._compare(j, int(time[row]), at)
-        for j, signal in enumerate(self.jump_signals):
-            self._jumps[j] += len(jumps[j])
-            signal.advance(int(time[-1]))
-            for alert in [before[j], *signal.log[seen:]]:
-                if alert is not None and alert.rule is signal.rule:
-                    end = np.inf if alert.end is None else alert.end
-                    q[j, (time >= alert.start) & (time < end)] = np.nan
-        self._has_jumped = not all(signal.quiet for signal in self.jump_signals)
-
-    def _jump_rows(self, j: int, time: Times, q: Floats, named: Mask) -> Indices:
-        """Return the rows at which joint number j jumps, as `merge` counts them."""
-        rows = np.arange(len(q)) if named.all() else np.flatnonzero(named)
-        if not len(rows):
-            return rows
-        told = q if len(rows) == len(q) else q[rows]
-        newest, self._told[j] = self._told[j], float(told[-1])
-        if self._most[j] == math.inf:
-            return rows[:0]
-        far = np.flatnonzero(np.abs(told[1:] - told[:-1]) > self._most[j]) + 1
-        if abs(told[0] - newest) > self._most[j]:
-            far = np.concatenate(([0], far))
-        before = np.where(far > 0, told[far - 1], newest)
-        apart = time[rows[far]] - np.where(far > 0, time[rows[far - 1]], self.seen[j])
-        return rows[far[self._jumped(j, np.abs(told[far] - before), apart)]]
+        return np.append(self.turns.told[j], raw)[newest]
 
     def _fill(self, tables: Floats, named: Mask, segment: JointStateColumns) -> None:
         """Write a segment's positions, rates and efforts, and which joints it names."""
@@ -490,43 +325,6 @@ class JointMerger:
         for table, value in zip(tables, before, strict=True):
             table[:] = np.where(known, table[newest], value)
         return np.where(known, time[newest], self.seen[j])
-
-    def _told_at(self, j: int, row: int) -> float:
-        """Return the position of joint number j that was told last at a row of the batch."""
-        rows = np.flatnonzero(self.told.named[j, : row + 1])
-        return float(self.told.raw[j, rows[-1]]) if len(rows) else self.told.before[j]
-
-    def unusable_words(self, row: int | None = None) -> str:
-        """Return why positions cannot be used: now, or at a row of the last batch."""
-        joints = range(len(self.q))
-        if row is None:
-            unknown = [j for j in joints if math.isnan(self.q[j]) and self.seen[j] != NEVER]
-            return unusable_words(self.settings, self._turns.told, unknown)
-        told = [self._told_at(j, row) for j in joints]
-        q = self.told.q[row].tolist()
-        unknown = [j for j in joints if math.isnan(q[j]) and self.told.seen[j][row] != NEVER]
-        return unusable_words(self.settings, told, unknown)
-
-    def missing_words(self, now: int, limit: int, row: int | None = None) -> str:
-        """Return which joints were told longer ago than `limit` (ns), as `unusable_words`."""
-        seen = self.seen if row is None else [int(times[row]) for times in self.told.seen]
-        ages = [
-            None if now - at <= limit else math.inf if at == NEVER else (now - at) / 1e9
-            for at in seen
-        ]
-        return missing_words(self.settings, ages, self._names(now))
-
-    def foreign_words(self, until: int) -> str:
-        """Return why no message until then (ns) was of this robot; '' if none came, or one was."""
-        came = [layout for layout in self._layouts.values() if NEVER != layout.first <= until]
-        if not came or any(layout.pairs for layout in came):
-            return ''
-        return foreign_words(self.settings, self._names(until))
-
-    def _names(self, until: int) -> Iterable[str]:
-        """Return all names that messages told until then (ns)."""
-        layouts = self._layouts.items()
-        return {x for names, layout in layouts if NEVER != layout.first <= until for x in names}
 
 
 def _believe(values: Floats, limits: tuple[float, float]) -> None:

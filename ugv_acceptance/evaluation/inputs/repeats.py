@@ -48,9 +48,10 @@ class Repeats:
         same[0] = stamp[0] == self.stamp
         same &= stamp != 0
         if same.any():
-            before = np.array([self.position]) if len(self.position) == position.shape[1] else None
-            same[1:] &= (position[1:] == position[:-1]).all(axis=1)
-            same[0] &= before is not None and bool((position[0] == before).all())
+            alike = np.zeros(n, np.bool_)
+            alike[1:] = (position[1:] == position[:-1]).all(axis=1)
+            alike[0] = self.position == tuple(position[0].tolist())
+            same &= alike
         since = time
         found = np.zeros(n)
         if same.any():

@@ -61,7 +61,8 @@ def _turning(robot: Robot, tree: Tree, joint: Joint, k: int) -> Turning:
 
 def _moves(robot: Robot, tree: Tree, k: int) -> bool:
     """Return whether turning body number k moves anything: mass, a contact, the payload."""
-    held = [c.link for c in robot.contacts] + [robot.payload_link] * bool(robot.payload_link)
+    held = [contact.link for contact in robot.contacts]
+    held += [] if robot.payload_link is None else [robot.payload_link]
     if any(in_body(tree, link, (0.0, 0.0, 0.0))[0] == k for link in held):
         return True
     return any(b.parent == k for b in tree.bodies[1:]) or _moment(tree.bodies[k]) > BALANCED
