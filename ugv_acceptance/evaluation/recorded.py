@@ -104,7 +104,8 @@ class RecordedEvaluator:
         imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0, never < 0)
         self._carry = _Newest(joints, never, imu, never)
         if not self.settings.hears_imu:
-            down = ImuRows(never, never, np.array([[0.0, 0.0, -robot.gravity]]), never > 0)
+            level = np.array([[0.0, 0.0, -robot.gravity]])
+            down = ImuRows(never, never, level, never > 0, never < 0)
             self._carry = _Newest(joints, never, down, never + FOREVER)
         for fresh in self._unheard():
             fresh.last = FOREVER
@@ -333,7 +334,7 @@ class RecordedEvaluator:
         found = stability_of(stance, gravity)
         return *found.angle, *found.moment, *found.energy, found.zmp, found.state
 
-    def _watch_pairs(self, rows: MarginRows, lost: '_Lost') -> None:
+    def _watch_pairs(self, rows: MarginRows, lost: Lost) -> None:
         all_known = rows.known.all()
         time = rows.time if all_known else rows.time[rows.known]
         time = with_lost(time, lost, lost.time)
