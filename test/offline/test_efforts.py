@@ -26,7 +26,7 @@ def judged(repository: Path, tmp_path: Path) -> Callable[[Change], Json]:
     (source,) = (repository / 'bags' / 'packbot_pass').glob('*.mcap')
 
     def judge(change: Change) -> Json:
-        return ugv.evaluate(rewritten(source, tmp_path / 'run', change)).to_dict()
+        return dict(ugv.evaluate(rewritten(source, tmp_path / 'run', change)).to_dict())
 
     return judge
 
@@ -134,7 +134,8 @@ def test_an_effort_beyond_the_limit_is_no_pass_whatever_it_means(
 @pytest.mark.parametrize('noise', [0.0, 2e-4])
 def test_a_stuck_encoder_is_no_pass(noise: float, judged: Callable[[Change], Json]) -> None:
     """The shoulder's position stands still, but for 0.2 mrad, while its effort grows to 45 N m."""
-    rng, stuck = np.random.default_rng(1), {}
+    rng = np.random.default_rng(1)
+    stuck: dict[bool, float] = {}
 
     def change(at: float, sample: JointStateSample) -> JointStateSample:
         k = sample.names.index('shoulder_joint')
@@ -171,7 +172,7 @@ CASES = {
 @pytest.mark.parametrize('case', CASES)
 def test_the_efforts_of_the_cases_are_named(case: str, shared_bags: Path) -> None:
     """Recordings of one quirk each, of ten seconds in one posture."""
-    result = ugv.evaluate(shared_bags / 'cases' / case).to_dict()
+    result: Json = dict(ugv.evaluate(shared_bags / 'cases' / case).to_dict())
     check = result['model_check']
     assert result['verdict'] == 'PASS'
     assert {check['joints'][joint]['meaning'] for joint in ARM} == {CASES[case]}
@@ -189,6 +190,7 @@ def test_of_a_foreign_recording_only_the_ratio_is_certain(
     """98.0 N may be 1.25 times 8 kg: one sliding joint that holds one torque tells no load."""
     folder = shared_bags / 'abitobot'
     config = load(repository / 'msg_configs' / 'abitobot.yaml', urdf=folder / 'robot.urdf')
-    check = ugv.evaluate(folder, config=config).to_dict()['model_check']
+    result: Json = dict(ugv.evaluate(folder, config=config).to_dict())
+    check = result['model_check']
     assert check['joints']['arm_3_link_joint']['meaning'] == 'unknown'
     assert (check['loads'], check['contacts']) == ([], [])

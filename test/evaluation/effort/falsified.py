@@ -1,6 +1,6 @@
 """Robots that report something else than torque: efforts made from a model that is itself off."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -186,7 +186,7 @@ def _reported(
     meaning: str, full: Floats, gravity: Floats, size: float, rng: np.random.Generator
 ) -> Floats:
     """Return what is reported of the torque `full`, of which `gravity` holds the arm alone."""
-    makers = {
+    makers: dict[str, Callable[[], Floats]] = {
         OTHER_SIGN: lambda: -full,
         SCALED: lambda: _scale(rng) * full,
         WITHOUT: lambda: full - gravity,

@@ -101,7 +101,7 @@ def test_f_is_that_of_the_mean_squares() -> None:
     freedom = [independent_samples(x) - 1.0 for x in (motion, rest)]
     assert found['freedom'] == pytest.approx(freedom)
     assert found['critical'] == pytest.approx(stats.f.ppf(0.95, *freedom))
-    added = math.sqrt(max(squares[0] - squares[1], 0.0))
+    added = math.sqrt(max(float(squares[0] - squares[1]), 0.0))
     assert found['added'] == pytest.approx(added)
     assert found['margin'] == 20.0
     assert found['matters'] is (2.0 * added > 20.0)

@@ -123,7 +123,7 @@ def _fit(stack: _Stack, weight: Floats, cuts: Sequence[int]) -> tuple[Floats, Fl
     """Return the loads (s,), their covariance (s, s) and the weight (n, n) less their columns."""
     columns = _columns(stack, cuts)
     weighted = weight @ columns
-    variance = np.linalg.pinv(columns.T @ weighted)
+    variance: Floats = np.linalg.pinv(columns.T @ weighted)
     left = weight - weighted @ variance @ weighted.T
     return variance @ (weighted.T @ stack.open), variance, left
 
@@ -215,7 +215,7 @@ def _told(arm: Arm, stack: _Stack, cuts: Sequence[int], weight: Floats, least: f
 
 def _contacts(stack: _Stack, left: Floats, z: Floats) -> list[Contact]:
     """Return the rests in which a joint is off by more than loads and errors explain."""
-    found = {}
+    found: dict[int, tuple[float, int]] = {}
     for k in np.flatnonzero(np.abs(np.nan_to_num(z)) > PUSHES).tolist():
         row, size = int(stack.row[k]), float(abs(z[k]))
         if size > found.get(row, (0.0, 0))[0]:

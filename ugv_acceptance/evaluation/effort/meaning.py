@@ -82,6 +82,14 @@ class Arm:
             self.errors[:, rows, j], float(self.sizes[j]),
         )  # fmt: skip
 
+    def rows(self, rows: Sequence[int]) -> 'Arm':
+        """Return the given postures."""
+        at = list(rows)
+        return Arm(
+            self.effort[at], self.torque[at], self.lever[at], self.declared[at],
+            self.errors[:, at], self.sizes, self.most,
+        )  # fmt: skip
+
     def loads(self) -> Floats:
         """Return the loads (kg) beyond the declared one that are tried; 0 is one of them."""
         if not self.lever.any():

@@ -101,8 +101,7 @@ def _still(time: Times, rate: Floats, q: Floats) -> NDArray[np.bool_]:
         untold = np.isnan(rate)
         fast[1:] |= moved & untold[1:]
         fast[:-1] |= moved & untold[:-1]
-    still: NDArray[np.bool_] = ~fast.any(axis=1)
-    return still
+    return np.asarray(~fast.any(axis=1), np.bool_)
 
 
 def _median(values: Floats) -> Floats:
@@ -153,8 +152,8 @@ def is_near(q: Floats, p: Floats, gravity: Floats, other: Floats, reach: Floats)
     return bool(float(gravity @ other) >= np.cos(TURNED) * size)
 
 
-def distinct(rests: Rests, reach: Floats) -> Rests:
-    """Return one row a posture and level of effort, the first and longest, in order of time.
+def distinct(rests: Rests, reach: Floats) -> list[int]:
+    """Return the rows of one rest a posture and level of effort, the longest, in order of time.
 
     A posture that is taken again with the same efforts says nothing new.
     """
@@ -169,7 +168,7 @@ def distinct(rests: Rests, reach: Floats) -> Rests:
             kept.append(k)
         if len(kept) == MOST:
             break
-    return rests.rows(sorted(kept))
+    return sorted(kept)
 
 
 def arm_of(

@@ -67,15 +67,14 @@ def understand(settings: Settings, sources: Sequence[Source], rests: Rests) -> U
     if not len(rests.start):
         unknown = (JointMeaning(n, u, UNKNOWN) for n, u in zip(names, units, strict=True))
         return Understanding(tuple(unknown), rests)
-    rests = _without_clipped(settings, rests)
-    arm, sizes = arm_of(settings, sources, distinct(rests, reaches(settings)))
+    kept = longest(_without_clipped(settings, rests))
+    whole, sizes = arm_of(settings, sources, kept)
+    arm = whole.rows(distinct(kept, reaches(settings)))
     joints = tuple(
         JointMeaning(n, u, m.meaning, m.probability, m.ratio, m.level, m.below)
         for n, u, m in zip(names, units, name_meanings(arm), strict=True)
     )
-    kept = longest(rests)
-    signs = signs_of([joint.meaning for joint in joints])
-    weighed = weigh(arm_of(settings, sources, kept)[0], signs)
+    weighed = weigh(whole, signs_of([joint.meaning for joint in joints]))
     return Understanding(joints, kept, weighed.loads, weighed.contacts, sizes.link, sizes.guessed)
 
 
