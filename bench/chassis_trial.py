@@ -131,7 +131,7 @@ def braking(robot: Robot, push: float, hold: float, load: float, arm: Sequence[f
 
 
 def as_built(robot: Robot, trial: Trial) -> Robot:
-    """Return the robot as it really is in a trial: off the configured one by what nobody measures."""
+    """Return the robot as it really is in a trial: not quite as it is configured."""
     rng = np.random.default_rng([trial.seed, 1])
     links = tuple(
         replace(
@@ -189,7 +189,7 @@ def _watch(
             rows.joints.append((data.time, q, rate, effort))
         attitude = data.xmat[vehicle.root].reshape(3, 3).copy()
         poses.append((q, data.xpos[vehicle.root].copy(), attitude))
-    least, lift, tipped_at = _truth(robot, vehicle, trial, poses)
+    least, lift, tipped_at = _truth(robot, vehicle, poses)
     sensors = Sensors(Noise(), rng)
     return Run(_batch(robot, sensors, rows), least, lift, tipped_at)
 
@@ -201,14 +201,22 @@ def _course(
     gentle = abs(trial.speed) / 0.8
     cruise = STAND + gentle + 0.4
     over = cruise + trial.hold
-    arm = vehicle.motor[robot.joint_names.index('shoulder_joint' if trial.seed % 2 else 'turret_joint')]
+    arm = vehicle.motor[
+        robot.joint_names.index('shoulder_joint' if trial.seed % 2 else 'turret_joint')
+    ]
     start, weight = float(data.ctrl[arm]), float(vehicle.model.body_subtreemass[0])
 
     def forward(t: float) -> float:
         speed = trial.speed * min(max(t - STAND, 0.0) / max(gentle, 1e-9), 1.0)
         if trial.kind == 'brake' and t > cruise:
             return math.copysign(max(abs(speed) - trial.push * (t - cruise), 0.0), trial.speed)
-        return speed if t < over else 0.0 if trial.kind == 'brake' else speed * max(1 - (t - over) * 2, 0.0)
+        return (
+            speed
+            if t < over
+            else 0.0
+            if trial.kind == 'brake'
+            else speed * max(1 - (t - over) * 2, 0.0)
+        )
 
     def steer(t: float) -> None:
         speed, yaw = forward(t), 0.0
@@ -219,7 +227,7 @@ def _course(
         if trial.kind == 'swing' and cruise < t:
             way, rate = _swing(min(t, over) - cruise, trial.hold)
             data.ctrl[arm] = start + trial.push * (way + rate * 2.0 / SERVO)
-        if trial.kind == 'rattle' and STAND < t:
+        if trial.kind == 'rattle' and t > STAND:
             wave = 2.0 * math.pi * trial.pitch * t
             push = weight * trial.push * np.array([math.sin(wave), 0.0, math.sin(1.3 * wave)])
             data.xfrc_applied[vehicle.root, :3] = push
@@ -243,7 +251,7 @@ def _in_world(orientation: Floats, slope: tuple[float, float]) -> Floats:
 
 
 def _truth(
-    robot: Robot, vehicle: Vehicle, trial: Trial, poses: Sequence[tuple[Floats, Floats, Floats]]
+    robot: Robot, vehicle: Vehicle, poses: Sequence[tuple[Floats, Floats, Floats]]
 ) -> tuple[float, float, float]:
     q, position, attitude = (np.array(part) for part in zip(*poses, strict=True))
     down = np.einsum('nij,i->nj', attitude, vehicle.model.opt.gravity)
@@ -284,7 +292,7 @@ def _batch(robot: Robot, sensors: Sensors, rows: Rows) -> Batch:
 
 
 def halved(batch: Batch) -> Batch:
-    """Return the messages as an IMU of half the rate sends them: its filter takes the mean of two."""
+    """Return the messages of an IMU of half the rate, whose filter takes the mean of two."""
     (imu,) = batch.imu
     m = len(imu.log_time) // 2 * 2
     some = slice(1, m, 2)

@@ -280,9 +280,9 @@ class Keep:
 
     def run(self, x: Floats, before: Floats) -> Floats:
         """Return the filter's output for `x` (PIECE, r, pieces); `before` (r,) is that before."""
-        return self._add(x * (1.0 - self.share), before)
+        return self.add(x * (1.0 - self.share), before)
 
-    def _add(self, y: Floats, before: Floats) -> Floats:
+    def add(self, y: Floats, before: Floats) -> Floats:
         """Turn what each row adds into the output, in place, and return it.
 
         What a piece carries on into the next comes after; it is a recursion over the pieces.
@@ -292,7 +292,7 @@ class Keep:
         carried = before[:, None]
         if y.shape[2] > 1:
             inner = Keep.of(self.product[-1, 0, :-1])
-            ends = inner._add(in_pieces(y[-1, :, :-1], 0.0), before)
+            ends = inner.add(in_pieces(y[-1, :, :-1], 0.0), before)
             carried = np.concatenate((carried, in_rows(ends, y.shape[2] - 1)), axis=1)
         y += self.product * carried
         return y
