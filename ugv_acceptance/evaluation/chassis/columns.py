@@ -114,7 +114,9 @@ class ChassisColumns:
             raised = rows.state[which] != STANDING
             limits = _limits(least, raised, gravity)
             part = self._part(raw, which, judged, limits, (gravity, alone))
-            found = _judge(motion, part, rows, load, tuple(x[part.at] for x in limits))
+            spin, hard, _ = limits
+            at = (spin[part.at], hard[part.at], raised[part.at])
+            found = _judge(motion, part, rows, load, at)
             _go_on(motion, part, int(raw.fresh[raw.lead :].sum()))
             _feed(motion, (time, judged, which), rows, (part.at, *found.values), lost)
         known, step = rows.known[which], raw.step[raw.lead :] * 1e-9
@@ -143,7 +145,7 @@ class ChassisColumns:
             np.repeat(b, GROUP)[lead : lead + n] for b in (bound.flat, bound.up, bound.off)
         )
         pushed = judged & (off > hard)
-        elapsed, segment = raw.elapsed[lead:], np.cumsum(raw.fresh[lead:])
+        elapsed, segment = raw.elapsed[lead:], np.cumsum(raw.fresh[lead:], dtype=np.int64)
         at = _last(elapsed, segment, pushed, self.motion.episodes.hard_at)
         wanted = judged & ((np.where(raised, flat + up, flat) > spin) | (elapsed - at < BACK))
         at = np.flatnonzero(wanted)
@@ -244,7 +246,7 @@ def _judge(
     turns = spins[:, None] & (angle - margin > MATTERS)
     effective = np.where(angle - effective > MATTERS, effective, np.inf)
     values[0] = np.where(turns, -margin, NOTHING)
-    sure = part.alone | witnessed(rate, part.gravity, level)
+    sure = part.alone | witnessed(tuple(rate), tuple(part.gravity), tuple(level))
     values[1] = np.where(sure[:, None], values[0], NOTHING)
     denied = (values[0] >= 0.0) & ~sure[:, None]
     values[2][pushed] = -effective[pushed]
@@ -273,7 +275,7 @@ def _episodes(of: Episodes, look: _Look, values: list[Floats], denied: Mask) -> 
     """Go through the episodes row by row; return where the accelerometer was believed in one."""
     part, (effective, against, frequency) = look.part, look.margins
     believed, segment = np.zeros(len(part.at), np.bool_), 0
-    low = (effective < LOW).any(axis=1)
+    low: Mask = (effective < LOW).any(axis=1)
     since = part.elapsed - _last(part.elapsed, part.segment, low, of.newest)
     for k in np.flatnonzero(look.pushed & (since < BACK)).tolist():
         if part.segment[k] != segment:
