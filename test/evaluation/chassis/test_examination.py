@@ -60,8 +60,10 @@ def driven(
             up = upright(lean)
             felt = (up[0] - (brake if on else 0.0), up[1], up[2])
             spin = units * (rate if on else 0.0)
-            m = replace(m, orientation=lean, acceleration=felt, omega=(0.0, spin, units * YAW))
-        found.append(m)
+            moved = replace(m, orientation=lean, acceleration=felt)
+            found.append(replace(moved, omega=(0.0, spin, units * YAW)))
+        else:
+            found.append(m)
     return found
 
 

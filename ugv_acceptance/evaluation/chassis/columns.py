@@ -275,7 +275,7 @@ def _episodes(of: Episodes, look: _Look, values: list[Floats], denied: Mask) -> 
     """Go through the episodes row by row; return where the accelerometer was believed in one."""
     part, (effective, against, frequency) = look.part, look.margins
     believed, segment = np.zeros(len(part.at), np.bool_), 0
-    low: Mask = (effective < LOW).any(axis=1)
+    low: Mask = np.asarray((effective < LOW).any(axis=1), np.bool_)
     since = part.elapsed - _last(part.elapsed, part.segment, low, of.newest)
     for k in np.flatnonzero(look.pushed & (since < BACK)).tolist():
         if part.segment[k] != segment:
