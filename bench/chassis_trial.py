@@ -12,13 +12,13 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.statement import Statement
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.robot import Matrix, Payload, Robot, Vector
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
@@ -52,6 +52,7 @@ KINDS = ('brake', 'turn', 'swing', 'rattle')
 LIFTED, GROUNDED = 0.02, 0.002
 # Static margin (rad) in which trials begin: nothing tips a robot that is far from it.
 NEAREST, FURTHEST = math.radians(5.0), math.radians(28.0)
+CODES = ('TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')
 START = 1_700_000_000_000_000_000
 
 
@@ -131,16 +132,13 @@ def braking(robot: Robot, push: float, hold: float, load: float, arm: Sequence[f
 
 
 def as_built(robot: Robot, trial: Trial) -> Robot:
-    """Return the robot as it really is in a trial: off the configured one by what nobody measures."""
+    """Return the robot as it really is in a trial: not quite as it is configured."""
     rng = np.random.default_rng([trial.seed, 1])
     links = tuple(
         replace(
             link,
-            cog=tuple(float(x) for x in np.array(link.cog) + rng.normal(0.0, 0.003, 3)),
-            inertia=tuple(
-                tuple(float(x) for x in row)
-                for row in np.array(link.inertia) * rng.uniform(0.8, 1.2)
-            ),
+            cog=_vector(np.array(link.cog) + rng.normal(0.0, 0.003, 3)),
+            inertia=_matrix(np.array(link.inertia) * rng.uniform(0.8, 1.2)),
         )
         if link.mass
         else link
@@ -148,6 +146,16 @@ def as_built(robot: Robot, trial: Trial) -> Robot:
     )
     joints = tuple(replace(joint, effort=math.inf) for joint in robot.joints)
     return replace(robot, links=links, joints=joints, payload=Payload(trial.load))
+
+
+def _vector(v: Floats) -> Vector:
+    x, y, z = v.tolist()
+    return x, y, z
+
+
+def _matrix(m: Floats) -> Matrix:
+    x, y, z = m
+    return _vector(x), _vector(y), _vector(z)
 
 
 def simulate(settings: Settings, trial: Trial) -> Run:
@@ -189,7 +197,7 @@ def _watch(
             rows.joints.append((data.time, q, rate, effort))
         attitude = data.xmat[vehicle.root].reshape(3, 3).copy()
         poses.append((q, data.xpos[vehicle.root].copy(), attitude))
-    least, lift, tipped_at = _truth(robot, vehicle, trial, poses)
+    least, lift, tipped_at = _truth(robot, vehicle, poses)
     sensors = Sensors(Noise(), rng)
     return Run(_batch(robot, sensors, rows), least, lift, tipped_at)
 
@@ -251,7 +259,7 @@ def _in_world(orientation: Floats, slope: tuple[float, float]) -> Floats:
 
 
 def _truth(
-    robot: Robot, vehicle: Vehicle, trial: Trial, poses: Sequence[tuple[Floats, Floats, Floats]]
+    robot: Robot, vehicle: Vehicle, poses: Sequence[tuple[Floats, Floats, Floats]]
 ) -> tuple[float, float, float]:
     q, position, attitude = (np.array(part) for part in zip(*poses, strict=True))
     down = np.einsum('nij,i->nj', attitude, vehicle.model.opt.gravity)
@@ -292,7 +300,7 @@ def _batch(robot: Robot, sensors: Sensors, rows: Rows) -> Batch:
 
 
 def halved(batch: Batch) -> Batch:
-    """Return the messages as an IMU of half the rate sends them: its filter takes the mean of two."""
+    """Return the messages of an IMU of half the rate, whose filter takes the mean of two."""
     (imu,) = batch.imu
     m = len(imu.log_time) // 2 * 2
     some = slice(1, m, 2)
@@ -328,38 +336,45 @@ def judged(settings: Settings, load: float, batch: Batch) -> tuple[Statement, li
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
-    """What became of a trial: truth, and what was said of it (with 200 Hz, with 100 Hz).
+class Said:
+    """What is said of a trial from its messages.
 
-    `verdict` is that of static margin and chassis acceleration together, `said` of the latter
-    alone; `danger`, `caution` (s) are the first such alerts of the chassis, infinite if there was
-    none.
+    `verdict` is that of static margin and chassis acceleration together, `chassis` of the latter
+    alone; `danger`, `caution` (s) are the first such alerts of the chassis, infinite if none.
     """
+
+    verdict: str
+    chassis: str
+    danger: float
+    caution: float
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What became of a trial: the truth (see Run), and what is said at 200 and at 100 Hz."""
 
     trial: Trial
     least: float
     lift: float
     tipped_at: float
-    verdict: tuple[str, str]
-    said: tuple[str, str]
-    danger: tuple[float, float]
-    caution: tuple[float, float]
+    fast: Said
+    slow: Said
 
 
 def tried(settings: Settings, trial: Trial) -> Verdict:
     """Run a trial and judge it with the IMU at 200 and at 100 Hz."""
     run = simulate(settings, trial)
     found = [judged(settings, trial.load, batch) for batch in (run.batch, halved(run.batch))]
-    said, verdict, danger, caution = [], [], [], []
-    for statement, alerts, least in found:
-        kinds = [objection.verdict for objection in statement.objections]
-        said.append('FAIL' if 'FAIL' in kinds else 'INCONCLUSIVE' if kinds else 'PASS')
-        verdict.append('FAIL' if least <= 0.0 else said[-1])
-        mine = [a for a in alerts if a.rule.code in ('TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')]
-        danger.append(_first([a for a in mine if a.rule.level == 2]))
-        caution.append(_first(mine))
-    both = [(a, b) for a, b in (verdict, said, danger, caution)]
-    return Verdict(trial, run.least, run.lift, run.tipped_at, *both)
+    fast, slow = (_said(*one) for one in found)
+    return Verdict(trial, run.least, run.lift, run.tipped_at, fast, slow)
+
+
+def _said(statement: Statement, alerts: Sequence[Alert], least: float) -> Said:
+    kinds = [objection.verdict for objection in statement.objections]
+    said = 'FAIL' if 'FAIL' in kinds else 'INCONCLUSIVE' if kinds else 'PASS'
+    mine = [a for a in alerts if a.rule.code in CODES]
+    danger = [a for a in mine if a.rule.level == ERROR]
+    return Said('FAIL' if least <= 0.0 else said, said, _first(danger), _first(mine))
 
 
 def _first(alerts: Sequence[Alert]) -> float:

@@ -5,8 +5,10 @@ import pinocchio as pin
 import pytest
 from robots import random_robot
 
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Link, Robot
 from ugv_acceptance.model.statics import centre_of_gravity, inverse_dynamics, static_torque
+from ugv_acceptance.model.tipping import inertia_of
 
 SEEDS = range(40)
 
@@ -103,3 +105,19 @@ def test_the_centre_of_gravity_is_theirs(seed: int) -> None:
     robot, twin, (q, _, _), _ = case(seed)
     theirs = np.array([twin.centre(a) for a in q])
     assert np.abs(centre_of_gravity(robot, q) - theirs).max() <= 1e-12 * (1 + np.abs(theirs).max())
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+def test_inertia_is_pinocchios(seed: int) -> None:
+    """The inertia about the centre of gravity is that of Pinocchio's composite rigid body."""
+    rng = np.random.default_rng(seed)
+    robot = random_robot(rng, 4)
+    q = rng.uniform(-2.0, 2.0, len(robot.joint_names))
+    twin = Twin(robot)
+    pin.ccrba(twin.model, twin.data, twin.ordered(q), np.zeros(twin.model.nv))
+    moving = twin.data.Ig
+    whole = pin.Inertia(moving.mass, twin.data.com[0], moving.inertia) + twin.model.inertias[0]
+    load = robot.payload
+    found = inertia_of(mechanics_of(robot)).one(*q.tolist(), load.mass, *load.cog)
+    entries = whole.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    np.testing.assert_allclose(found, entries, rtol=1e-9, atol=1e-9)

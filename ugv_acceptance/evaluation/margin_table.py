@@ -30,9 +30,9 @@ class ChassisRows:
     `rows` (m,) are rows of the part's margins. `moving` (m, 4) rad is the tilt left to each of
     SIDES with the energy of the turn, `effective` (m, 4) rad that under effective gravity felt at
     the edge, infinite where it was not judged; `lifted` (m, 4) says where an end lifts, `denied`
-    (m, 4) where one sensor of the IMU shows it past tipping and another that it does not turn. Seconds of the part
-    with margins; of these judged, and with an accelerometer that shows gravity; without a gyro;
-    with an IMU below 50 Hz.
+    (m, 4) where one sensor of the IMU shows it past tipping and another that it does not turn.
+    Seconds of the part with margins; of these judged, and with an accelerometer that shows gravity;
+    without a gyro; with an IMU below 50 Hz.
     """
 
     rows: NDArray[np.intp]

@@ -35,7 +35,7 @@ from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.robot import NO_INERTIA, Vector
 from ugv_acceptance.model.tree import Pose, point_of, pose_of
 
-# A part of the robot: mass (kg), centre of gravity (m, `base_link`), inertia about it (six numbers).
+# A part of the robot: mass (kg), centre of gravity (m, `base_link`), its inertia (six numbers).
 _Part = tuple[Scalar, Vec, tuple[Scalar, ...]]
 # Where xx, yy, zz, xy, xz, yz stand in a matrix.
 _ENTRIES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -97,12 +97,12 @@ def _together(parts: Sequence[_Part]) -> list[Scalar]:
 def tipping_of(
     mechanics: Mechanics, corners: Corners, sides: tuple[int, ...], imu: Vector
 ) -> Kernel:
-    """Return the kernel of a moving robot's margins about the edges of a polygon, which lie on `sides`.
+    """Return the kernel of a moving robot's margins about the edges of a polygon.
 
-    It takes the terms of a stance (see Corners), mass (kg), inertia (6, see `inertia_of`), then
-    gravity, specific force (m/s2), rate (rad/s) and angular acceleration (rad/s2), three numbers
-    each in base axes; the force is what an accelerometer at `imu` (m, `base_link`) feels. It
-    returns four numbers each, one to each of SIDES:
+    The edges lie on `sides`. It takes the terms of a stance (see Corners), mass (kg), inertia (6,
+    see `inertia_of`), then gravity, specific force (m/s2), rate (rad/s) and angular acceleration
+    (rad/s2), three numbers each in base axes; the force is what an accelerometer at `imu` (m,
+    `base_link`) feels. It returns four numbers each, one to each of SIDES:
 
     * the margin left with the energy of the turn towards the edge (rad; negative: it will tip),
     * the margin under effective gravity, felt at the edge (rad; negative: the other side lifts),

@@ -169,9 +169,15 @@ def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
 
 
 def margin_statuses(
-    settings: Settings, margins: Margins | None, active: Sequence[Alert]
+    settings: Settings,
+    margins: Margins | None,
+    active: Sequence[Alert],
+    moving: Sequence[float] | None = None,
 ) -> Iterator[Status]:
-    """Yield a status for every judged joint, and one for the tip-over margins."""
+    """Yield a status for every judged joint, and one for the tip-over margins.
+
+    `moving` is the tilt left (rad) to each of SIDES with the energy of the turn the robot is in.
+    """
     for j, name in enumerate(settings.robot.joint_names):
         limit = settings.limits.torque[j]
         if math.isfinite(limit):
@@ -187,13 +193,16 @@ def margin_statuses(
             }
             yield Status(level, f'Torque {name}', text, numbers)
     if settings.hears_imu:
-        yield _tip_status(margins, active)
+        yield _tip_status(margins, active, moving)
     else:
         yield Status(STALE, 'Tip-over', TILT_NOT_CHECKED)
 
 
-def _tip_status(margins: Margins | None, active: Sequence[Alert]) -> Status:
-    level = max(_level(active, code, None, margins) for code in ('TIP_OVER', 'NO_SUPPORT'))
+def _tip_status(
+    margins: Margins | None, active: Sequence[Alert], moving: Sequence[float] | None
+) -> Status:
+    codes = ('TIP_OVER', 'NO_SUPPORT', 'TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')
+    level = max(_level(active, code, None, margins) for code in codes)
     if margins is None:
         return Status(level, 'Tip-over', 'not known')
     stability = margins.stability
@@ -206,6 +215,8 @@ def _tip_status(margins: Margins | None, active: Sequence[Alert]) -> Status:
         return Status(level, 'Tip-over', f'no margin: {state}', values)
     side, angle = least_tilt(stability.angle)
     values['edge'] = side
+    if moving is not None:
+        values['moving_deg'] = math.degrees(min(moving))
     return Status(level, 'Tip-over', _tilt_words(side, angle), values)
 
 
@@ -263,7 +274,9 @@ def diagnostics_of(
     statuses = [_monitor(verdict, config, session)]
     if session is not None:
         active = session.active
-        statuses += margin_statuses(session.settings, session.evaluator.margins, active)
+        evaluator = session.evaluator
+        moving = evaluator.moving
+        statuses += margin_statuses(session.settings, evaluator.margins, active, moving)
         statuses += [_input(name, session, inputs, active) for name in session.counts]
     return statuses
 

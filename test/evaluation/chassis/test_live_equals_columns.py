@@ -1,18 +1,19 @@
 """A chassis in motion: live and recorded raise the same alerts, whatever it does."""
 
 import math
+from collections.abc import Callable
 from random import Random
 
 import hypothesis
 import numpy as np
-from evaluation.streams import MS, T0, Imu, Joints, Message, S, settings, tilted, upright
+from evaluation.streams import MS, T0, Imu, Joints, Message, S, live, settings, tilted, upright
 from evaluation.test_live_equals_recorded import compare
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.chassis.filter_columns import recursion
 from ugv_acceptance.evaluation.settings import Delays, ImuInput
-from ugv_acceptance.model.robot import IDENTITY
+from ugv_acceptance.model.robot import IDENTITY, Matrix
 
 YAWED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -49,13 +50,13 @@ def rough(seed: int, seconds: float, *, faults: bool) -> list[Message]:
     return sorted([*found, *joints], key=lambda m: m.time)
 
 
-def _pulse(random: Random, size: float, seconds: float):
+def _pulse(random: Random, size: float, seconds: float) -> Callable[[float], tuple[float, float]]:
     begin, length = random.uniform(0.6, seconds), random.uniform(0.02, 0.8)
     x, y = random.uniform(-size, size), random.uniform(-size, size)
     return lambda t: (x, y) if begin <= t < begin + length else (0.0, 0.0)
 
 
-@hypothesis.settings(max_examples=150, deadline=None)
+@hypothesis.settings(max_examples=60, deadline=None)
 @given(
     st.integers(0, 10**9),
     st.lists(st.integers(0, 900), max_size=6),
@@ -68,7 +69,7 @@ def test_a_rough_run_gives_the_same_alerts(
     cuts: list[int],
     ticks: list[int],
     faults: bool,  # noqa: FBT001 - drawn
-    mounting: tuple,
+    mounting: Matrix,
 ) -> None:
     """Brakes, turns, lifts, gaps, bad stamps and lost messages: the same alerts in any batches."""
     imu = ImuInput(position=(0.1, 0.05, 0.2), mounting=mounting)
@@ -78,8 +79,6 @@ def test_a_rough_run_gives_the_same_alerts(
 
 def test_rough_runs_raise_every_alert_of_a_chassis() -> None:
     """The runs above are rough enough for each of the alerts, and calm enough for none."""
-    from evaluation.streams import live
-
     told, kinds, silent = settings(), set(), 0
     for seed in range(60):
         _, alerts = live(told, rough(seed, 4.0, faults=False), T0 + 5 * S)

@@ -35,6 +35,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
     SPIN,
     SPIN_LESS,
     ChassisMotion,
+    Episodes,
     no_witness,
     stance_kernel,
     witnessed,
@@ -113,7 +114,9 @@ class ChassisColumns:
             raised = rows.state[which] != STANDING
             limits = _limits(least, raised, gravity)
             part = self._part(raw, which, judged, limits, (gravity, alone))
-            found = _judge(motion, part, rows, load, tuple(x[part.at] for x in limits))
+            spin, hard, _ = limits
+            at = (spin[part.at], hard[part.at], raised[part.at])
+            found = _judge(motion, part, rows, load, at)
             _go_on(motion, part, int(raw.fresh[raw.lead :].sum()))
             _feed(motion, (time, judged, which), rows, (part.at, *found.values), lost)
         known, step = rows.known[which], raw.step[raw.lead :] * 1e-9
@@ -142,7 +145,7 @@ class ChassisColumns:
             np.repeat(b, GROUP)[lead : lead + n] for b in (bound.flat, bound.up, bound.off)
         )
         pushed = judged & (off > hard)
-        elapsed, segment = raw.elapsed[lead:], np.cumsum(raw.fresh[lead:])
+        elapsed, segment = raw.elapsed[lead:], np.cumsum(raw.fresh[lead:], dtype=np.int64)
         at = _last(elapsed, segment, pushed, self.motion.episodes.hard_at)
         wanted = judged & ((np.where(raised, flat + up, flat) > spin) | (elapsed - at < BACK))
         at = np.flatnonzero(wanted)
@@ -243,29 +246,51 @@ def _judge(
     turns = spins[:, None] & (angle - margin > MATTERS)
     effective = np.where(angle - effective > MATTERS, effective, np.inf)
     values[0] = np.where(turns, -margin, NOTHING)
-    sure = part.alone | witnessed(rate, part.gravity, level)
+    sure = part.alone | witnessed(tuple(rate), tuple(part.gravity), tuple(level))
     values[1] = np.where(sure[:, None], values[0], NOTHING)
     denied = (values[0] >= 0.0) & ~sure[:, None]
-    believed, segment = np.zeros(len(part.at), np.bool_), 0
-    low_at = _last(part.elapsed, part.segment, (effective < LOW).any(axis=1), of.newest)
     values[2][pushed] = -effective[pushed]
-    for k in np.flatnonzero(pushed & (part.elapsed - low_at < BACK)).tolist():
-        if part.segment[k] != segment:
-            segment = int(part.segment[k])
-            of.begin()
-        elapsed, of.trusted_at = int(part.elapsed[k]), int(trusted_at[k])
-        if not of.believed(elapsed):
-            values[2][k] = NOTHING
-        else:
-            of.step(elapsed, float(part.step[k]) * 1e-9, effective[k].tolist(), against[k].tolist())
-            believed[k], values[3][k] = True, of.turn
-            denied[k] |= of.contradicted(frequency[k].tolist())
+    look = _Look(part, pushed, trusted_at, (effective, against, frequency))
+    believed = _episodes(of, look, values, denied)
     if len(part.at):
-        if part.segment[-1] != segment:
-            of.begin()
         of.trusted_at, of.hard_at = int(trusted_at[-1]), int(hard_at[-1])
     columns = part.which, -values[1], -values[2], values[3] >= LIFT, denied
     return _Found(tuple(values), columns, believed)
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What the episodes need to know of a part: where it is pushed, and three of its margins.
+
+    `margins` are that under effective gravity, minus the rate, and wn^2 (model/tipping.py).
+    """
+
+    part: _Part
+    pushed: Mask
+    trusted_at: Times
+    margins: tuple[Floats, Floats, Floats]
+
+
+def _episodes(of: Episodes, look: _Look, values: list[Floats], denied: Mask) -> Mask:
+    """Go through the episodes row by row; return where the accelerometer was believed in one."""
+    part, (effective, against, frequency) = look.part, look.margins
+    believed, segment = np.zeros(len(part.at), np.bool_), 0
+    low: Mask = np.asarray((effective < LOW).any(axis=1), np.bool_)
+    since = part.elapsed - _last(part.elapsed, part.segment, low, of.newest)
+    for k in np.flatnonzero(look.pushed & (since < BACK)).tolist():
+        if part.segment[k] != segment:
+            segment = int(part.segment[k])
+            of.begin()
+        elapsed, of.trusted_at = int(part.elapsed[k]), int(look.trusted_at[k])
+        if not of.believed(elapsed):
+            values[2][k] = NOTHING
+            continue
+        of.step(elapsed, float(part.step[k]) * 1e-9, effective[k].tolist(), against[k].tolist())
+        believed[k], values[3][k] = True, of.turn
+        denied[k] |= of.contradicted(frequency[k].tolist())
+    if len(part.at) and part.segment[-1] != segment:
+        of.begin()
+    return believed
 
 
 def _go_on(motion: ChassisMotion, part: _Part, segment: int) -> None:

@@ -1,4 +1,4 @@
-"""What chassis acceleration means for a verdict: objections, the worst, and what was not checked."""
+"""What chassis acceleration means for a verdict: objections, the worst, what was not checked."""
 
 import math
 from collections.abc import Iterator
@@ -117,21 +117,18 @@ class ChassisExamination:
         )
 
     def _objections(self, start: int) -> Iterator[Objection]:
-        lift = math.degrees(LIFT)
+        lifted = (
+            'an end of the tracks lifted: pushed to the {side}, the robot turned there by over '
+            f'{math.degrees(LIFT):g} degree'
+        )
+        denied = (
+            'past tipping to the {side} by one sensor of the IMU, but not by the others: gyro, '
+            'accelerometer and orientation contradict each other'
+        )
         told = (
             (self._tips, FAIL, 'the robot turned so fast to the {side} that it tips over'),
-            (
-                self._lifts,
-                INCONCLUSIVE,
-                f'an end of the tracks lifted: pushed to the {{side}}, the robot turned there by '
-                f'over {lift:g} degree',
-            ),
-            (
-                self._denied,
-                INCONCLUSIVE,
-                'past tipping to the {side} by one sensor of the IMU, but not by the others: gyro, '
-                'accelerometer and orientation contradict each other',
-            ),
+            (self._lifts, INCONCLUSIVE, lifted),
+            (self._denied, INCONCLUSIVE, denied),
         )
         for event, verdict, words in told:
             if event.count:
@@ -141,10 +138,10 @@ class ChassisExamination:
                 yield Objection(SAFEGUARD, verdict, reason)
 
     def _not_checked(self) -> Iterator[NotChecked]:
-        known, judged, believed, no_gyro, slow = self._seconds.tolist()
+        _, judged, believed, no_gyro, slow = self._seconds.tolist()
         what = 'chassis acceleration'
         if no_gyro > FEW_SECONDS:
-            yield NotChecked(what, 'the IMU measures no rate', no_gyro)
+            yield NotChecked(what, 'the IMU measures no rate, or only zeros', no_gyro)
         if slow > FEW_SECONDS:
             yield NotChecked(what, 'the IMU sends fewer than 50 messages a second', slow)
         if judged - believed > FEW_SECONDS:

@@ -53,18 +53,21 @@ class RawRows:
     def newest(self, since: int) -> 'RawRows':
         """Return the rows of the last `since` (ns), as a lead of the next."""
         k = int(np.searchsorted(self.total, self.total[-1] - since)) if len(self.total) else 0
-        parts = (self.x[:, k:], self.step[k:], self.elapsed[k:], self.fresh[k:], self.total[k:])
-        x, *rest = (part.copy() for part in parts)
-        return RawRows(len(self.total) - k, x, *rest, self.true[k:].copy(), self.fast[k:].copy())
+        return RawRows(
+            len(self.total) - k,
+            self.x[:, k:].copy(),
+            self.step[k:].copy(),
+            self.elapsed[k:].copy(),
+            self.fresh[k:].copy(),
+            self.total[k:].copy(),
+            self.true[k:].copy(),
+            self.fast[k:].copy(),
+        )
 
 
+_NO_TIMES, _NO_MASK = np.zeros(0, np.int64), np.zeros(0, np.bool_)
 _NO_ROWS = RawRows(
-    0,
-    np.zeros((8, 0)),
-    *(np.zeros(0, np.int64) for _ in range(2)),
-    np.zeros(0, np.bool_),
-    np.zeros(0, np.int64),
-    *(np.zeros(0, np.bool_) for _ in range(2)),
+    0, np.zeros((8, 0)), _NO_TIMES, _NO_TIMES, _NO_MASK, _NO_TIMES, _NO_MASK, _NO_MASK
 )
 
 
@@ -129,15 +132,17 @@ class RawColumns:
         x[:, : old.lead] = old.x
         # A new beginning counts as a second: nothing of before may be within MEMORY.
         total = start + np.cumsum(np.where(fresh, 2 * MEMORY, step))
-        pairs = (
-            (old.step, step),
-            (old.elapsed, elapsed),
-            (old.fresh, fresh),
-            (old.total, total),
-            (old.true, true),
-            (old.fast, fast),
+        one = np.concatenate
+        return RawRows(
+            old.lead,
+            x,
+            one((old.step, step)),
+            one((old.elapsed, elapsed)),
+            one((old.fresh, fresh)),
+            one((old.total, total)),
+            one((old.true, true)),
+            one((old.fast, fast)),
         )
-        return RawRows(old.lead, x, *map(np.concatenate, pairs))
 
     def _tell(self, push: Floats, elapsed: Times, fresh: Mask, good: Mask) -> tuple[Mask, Mask]:
         """Return `true` and `fast` of Blocks at each row."""
@@ -280,9 +285,9 @@ class Keep:
 
     def run(self, x: Floats, before: Floats) -> Floats:
         """Return the filter's output for `x` (PIECE, r, pieces); `before` (r,) is that before."""
-        return self._add(x * (1.0 - self.share), before)
+        return self.add(x * (1.0 - self.share), before)
 
-    def _add(self, y: Floats, before: Floats) -> Floats:
+    def add(self, y: Floats, before: Floats) -> Floats:
         """Turn what each row adds into the output, in place, and return it.
 
         What a piece carries on into the next comes after; it is a recursion over the pieces.
@@ -292,7 +297,7 @@ class Keep:
         carried = before[:, None]
         if y.shape[2] > 1:
             inner = Keep.of(self.product[-1, 0, :-1])
-            ends = inner._add(in_pieces(y[-1, :, :-1], 0.0), before)
+            ends = inner.add(in_pieces(y[-1, :, :-1], 0.0), before)
             carried = np.concatenate((carried, in_rows(ends, y.shape[2] - 1)), axis=1)
         y += self.product * carried
         return y

@@ -84,7 +84,7 @@ class ChassisFilter:
     _time: int = 0
     _keep: tuple[float, float] = (0.0, 0.0)
 
-    def step(
+    def step(  # noqa: PLR0915 - every message would pay for another call
         self,
         now: int,
         stamp: int,

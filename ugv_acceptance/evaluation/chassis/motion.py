@@ -36,9 +36,10 @@ MATTERS = math.radians(1.0)
 # turn towards it of LIFT (rad) meanwhile is a lift, one below NONE (rad) is none.
 LOW, BACK = math.radians(3.0), 100_000_000
 LIFT, NONE = math.radians(1.0), math.radians(0.5)
-# A closer look is taken where the rate may leave less than CALM of the least tip angle: its square is
-# above SPIN angle^2 - SPIN_LESS, as 1 - cos(angle) > 0.4 angle^2, and as the square of the natural
-# frequency is above 2 / s2 on any robot whose centre of gravity is less than 4 m from the edge.
+# A closer look is taken where the rate may leave less than CALM of the least tip angle: its square
+# is above SPIN angle^2 - SPIN_LESS, as 1 - cos(angle) > 0.4 angle^2, and as the square of the
+# natural frequency is above 2 / s2 on any robot whose centre of gravity is less than 4 m from the
+# edge.
 SPIN, SPIN_LESS = 2.0 * 2.0 * 0.4, 2.0 * 2.0 * (1.0 - math.cos(CALM))
 # So it is where the push may leave less than LOW: it is above 0.8 g (angle - LOW), which is below
 # g sin(angle - LOW) up to 1.1 rad. (Gravity's z is negative.)
@@ -73,7 +74,7 @@ class ChassisSignals:
 
     def quiet(self) -> bool:
         """Return whether all signals are quiet."""
-        return all([signal.quiet for kind in self.all() for signal in kind])
+        return all(signal.quiet for kind in self.all() for signal in kind)
 
 
 @dataclass(slots=True)
@@ -81,8 +82,8 @@ class Episodes:
     """How far the robot turned towards each side while effective gravity was near tipping there.
 
     `turn` (rad), `past` (s) how long the margin has been below 0, each to one of SIDES. The times
-    (ns) are `elapsed` of the filters: when the margin to a side and when any was last low, when the push
-    was last hard enough to look closer, and when the mean force was last gravity.
+    (ns) are `elapsed` of the filters: when the margin to a side and when any was last low, when the
+    push was last hard enough to look closer, and when the mean force was last gravity.
     """
 
     turn: list[float] = field(default_factory=lambda: [0.0] * len(SIDES))
@@ -231,7 +232,7 @@ class ChassisMotion:
         self._feed(now, (turning, certain, unloaded, lift))
 
     def _pushed(self, gravity: Vector) -> bool:
-        """Return whether the push is to be believed: the ground presses, and gravity is measured."""
+        """Return whether to believe the push: the ground presses, and gravity is measured."""
         felt, of = self.filter, self.episodes
         vx, vy, vz = felt.state[3:6]
         gx, gy, gz = gravity
@@ -256,7 +257,7 @@ class ChassisMotion:
         return kernel.one(*stance.terms, stance.mass, *self._inertia[1], *felt)
 
     def moving(self, gravity: Vector, angles: Four) -> Four | None:
-        """Return the tilt left (rad) to each of SIDES with the energy of the turn; None: no gyro."""
+        """Return the tilt left (rad) to each side with the energy of the turn; None: no gyro."""
         if not (self.turned and self.filter.blocks.fast):
             return None
         if self.stands is None or self.stands[0].edges is None:

@@ -1,0 +1,106 @@
+"""The margins of a robot that moves: held to a pendulum that is integrated, and to closed forms."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from ugv_acceptance.model.edges import corners_of
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.robot import Contact, Joint, Link, Robot
+from ugv_acceptance.model.stability import SIDES, stance_of
+from ugv_acceptance.model.tipping import inertia_of, tipping_of
+
+MASS, HEIGHT, HALF, WIDE, INERTIA = 20.0, 0.3, 0.25, 0.2, (1.0, 1.5, 2.0)
+G, IMU = 9.81, (0.05, 0.02, 0.4)
+FRONT, LEFT, REAR = (SIDES.index(side) for side in ('front', 'left', 'rear'))
+
+
+def box() -> Robot:
+    """Return a box on four points, with an arm that weighs nothing."""
+    xx, yy, zz = INERTIA
+    links = (
+        Link('base', MASS, (0.0, 0.0, HEIGHT), ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))),
+        Link('arm'),
+    )
+    feet = ((HALF, WIDE), (HALF, -WIDE), (-HALF, WIDE), (-HALF, -WIDE))
+    contacts = tuple(Contact(f'c{k}', 'base', (x, y, 0.0)) for k, (x, y) in enumerate(feet))
+    return Robot('box', links, (Joint('j', 'revolute', 'base', 'arm'),), ('j',), contacts)
+
+
+def margins(
+    pitch: float = 0.0,
+    push: Sequence[float] = (0.0, 0.0, 0.0),
+    omega: Sequence[float] = (0.0, 0.0, 0.0),
+    alpha: Sequence[float] = (0.0, 0.0, 0.0),
+) -> tuple[tuple[float, ...], ...]:
+    """Return the four results for the box, nose down by `pitch` (rad); `push` is what it feels."""
+    mechanics = mechanics_of(box())
+    stance = stance_of(mechanics, posture_of(mechanics, (0.0,), 0.0, (0.0, 0.0, 0.0)))
+    kernel = tipping_of(mechanics, corners_of(mechanics, stance.support.polygon), stance.sides, IMU)
+    inertia = inertia_of(mechanics).one(0.0, 0.0, 0.0, 0.0, 0.0)
+    gravity = np.array([G * math.sin(pitch), 0.0, -G * math.cos(pitch)])
+    felt = (*gravity, *(np.array(push) - gravity), *omega, *alpha)
+    return kernel.one(*stance.terms, stance.mass, *inertia, *map(float, felt))
+
+
+def furthest(angle: float, rate: float) -> float:
+    """Return where a rigid body that turns about its front edge comes to rest: the margin left.
+
+    Integrated step by step; minus infinity if it goes over.
+    """
+    reach2 = HALF**2 + HEIGHT**2
+    inertia, pull = INERTIA[1] + MASS * reach2, MASS * G * math.sqrt(reach2)
+    left, dt = angle, 1e-5
+    while rate > 0.0:
+        rate -= pull / inertia * math.sin(left) * dt
+        left -= rate * dt
+        if left < 0.0:
+            return -math.inf
+    return left
+
+
+@pytest.mark.parametrize('pitch', [0.0, 0.3])
+@pytest.mark.parametrize('rate', [0.0, 0.5, 1.5, 2.2])
+def test_the_energy_of_a_turn_takes_what_the_pendulum_turns(pitch: float, rate: float) -> None:
+    """A box that turns about its edge comes to rest at the margin told, or goes over."""
+    found = margins(pitch, omega=(0.0, rate, 0.0))[0][FRONT]
+    wanted = furthest(math.atan2(HALF, HEIGHT) - pitch, rate)
+    assert found == pytest.approx(wanted, abs=2e-4) if wanted > 0.0 else found < 0.0
+
+
+def test_a_turn_away_from_an_edge_takes_nothing() -> None:
+    """Only the rate towards an edge counts for it; a yaw counts for none."""
+    still = margins()[0]
+    assert margins(omega=(0.0, 1.0, 0.0))[0][REAR] == pytest.approx(still[REAR], abs=1e-12)
+    assert margins(omega=(0.0, 0.0, 3.0))[0] == pytest.approx(still, abs=1e-12)
+    assert margins(omega=(-1.0, 0.0, 0.0))[0][LEFT] < still[LEFT] - 0.01
+    assert margins(omega=(-1.0, 0.0, 0.0))[2][LEFT] == -1.0
+
+
+@pytest.mark.parametrize('brake', [-6.0, -1.0, 0.0, 2.0, 8.0, 12.0])
+def test_a_brake_tilts_effective_gravity(brake: float) -> None:
+    """On the ground the margin is the static one less the arctangent of brake over gravity."""
+    found = margins(push=(-brake, 0.0, 0.0))[1]
+    lean = math.atan2(brake, G)
+    assert found[FRONT] == pytest.approx(math.atan2(HALF, HEIGHT) - lean, abs=1e-12)
+    assert found[REAR] == pytest.approx(math.atan2(HALF, HEIGHT) + lean, abs=1e-12)
+
+
+def test_a_body_that_turns_about_its_edge_feels_only_gravity_there() -> None:
+    """What the IMU feels of the turn itself is taken off: the edge does not move."""
+    rate, turn = 1.3, 4.0
+    arm = np.array(IMU) - (HALF, 0.0, 0.0)
+    omega, alpha = np.array([0.0, rate, 0.0]), np.array([0.0, turn, 0.0])
+    push = np.cross(omega, np.cross(omega, arm)) + np.cross(alpha, arm)
+    found = margins(push=push.tolist(), omega=omega.tolist(), alpha=alpha.tolist())[1]
+    assert found[FRONT] == pytest.approx(margins()[1][FRONT], abs=1e-12)
+    assert abs(margins(push=push.tolist())[1][FRONT] - found[FRONT]) > 0.05
+
+
+def test_the_frequency_is_that_of_the_pendulum() -> None:
+    """The squared natural frequency is M g r over the inertia about the edge."""
+    reach2 = HALF**2 + HEIGHT**2
+    wanted = MASS * G * math.sqrt(reach2) / (INERTIA[1] + MASS * reach2)
+    assert margins()[3][FRONT] == pytest.approx(wanted, rel=1e-12)
