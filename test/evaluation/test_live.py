@@ -189,13 +189,13 @@ def test_a_clock_that_is_off_is_told_until_it_is_right() -> None:
 
 
 def test_a_joint_that_was_never_named_is_missing_not_invalid() -> None:
-    """A joint that no message ever named is missing; it is not reported as invalid."""
+    """A joint that no message ever named is missing after half a second, and not invalid."""
     run = [
         replace(m, names=('lift',), position=(0.1,)) if isinstance(m, Joints) else m
         for m in run_of(1.0)
     ]
     assert told(run, T0 + S, 'INPUT_INVALID') == []
-    assert told(run, T0 + S, 'INPUT_INCOMPLETE') == [('joint_states', 0, None, 1.0)]
+    assert told(run, T0 + S, 'INPUT_INCOMPLETE') == [('joint_states', 520, None, 1.0)]
 
 
 def test_a_recording_that_ends_in_silence_has_a_gap_to_its_end() -> None:

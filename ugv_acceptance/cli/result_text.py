@@ -27,6 +27,8 @@ _MOST_EFFORTS = 11
 _MOST_WARNINGS = 6
 # More messages than this have a rate, if they can be used.
 _FEW = 100
+# Said of an alert that rests only on a sensor found to be wrong.
+DOUBTFUL = ' (by a sensor that is contradicted: it decides nothing)'
 # Levels of alerts, the least severe first.
 _SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
@@ -203,7 +205,7 @@ def _print_alerts(result: dict[str, Any], console: Console) -> None:
         level = level_words(alert['level'])
         console.print(
             f'  {alert["start_s"]:8.2f} to {end:>9}  {level:7}  {alert["code"]:16}  '
-            f'{escape(alert["message"])}',
+            f'{escape(alert["message"])}' + (DOUBTFUL if alert['doubtful'] else ''),
             soft_wrap=True,
         )
     if len(alerts) > _MOST_ALERTS:

@@ -22,7 +22,7 @@ from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
@@ -131,7 +131,9 @@ class LiveEvaluator:
                 watch.joints.invalid.detail = words.why_unusable(joints)
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
         limit = self._fresh[0].limit
-        old = now - min(joints.seen) > limit
+        oldest = min(joints.seen)
+        # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
+        old = now - oldest > limit and (oldest != NEVER or now - joints.began > STARTUP)
         if old or not watch.missing.quiet:
             if old and not watch.missing.raw:
                 watch.missing.detail = words.what_is_missing(joints, now, limit)

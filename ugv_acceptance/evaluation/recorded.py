@@ -24,7 +24,7 @@ from ugv_acceptance.evaluation.inputs.payload import (
     payload_fault,
     payload_from,
 )
-from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout, clock_words
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
@@ -218,6 +218,7 @@ class RecordedEvaluator:
             lambda row: words.why_unusable(merger, row),
         )
         old = time - joints.oldest > limits
+        old &= (joints.oldest != NEVER) | (time - merger.began > STARTUP)
         feed(
             self.watch.missing, time, old,
             lambda row: words.what_is_missing(merger, int(time[row]), int(limits[row]), row),

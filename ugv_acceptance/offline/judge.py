@@ -105,6 +105,8 @@ def judge(
     findings = Findings(
         asked, ordered(log), data, Bounds(settings, sources), statements, reading.held.doubtful
     )
+    for entry, alert in zip(data['alerts'], findings.alerts, strict=True):
+        entry['doubtful'] = findings.in_doubt(alert)
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
     # The cause goes before what follows from it.

@@ -53,6 +53,7 @@ class JointMerger:
     speed: list[float] = field(init=False)
     seen: list[int] = field(init=False)
     repeated: float = 0.0
+    began: int = NEVER
     repeating: int = 0
     told: Told = field(init=False)
     layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
@@ -113,6 +114,8 @@ class JointMerger:
             layout.first = now
         if not pairs or len(position) != len(names):
             return False
+        if self.began == NEVER:
+            self.began = now
         repeats = layout.repeats
         if repeats.seconds or (stamp == repeats.stamp and stamp):
             self._repeat(repeats, now, stamp, position)
@@ -203,6 +206,8 @@ class JointMerger:
             time, stamp, place = time[order], stamp[order], place[order]
             tables, named, of = tables[:, :, order], named[:, order], of[order]
             positions = {x: positions[x][place[of == k]] for x, k in numbers.items()}
+        if n and self.began == NEVER:
+            self.began = int(time[0])
         rows_of = {x: np.flatnonzero(of == k) for x, k in numbers.items()}
         repeats = self._repeat_rows(time, stamp, rows_of, positions)
         raw = tables[0].copy()
