@@ -81,7 +81,7 @@ def evidence_of(joint: Joint, loads: Floats) -> Evidence:
     mean = joint.torque + loads[:, None] * joint.lever
     parts: list[list[Floats]] = [[], [], [], []]
     for covariance, likely in zip(joint.covariances(), LIKELY, strict=True):
-        weight: Floats = np.linalg.inv(covariance)
+        weight = np.asarray(np.linalg.inv(covariance), np.float64)
         constant = likely - 0.5 * (np.linalg.slogdet(covariance)[1] + n * LOG_2PI)
         a, b, c = _products(y, weight, mean)
 

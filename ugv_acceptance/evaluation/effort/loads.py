@@ -76,7 +76,7 @@ class _Stack:
 
     def weight(self, friction: Floats) -> Floats:
         """Return the inverse covariance (n, n), for a friction (n,) in N m (N)."""
-        return np.linalg.inv(self.shared + np.diag(friction**2))
+        return np.asarray(np.linalg.inv(self.shared + np.diag(friction**2)), np.float64)
 
 
 def weigh(arm: Arm, signs: Sequence[float | None]) -> Weighed:
@@ -123,7 +123,7 @@ def _fit(stack: _Stack, weight: Floats, cuts: Sequence[int]) -> tuple[Floats, Fl
     """Return the loads (s,), their covariance (s, s) and the weight (n, n) less their columns."""
     columns = _columns(stack, cuts)
     weighted = weight @ columns
-    variance: Floats = np.linalg.pinv(columns.T @ weighted)
+    variance = np.asarray(np.linalg.pinv(columns.T @ weighted), np.float64)
     left = weight - weighted @ variance @ weighted.T
     return variance @ (weighted.T @ stack.open), variance, left
 

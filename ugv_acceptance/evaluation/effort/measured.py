@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.criteria.statement import Objection
 from ugv_acceptance.evaluation.effort.facts import CONSTANT, NONE, SCALED, JointMeaning
@@ -63,7 +64,13 @@ class MeasuredLimits:
             twice = np.fmin(size[1:], size[:-1])
         self._most = np.fmax(self._most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
 
-    def _feed(self, spells: list[Lasting], rows: MarginRows, bad: Floats, value: Floats) -> None:
+    def _feed(
+        self,
+        spells: list[Lasting],
+        rows: MarginRows,
+        bad: NDArray[np.bool_],
+        value: Floats,
+    ) -> None:
         for j, lasting in enumerate(spells):
             lasting.add(rows.time, rows.until, bad[:, j], value[:, j])
 
