@@ -17,6 +17,7 @@ from ugv_acceptance.report.format import (
     doubts_of,
     missing_text,
     not_checked_lines,
+    number_text,
     origin_line,
 )
 
@@ -250,7 +251,7 @@ def _load_line(load: dict[str, Any]) -> str:
     return (
         f'{load["start_s"]:.0f}-{load["end_s"]:.0f} s: payload {max(mass["value"], 0.0):.2f} kg '
         f'(95 %: {max(mass["low"], 0.0):.2f} to {max(mass["high"], 0.0):.2f} kg) by measured '
-        f'efforts, {load["declared_kg"]:.2f} kg declared'
+        f'efforts, {number_text(load["declared_kg"], 2)} kg declared'
     )
 
 

@@ -244,3 +244,16 @@ def test_a_sign_may_be_certain_where_the_scale_is_not(
     assert (joint.opposed, joint.odd) == (opposed, odd)
     assert ('effort_sign: -1' in joint.do) is opposed
     assert joint.sign is None
+
+
+def test_a_joint_that_carries_nothing_means_nothing() -> None:
+    """Balanced wheels have no torque to compare an effort with, and a robot may have no joint."""
+    made = run(PACKBOT, ['torque'], 3)
+    rolls = replace(made.arm, torque=0.0 * made.arm.torque, lever=0.0 * made.arm.lever,
+                    errors=0.0 * made.arm.errors, sizes=0.0 * made.arm.sizes)  # fmt: skip
+    assert {one.meaning for one in name_meanings(rolls)} == {UNKNOWN}
+    empty = made.arm
+    none = replace(empty, effort=empty.effort[:, :0], torque=empty.torque[:, :0],
+                   lever=empty.lever[:, :0], errors=empty.errors[:, :, :0],
+                   sizes=empty.sizes[:0])  # fmt: skip
+    assert name_meanings(none) == []

@@ -100,6 +100,10 @@ class Arm:
         return np.concatenate((less, np.linspace(0.0, most, LOADS - steps)))
 
 
+# A joint whose largest static torque (N m; N) is below this carries nothing.
+WEIGHTLESS = 1e-6
+
+
 @dataclass(frozen=True, slots=True)
 class Named:
     """What one joint's effort means: one of FACTS, its probability, the ratio, where it is cut."""
@@ -127,9 +131,12 @@ class _Explained:
 def name_meanings(arm: Arm) -> list[Named]:
     """Return what the effort of every joint means; `unknown` where nothing is certain."""
     count = arm.effort.shape[1]
+    if not count:
+        return []
     told = [_plain(arm, j) for j in range(count)]
     rows = np.array([rows for _, rows, _ in told]).reshape(count, -1).T
-    asked = [j for j in range(count) if told[j][0] in {'', SATURATED} and rows[:, j].any()]
+    open_ = [j for j in range(count) if told[j][0] in {'', SATURATED} and rows[:, j].any()]
+    asked = [j for j in open_ if arm.sizes[j] > WEIGHTLESS]
     parts = _parts(arm, rows, asked)
     found = []
     for j in range(count):
