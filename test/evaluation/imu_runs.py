@@ -6,6 +6,7 @@ held against formulas that they do not share.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -39,6 +40,13 @@ class ImuRun:
         """Seconds since the first message."""
         found: Floats = (self.time - self.time[0]) / NS
         return found
+
+    def taken(self, some: Any) -> 'ImuRun':
+        """Return the messages that a slice or a mask (n,) picks."""
+        return ImuRun(
+            self.time[some], self.stamp[some], self.q[some], self.w[some], self.a[some],
+            self.frame[some],
+        )  # fmt: skip
 
     def columns(self) -> list[ImuColumns]:
         """Return the messages as columns, one table a frame_id."""
@@ -78,7 +86,7 @@ def good_run(
     turn = np.gradient(np.unwrap(yaw), 1.0 / hz)
     left = np.column_stack((-ahead[:, 1], ahead[:, 0], np.zeros(n)))
     push = ahead * along[:, None] + left * (speed * turn)[:, None]
-    force = attitude.inv().apply(push + (0.0, 0.0, G))
+    force = attitude.inv().apply(push + np.array((0.0, 0.0, G)))
     shake = rng.uniform(0.0, 5.0) if vibration is None else vibration
     force += rng.normal(0.0, 0.3, (n, 3)) + rng.normal(0.0, shake, (n, 3)) * moving[:, None]
     rate = rate + rng.uniform(-0.02, 0.02, 3) + rng.normal(0.0, 0.02, (n, 3))
@@ -168,7 +176,7 @@ def lossy(run: ImuRun, seed: int, share: float = 0.3) -> ImuRun:
     """Return a run of which that share of the messages is lost at random."""
     keep = np.random.default_rng(seed).random(len(run.q)) >= share
     keep[0] = True
-    return ImuRun(*(v[keep] for v in (run.time, run.stamp, run.q, run.w, run.a, run.frame)))
+    return run.taken(keep)
 
 
 def jittery(run: ImuRun, seed: int, jitter: float = 0.02) -> ImuRun:

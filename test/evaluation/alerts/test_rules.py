@@ -39,8 +39,8 @@ def test_the_way_to_gravity_is_watched_with_the_delay_of_the_imu() -> None:
     assert found == [
         ('IMU_FRAME', ERROR, 0.5, 0.5, 400 * MS, 2 * S),
         ('IMU_ORIENTATION', WARN, 0.5, 0.5, 1500 * MS, 2 * S),
-        ('IMU_GRAVITY', ERROR, 0.15, 0.15, 1500 * MS, 2 * S),
-        ('IMU_INCONSISTENT', ERROR, 0.2, 0.1, 1500 * MS, 2 * S),
+        ('IMU_GRAVITY', ERROR, 0.15, 0.15, 0, 2 * S),
+        ('IMU_INCONSISTENT', ERROR, 0.2, 0.1, 0, 2 * S),
     ]
 
 

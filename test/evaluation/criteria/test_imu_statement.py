@@ -44,7 +44,7 @@ def checks(statement: Statement) -> Any:
 
 
 def test_the_windows_of_a_good_run_are_counted() -> None:
-    """Every second from the first whole window on; none contradicts, those that turn are verified."""
+    """Every second from the first whole window on; none contradicts, what turns is verified."""
     found = checks(stated(good_run(1, 60.0)))
     assert [found['gravity'][t]['windows'] for t in ('2 s', '5 s', '10 s')] == [58, 55, 50]
     for window in found['gravity'].values():

@@ -1,6 +1,7 @@
 """The grid of an IMU: integrals against closed forms and scipy, live against columns."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def filled(x: Floats) -> tuple[ImuGrid, ImuGrid]:
     one, many = ImuGrid(9.81), ImuGrid(9.81)
     at = x[:, TAU] // GRID
     ends = [0, *(np.flatnonzero(np.diff(at)) + 1).tolist()]
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
+    for a, b in pairwise(ends):
         one.close(x[a:b].ravel().tolist(), x[b].tolist())
     many.extend(x[: ends[-1] + 1])
     return one, many

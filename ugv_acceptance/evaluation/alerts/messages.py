@@ -4,10 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
+from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
-from ugv_acceptance.evaluation.inputs.imu_motion import SLACK, SOURCE_KINDS
-from ugv_acceptance.evaluation.inputs.imu_placing import MOUNTING_KINDS, UNIT_KINDS
-from ugv_acceptance.evaluation.inputs.imu_rates import GYRO_KINDS, ORIENTATION_KINDS
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
@@ -213,14 +211,15 @@ ALERTS = {
         'The IMU does not measure gravity correctly: tilt cannot be trusted.',
     ),
     'IMU_INCONSISTENT': AlertText(
-        'while the IMU does not turn, its orientation and acceleration disagree by {degrees:.1f} degrees',
+        'while the IMU does not turn, its orientation and acceleration disagree by '
+        '{degrees:.1f} degrees',
         'check the IMU: its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
     'IMU_NO_GRAVITY': AlertText(
-        'the tilt is unknown: {subject} gives no orientation that can be used, and its acceleration '
-        'differs from gravity by {peak:.0%}{seems}',
+        'the tilt is unknown: {subject} gives no orientation that can be used, and its '
+        'acceleration differs from gravity by {peak:.0%}{seems}',
         'use an IMU that gives an orientation; check the unit of the acceleration (m/s2, not g)',
         FailureSource.SENSOR,
         'Nothing tells the tilt now: no margin is known.',
@@ -232,9 +231,10 @@ ALERTS = {
         'The IMU repeats its last values: tilt is not known.',
     ),
     'IMU_CONTRADICTION': AlertText(
-        'averaged over {window:.0f} s, the acceleration of {subject} contradicts its orientation by '
-        '{degrees:.0f} degrees',
-        'check the IMU: its orientation may be stuck, drift, or have other axes; or its acceleration',
+        'averaged over {window:.0f} s, the acceleration of {subject} contradicts its orientation '
+        'by {degrees:.0f} degrees',
+        'check the IMU: its orientation may be stuck, drift, or have other axes; or its '
+        'acceleration',
         FailureSource.SENSOR,
         'Orientation and acceleration of the IMU contradict each other: tilt cannot be trusted.',
     ),
@@ -251,9 +251,10 @@ ALERTS = {
         'The orientation of the IMU does not turn as its rates say: tilt cannot be trusted.',
     ),
     'IMU_MOUNTING': AlertText(
-        'from the first message on {subject} leans by over 45 degrees, so it seems mounted otherwise '
-        'than configured: {found}',
-        'set imu.mounting_rpy_deg as named (its heading cannot be told), or let the driver send z up',
+        'from the first message on {subject} leans by over 45 degrees, so it seems mounted '
+        'otherwise than configured: {found}',
+        'set imu.mounting_rpy_deg as named (its heading cannot be told), or let the driver send '
+        'z up',
         FailureSource.DESIGN,
         'The IMU is mounted otherwise than configured, or its driver has other axes (z down).',
     ),
@@ -343,21 +344,6 @@ ALERTS = {
         level=ERROR,
     ),
 }
-# Sizes of an acceleration at rest, as shares of g, and what unit they suggest.
-SEEMS = (
-    (-1.0, 0.04, UNIT_KINDS[4]),
-    (0.04, 0.2, UNIT_KINDS[1]),
-    (2.5, 4.5, UNIT_KINDS[2]),
-    (70.0, 140.0, UNIT_KINDS[3]),
-)
-# What the numbers of kinds of the IMU's checks mean.
-FOUND = {
-    'IMU_RATES': GYRO_KINDS,
-    'IMU_ROTATION': ORIENTATION_KINDS,
-    'IMU_MOUNTING': MOUNTING_KINDS,
-    'IMU_UNIT': UNIT_KINDS,
-    'IMU_TWO_SOURCES': SOURCE_KINDS,
-}
 # The faults only a live node sees, with their levels; the other alerts a recording shows as well.
 LIVE = {code: text.level for code, text in ALERTS.items() if text.level is not None}
 RECORDED = tuple(code for code in ALERTS if code not in LIVE)
@@ -390,26 +376,12 @@ def describe(alert: Alert, settings: Settings) -> str:
         seconds=-rule.on,
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
-        window=(rule.reach - SLACK) / 1e9,
-        found=_found(alert),
-        seems=_seems(alert),
+        window=window(alert),
+        found=found(alert),
+        seems=seems(alert),
         relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
         detail=alert.detail,
     )
-
-
-def _found(alert: Alert) -> str:
-    """Return what a check of the IMU found, by the kind that is the alert's peak; '' if none."""
-    kinds = FOUND.get(alert.rule.code, ())
-    kind = int(alert.peak) if math.isfinite(alert.peak) else 0
-    return kinds[kind] if 0 <= kind < len(kinds) else ''
-
-
-def _seems(alert: Alert) -> str:
-    """Return the unit that an acceleration so far from gravity seems to have, '' if none."""
-    share = 1.0 - alert.peak if alert.peak <= 1.0 else 1.0 + alert.peak
-    found = [words for low, high, words in SEEMS if low <= share < high]
-    return f': {found[0]}' if found else ''
 
 
 def _relaxed(name: str, settings: Settings) -> str:

@@ -192,12 +192,12 @@ class RuleSet:
         apart = (imu.agreement, imu.agreement / 2)
         # With attitude 'orientation' this is a warning only: margins do not need the accelerometer.
         level = WARN if imu.attitude == 'orientation' and not imu.specific_force else ERROR
-        # Contradictions make doubtful what was believed while they were confirmed.
+        # inputs/imu_rest.py lets what is seen at rest last, and says how far back it reaches.
         return AttitudeSignals(
             self._fault('IMU_FRAME', 'imu', ERROR),
             self._fault('IMU_ORIENTATION', 'imu', WARN, delay),
-            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), delay, delay),
-            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay, delay),
+            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), 0.0),
+            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, 0.0),
             self._signal(
                 'IMU_NO_GRAVITY', 'imu', ERROR, (STRANGE, STRANGE), self.settings.delays.fault_on
             ),

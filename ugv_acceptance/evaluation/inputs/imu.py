@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, feed
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
+from ugv_acceptance.evaluation.inputs.imu_rest import RestChecks
 from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
@@ -94,7 +95,8 @@ class ImuSeen:
             self.messages += len(s.log_time)
             self.no_rate += int((s.angular_velocity_covariance_0 == -1.0).sum())
             self.no_force += int((s.linear_acceleration_covariance_0 == -1.0).sum())
-            self.turned += int(s.angular_velocity.any(axis=1).sum())
+            turned = int(s.angular_velocity.any(axis=1).sum())
+            self.turned += turned
 
 
 @dataclass(slots=True)
@@ -112,6 +114,7 @@ class ImuTracker:
     taken: list[int] = field(default_factory=lambda: [0, 0, 0])
     motion: MotionChecks = field(init=False)
     seen: ImuSeen = field(default_factory=ImuSeen)
+    _rest: RestChecks = field(init=False)
     _frame: str | None = None
     _foreign: float = 0.0
     _busy: bool = False
@@ -119,6 +122,13 @@ class ImuTracker:
     def __post_init__(self) -> None:
         self.low_pass = LowPass(self.settings.imu.low_pass)
         self.motion = MotionChecks(self.settings, self.faults.motion)
+        of = self.faults
+        self._rest = RestChecks(of.strange, of.disagreement, self.settings.robot.gravity)
+
+    @property
+    def _delay(self) -> int:
+        """For how long (ns) a disagreement at rest must last."""
+        return int(self.settings.imu.agreement_delay * 1e9)
 
     @property
     def gyro_trusted(self) -> bool:
@@ -164,8 +174,9 @@ class ImuTracker:
         strange = off / g if still else math.nan
         believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
         doubted = apart if told else math.nan
-        of, seen = self.faults, self._busy or self._foreign or empty >= 0.5
+        of, rest = self.faults, self._rest
         # Small values cannot change quiet signals: most calls are saved.
+        seen = self._busy or self._foreign or empty >= 0.5 or rest.pending
         seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
         lost = seen and self._judge(now, empty, strange, doubted)
         motion = self.motion
@@ -185,6 +196,7 @@ class ImuTracker:
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
         """Feed the fault signals with a message; return whether a fault makes gravity unknown."""
         of, lost = self.faults, False
+        strange, apart = self._rest.step(now, strange, apart, self._delay)
         signals = (of.frame, of.orientation, of.strange, of.disagreement)
         for signal, value in zip(signals, (self._foreign, empty, strange, apart), strict=True):
             signal.step(now, value)
@@ -233,10 +245,11 @@ class ImuTracker:
         smooth: Floats,
         foreign: Floats,
     ) -> ImuRows:
-        """Return the rows from `told_by` (orientation, covariance, rate, acceleration) and `smooth`.
+        """Return the rows from `told_by` and `smooth`.
 
-        Shapes (4, n), (n,), (3, n) and (3, n); `smooth` (3, n) is the filtered acceleration,
-        `foreign` (n,) is 1 for messages of another frame.
+        Orientation, covariance, rate and acceleration have shapes (4, n), (n,), (3, n) and (3, n);
+        `smooth` (3, n) is the filtered acceleration, `foreign` (n,) is 1 for messages of another
+        frame.
         """
         imu, g = self.settings.imu, self.settings.robot.gravity
         q, covariance_0, omega, acceleration = told_by
@@ -303,17 +316,15 @@ class ImuTracker:
         """Feed the fault signals; set gravity to NaN while one above the level WARN is active."""
         of = self.faults
         signals = (of.frame, of.orientation, of.strange, of.disagreement)
-        for signal, values in zip(signals, faults, strict=True):
-            for start, end in feed_spans(signal, time, values):
+        before = [(signal, signal.alert, len(signal.log)) for signal in signals]
+        foreign, empty, strange, apart = faults
+        feed(of.frame, time, foreign)
+        feed(of.orientation, time, empty)
+        self._rest.columns(time, strange, apart, self._delay)
+        for signal, alert, seen in before:
+            for start, end in spans(signal, alert, seen):
                 if signal.rule.level > WARN:
                     gravity[:, (time >= start) & (time < end)] = np.nan
-
-
-def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[float, float]]:
-    """Feed a signal with columns; yield begin and end (ns) of each alert, infinite while active."""
-    before, seen = signal.alert, len(signal.log)
-    feed(signal, time, values)
-    yield from spans(signal, before, seen)
 
 
 def spans(signal: Signal, before: Alert | None, seen: int) -> Iterator[tuple[float, float]]:

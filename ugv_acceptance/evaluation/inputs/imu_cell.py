@@ -51,7 +51,7 @@ PAIRS, FORCE_JUMPS, TURN_JUMPS, SUMS = 23, 24, 25, 26
 LARGEST = 1e10
 # Acceleration (m/s2) this far above g is a shock: such a sample is left out of the calm mean.
 SHOCK = 20.0
-# Distance of two sources: accelerations (m/s2) and quaternions; a jump between them is a share of it.
+# Distance of two sources: accelerations (m/s2) and quaternions; a jump is a share of it.
 APART_FORCE, APART_TURN, JUMP = 1.5, 0.05, 0.75
 UNTURNED = (0.0, 0.0, 0.0, 1.0)
 
@@ -109,8 +109,8 @@ def grown(
 ) -> list[Values]:
     """Return what a cell adds to the first columns, up to OWN.
 
-    `sums` are those of its samples: number, acceleration, its square, rate, its square; `weight` (s)
-    is what one stands for; `before` and `after` the orientations at its ends. Floats or arrays.
+    `sums` are those of its samples: number, acceleration, its square, rate, its square; `weight`
+    (s) is what one stands for; `before` and `after` the orientations at its ends. Floats or arrays.
     """
     return list(_cell_kernel().run(weight, *sums, *before, *after))
 

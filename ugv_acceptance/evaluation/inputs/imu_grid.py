@@ -70,7 +70,8 @@ Row = Sequence[float]
 class ImuGrid:
     """The last `rows` of the grid with the columns above: lists of numbers live, else an array.
 
-    `first` is the number of the first of them, counted from the grid's start; `g` is gravity (m/s2).
+    `first` is the number of the first of them, counted from the grid's start; `g` is gravity
+    (m/s2).
     """
 
     g: float
@@ -138,8 +139,9 @@ class ImuGrid:
             out[PAIRS] += 1.0
             out[FORCE_JUMPS] += force_jumps
             out[TURN_JUMPS] += turn_jumps
-        rows = self.rows.tolist() if isinstance(self.rows, np.ndarray) else self.rows
-        self.rows = rows
+        if isinstance(self.rows, np.ndarray):
+            self.rows = list(self.rows.tolist())
+        rows = self.rows
         _append(rows, list(map(add, rows[-1], out)), int(after[TAU]) // GRID - self.row, after)
 
     def _weight(self, tau: int, n: int) -> float:

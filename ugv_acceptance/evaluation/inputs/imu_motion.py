@@ -9,6 +9,8 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -61,8 +63,8 @@ SLACK = HOP_TIME
 class MotionSignals:
     """The signals of the checks; their values are numbers of kinds, that of gravity an angle (rad).
 
-    `frozen`; `contradiction`: orientation against the mean acceleration; `rates`: the gyro's unit or
-    axes; `rotation`: the orientation against the rates; `mounting`, `unit`, `sources`.
+    `frozen`; `contradiction`: orientation against the mean acceleration; `rates`: the gyro's unit
+    or axes; `rotation`: the orientation against the rates; `mounting`, `unit`, `sources`.
     """
 
     frozen: Signal
@@ -191,7 +193,7 @@ class MotionChecks:
         passed = np.where((passed > 0) & (passed <= LONGEST), passed, received)
         starts = np.flatnonzero((passed < 0) | (passed > LONGEST)).tolist()
         places = [0, *starts, len(time)] if not starts or starts[0] else [*starts, len(time)]
-        for a, b in zip(places[:-1], places[1:], strict=True):
+        for a, b in pairwise(places):
             if a in starts:
                 self._restart(int(time[a]))
                 passed[a] = 0
@@ -216,7 +218,7 @@ class MotionChecks:
         times = self._kept[:, TAU]
         for k in range(last // HOP * HOP + HOP, grid.row + 1, HOP):
             closing = int(np.searchsorted(tau, k * GRID))
-            self._judge(k, int(time[closing]), lambda k=k: _part_of(self._kept, times, k))
+            self._judge(k, int(time[closing]), partial(_part_of, self._kept, times, k))
         grid.trim()
         self._due = (grid.row + 1) * GRID
         begins = np.searchsorted(times, grid.row // SOURCES * SOURCES * GRID)

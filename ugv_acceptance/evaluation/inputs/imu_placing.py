@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from ugv_acceptance.evaluation.inputs.imu_cell import BODY, ORIENTED, SECONDS, SQUARE
 from ugv_acceptance.evaluation.inputs.imu_grid import QUATERNION, TIME, ImuGrid
 from ugv_acceptance.evaluation.settings import ImuInput
-from ugv_acceptance.model.expressions import rotate
 from ugv_acceptance.model.robot import Vector
 
 # Rows of the grid over which unit and lean are averaged (2 s), and the parts of it (0.5 s).
@@ -81,8 +80,8 @@ def _unit(square: float, g: float) -> float:
 class Mounting:
     """Whether the IMU is mounted as configured, judged from its first two seconds on.
 
-    `kind` is None until that is known, 0 if it is so, else the number in MOUNTING_KINDS of how it looks
-    mounted; it is so again once the lean is below 45 degrees.
+    `kind` is None until that is known, 0 if it is so, else the number in MOUNTING_KINDS of how it
+    looks mounted; it is so again once the lean is below 45 degrees.
     """
 
     imu: ImuInput
@@ -107,7 +106,8 @@ class Mounting:
 
     def _height(self, up: Vector) -> float:
         """Return the cosine of the lean."""
-        return float(rotate(self.imu.mounting, up)[2])
+        (x, y, z), (a, b, c) = self.imu.mounting[2], up
+        return x * a + y * b + z * c
 
     def _leans(self, up: Vector) -> bool:
         return self._height(up) < LEANS

@@ -91,7 +91,7 @@ def rates_over(grid: ImuGrid, end: int) -> RatesFound:
     both = last[BOTH] - before[BOTH]
     cosine, ratio = both / math.sqrt(g2 * max(o2, 0.0) + 1e-18), math.sqrt(g2 / (o2 + 1e-12))
     if cosine >= AGREES and ALIKE[0] <= ratio <= ALIKE[1]:
-        return RatesFound(0.0, 0.0, True, cosine)
+        return RatesFound(0.0, 0.0, excited=True, cosine=cosine)
     # Where both differ by no more than a small rate nothing contradicts, however late one comes.
     apart = math.sqrt(max(g2 + o2 - 2.0 * both, 0.0) / count) / (0.1 * SPAN)
     if apart <= EXCITED + noise:
@@ -132,13 +132,14 @@ class Window:
             return RatesFound()
         c, s = found.cosine, found.ratio
         if c >= AGREES and ALIKE[0] <= s <= ALIKE[1]:
-            return RatesFound(0.0, 0.0, True, c)
+            return RatesFound(0.0, 0.0, excited=True, cosine=c)
         if found.error <= EXCITED + self.noise:
             return RatesFound(excited=True, cosine=c)
         gyro = _gyro_kind(s, c, pairs)
         if gyro:
-            return RatesFound(gyro, math.nan, True, c)
-        return RatesFound(math.nan, self._orientation_kind(found) or math.nan, True, c)
+            return RatesFound(gyro, excited=True, cosine=c)
+        kind = self._orientation_kind(found) or math.nan
+        return RatesFound(orientation=kind, excited=True, cosine=c)
 
     def _late(self, late: int) -> '_Pair | None':
         """Return the rotations with an orientation that comes `late` rows late."""
