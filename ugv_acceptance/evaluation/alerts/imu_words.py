@@ -1,4 +1,4 @@
-"""What the numbers of kinds of the IMU's checks mean, and which unit an acceleration seems to have."""
+"""What the numbers of kinds of the IMU's checks mean, and the unit an acceleration seems to have."""
 
 import math
 
@@ -38,5 +38,5 @@ def seems(alert: Alert) -> str:
 
 
 def window(alert: Alert) -> float:
-    """Return the length (s) of the window that contradicts: an alert reaches back by it and SLACK."""
+    """Return the length (s) of the window that contradicts: the alert reaches back SLACK more."""
     return max(alert.rule.reach - SLACK, 0) / 1e9

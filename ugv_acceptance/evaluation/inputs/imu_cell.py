@@ -115,6 +115,13 @@ def grown(
     return list(_cell_kernel().run(weight, *sums, *before, *after))
 
 
+def grown_once(
+    weight: float, sums: Sequence[float], before: Sequence[float], after: Sequence[float]
+) -> list[float]:
+    """Return `grown` of one cell, live."""
+    return list(_cell_kernel().one(weight, *sums, *before, *after))
+
+
 def in_the_world(
     force: Sequence[Values], before: Sequence[Values], after: Sequence[Values]
 ) -> tuple[Values, ...]:

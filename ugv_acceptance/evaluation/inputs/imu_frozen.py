@@ -26,7 +26,8 @@ Change = tuple[int, Sequence[float], Sequence[float], Sequence[float]]
 class FrozenCheck:
     """Feeds the signal IMU_FROZEN; `changes` are the newest changes of the values.
 
-    `count` is the number of messages since the last change, `varied` that of all changes.
+    `count` is the number of messages since the last change, `varied` that of all changes, `last`
+    orientation, rate and acceleration of the last message.
     """
 
     signal: Signal
@@ -34,23 +35,27 @@ class FrozenCheck:
     count: int = 0
     varied: int = 0
     _frozen: bool = False
-    _last: tuple[Any, ...] = (None, None, None)
+    last: tuple[Any, ...] = (None, None, None)
 
     def step(self, now: int, q: Sequence[float], w: Sequence[float], a: Sequence[float]) -> None:
         """Take a message's orientation, rate and acceleration at `now` (ns)."""
-        old_q, old_w, old_a = self._last
+        old_q, old_w, old_a = self.last
         if a != old_a or w != old_w or (q != old_q and not _same(q, old_q)):
-            self._last = q, w, a
-            self.count = 1
-            self.varied += 1
-            self.changes.append((now, q, w, a))
-            if self._frozen:
-                self._thaw(now)
+            self.change(now, q, w, a)
         elif not self._frozen:
             self.count += 1
             if self.count >= MESSAGES and now - self.changes[-1][0] >= LASTS and self._lively():
                 self._frozen = True
                 self.signal.step(now, 1.0)
+
+    def change(self, now: int, q: Sequence[float], w: Sequence[float], a: Sequence[float]) -> None:
+        """Take a message whose values differ from those before."""
+        self.last = q, w, a
+        self.count = 1
+        self.varied += 1
+        self.changes.append((now, q, w, a))
+        if self._frozen:
+            self._thaw(now)
 
     def _thaw(self, now: int) -> None:
         self._frozen = False
@@ -91,14 +96,14 @@ class FrozenCheck:
         """Take the changes of the values at `places`."""
         for k in places[-REMEMBERED:].tolist():
             row = x[k].tolist()
-            self._last = tuple(row[:4]), tuple(row[4:7]), tuple(row[7:])
-            self.changes.append((int(time[k]), *self._last))
+            self.last = tuple(row[:4]), tuple(row[4:7]), tuple(row[7:])
+            self.changes.append((int(time[k]), *self.last))
 
     def _changed(self, x: Floats) -> NDArray[np.bool_]:
         """Return which messages (n,) differ from the one before; a rate of NaN always does."""
         before = np.empty_like(x)
         before[1:] = x[:-1]
-        old_q, old_w, old_a = self._last
+        old_q, old_w, old_a = self.last
         before[0] = (*old_q, *old_w, *old_a) if old_q is not None else np.nan
         differs = x != before
         unknown = differs[:, :4].any() and np.isnan(x[:, :4]).any()

@@ -36,6 +36,7 @@ from ugv_acceptance.evaluation.inputs.imu_cell import (
     Q,
     W,
     grown,
+    grown_once,
     in_the_world,
     jump_rows,
     jumps,
@@ -64,6 +65,8 @@ GYRO_2, OWN_2, BOTH, COMPARED, PRODUCTS, QUATERNION, TIME = (
 )
 
 Row = Sequence[float]
+# What a cell adds where the kernel says nothing of it.
+NOTHING = (0.0,) * (SUMS - OWN.stop)
 
 
 @dataclass(slots=True)
@@ -120,8 +123,8 @@ class ImuGrid:
         known = n == good == sum(x[OK::WIDTH]) and after[OK]
         before, end = (x[Q], after[Q]) if known else (UNTURNED, UNTURNED)
         sums = [sum(x[k::WIDTH]) for k in (7, 8, 9, A2, 4, 5, 6, W2)]
-        out = grown(weight, (max(good, 1.0), *sums), before, end)
-        out += (0.0,) * (SUMS - len(out))
+        out = grown_once(weight, (good or 1.0, *sums), before, end)
+        out += NOTHING
         if good:
             out[ORIENTED], out[KNOWN] = out[0], 1.0
         if not known:
@@ -133,9 +136,8 @@ class ImuGrid:
             hard = [x[k : k + WIDTH] for k in range(0, len(x), WIDTH) if x[k + A2] > limit]
             force = [weight * sum(row[k] for row in hard) for k in (7, 8, 9)]
             out[SHOCKS], out[SHOCKED] = in_the_world(force, before, end), weight * len(hard)
-        for k in range(min(n - 1, 2)):
-            pair = x[k * WIDTH : (k + 1) * WIDTH], x[(k + 1) * WIDTH : (k + 2) * WIDTH]
-            force_jumps, turn_jumps = jumps(*pair)
+        for k in range(0, min(n - 1, 2) * WIDTH, WIDTH):
+            force_jumps, turn_jumps = jumps(x[k : k + 10], x[k + WIDTH : k + WIDTH + 10])
             out[PAIRS] += 1.0
             out[FORCE_JUMPS] += force_jumps
             out[TURN_JUMPS] += turn_jumps

@@ -109,12 +109,14 @@ class MotionChecks:
     _stamp: int = NO_STAMP
     _began: int = LONG_AGO
     _busy: bool = False
+    _varies: bool = True
     _frames: list[int] = field(default_factory=list)
     _before: list[float] = field(default_factory=lambda: [math.nan] * 3)
 
     def __post_init__(self) -> None:
         self.frozen = FrozenCheck(self.faults.frozen)
         self.mounting = Mounting(self.settings.imu)
+        self._varies = not self.settings.imu.noise_free
         self._grid = ImuGrid(self.settings.robot.gravity)
 
     def step(
@@ -135,8 +137,13 @@ class MotionChecks:
                 passed = 0
         self._stamp, self._time = stamp, now
         self._tau = tau = self._tau + passed
-        if not self.settings.imu.noise_free:
-            self.frozen.step(now, q, w, a)
+        if self._varies:
+            _, old_w, old_a = self.frozen.last
+            if a != old_a or w != old_w:
+                self.frozen.change(now, q, w, a)
+            else:
+                self.frozen.step(now, q, w, a)
+                self._busy = self._busy or not self.faults.frozen.quiet
         x, y, z = w
         w2 = x * x + y * y + z * z
         x, y, z = a
@@ -148,7 +155,7 @@ class MotionChecks:
         if tau >= self._due:
             self._close(now, sample)
         self._cell += sample
-        if self._busy or not self.faults.frozen.quiet:
+        if self._busy:
             self._look(now)
 
     def _close(self, now: int, sample: Sequence[float]) -> None:
@@ -178,6 +185,7 @@ class MotionChecks:
         """Judge by other settings from now on."""
         self.settings = settings
         self.mounting.imu = settings.imu
+        self._varies = not settings.imu.noise_free
 
     def columns(self, time: Times, stamp: Times, x: Floats) -> None:
         """Take many messages in order of receipt, as `step` one at a time.
@@ -186,7 +194,7 @@ class MotionChecks:
         """
         if self.tally is None:
             self.tally = Tally()
-        if not self.settings.imu.noise_free:
+        if self._varies:
             self.frozen.columns(time, x[:, :OK])
         passed = np.diff(stamp, prepend=self._stamp)
         received = np.diff(time, prepend=self._time)

@@ -74,18 +74,17 @@ class Lasting:
 
 @dataclass(slots=True)
 class RestChecks:
-    """Feeds the signals of the checks at rest: `strange`, acceleration that is not g; `apart`."""
+    """Feeds the signals of the checks at rest: `strange`, acceleration that is not g; `apart`.
+
+    `pending` says whether one of the two is at its limit or beyond.
+    """
 
     strange: Signal
     apart: Signal
     g: float
+    pending: bool = False
     _strange: Lasting = field(default_factory=lambda: Lasting(0.0))
     _apart: Lasting = field(default_factory=Lasting)
-
-    @property
-    def pending(self) -> bool:
-        """Whether one of the two is at its limit or beyond."""
-        return self._strange.since is not None or self._apart.since is not None
 
     def step(self, now: int, strange: float, apart: float, delay: int) -> tuple[float, float]:
         """Take values at `now` (ns) that must last for `delay` (ns); return those to be believed.
@@ -101,6 +100,7 @@ class RestChecks:
             (self.strange, self.apart), found, (self._strange, self._apart), strict=True
         ):
             _reach(signal, value, now, lasting.since or now)
+        self.pending = self._strange.since is not None or self._apart.since is not None
         return found
 
     def columns(self, time: Times, strange: Floats, apart: Floats, delay: int) -> None:
@@ -117,6 +117,7 @@ class RestChecks:
                 _reach(signal, value, now, begin)
                 signal.step(now, value)
             signal.advance(int(time[-1]))
+        self.pending = self._strange.since is not None or self._apart.since is not None
 
 
 def _reach(signal: Signal, value: float, now: int, since: int) -> None:
