@@ -66,7 +66,7 @@ def make(made: Run, folder: Path) -> None:
     scenario = replace(SCENARIOS[made.scenario](), duration=made.duration)
     recording = run(config.settings.robot, scenario, made.seed, build)
     shutil.rmtree(folder, ignore_errors=True)
-    with BagWriter(folder) as bag:
+    with BagWriter(folder, simulated=True) as bag:
         sensor = Qos(reliability='best_effort')
         bag.add_topic('/joint_states', 'sensor_msgs/msg/JointState', sensor)
         bag.add_topic('/imu/data', 'sensor_msgs/msg/Imu', sensor)

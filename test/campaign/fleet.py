@@ -24,10 +24,18 @@ NONE = [0.0] * 9
 STOWED = dict(FOLDED)
 
 
-def write_run(folder: Path, hour: int, *, tilt_deg: float = 0.0, silent_s: float = 0.0) -> Path:
+def write_run(
+    folder: Path,
+    hour: int,
+    *,
+    tilt_deg: float = 0.0,
+    silent_s: float = 0.0,
+    effort: float | None = None,
+) -> Path:
     """Write a standing run of 4 s, begun in some hour; the ground tilts sideways in its middle.
 
-    The joints are silent for the last `silent_s`.
+    The joints are silent for the last `silent_s`. The shoulder measures `effort` (N m) meanwhile,
+    all efforts are 0 else; with None no effort is measured.
     """
     settings = load().settings
     names = [joint.topic_name for joint in settings.joints]
@@ -41,7 +49,11 @@ def write_run(folder: Path, hour: int, *, tilt_deg: float = 0.0, silent_s: float
             now = EPOCH + hour * HOUR + k * 20_000_000
             angle = np.radians(tilt_deg) if 80 <= k < 140 else 0.0
             if k * 0.02 < 4.0 - silent_s:
-                bag.write('/joint_states', now, joint_state_cdr(now, '', names, still, calm, []))
+                efforts = [0.0] * len(names) if effort is not None else []
+                if effort and 80 <= k < 140:
+                    efforts[settings.robot.joint_names.index('shoulder_joint')] = effort
+                state = joint_state_cdr(now, '', names, still, calm, efforts)
+                bag.write('/joint_states', now, state)
             up = [0.0, GRAVITY * float(np.sin(angle)), GRAVITY * float(np.cos(angle))]
             turned = [float(np.sin(angle / 2.0)), 0.0, 0.0, float(np.cos(angle / 2.0))]
             bag.write(

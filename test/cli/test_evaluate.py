@@ -230,22 +230,24 @@ def test_bad_input_is_one_line_and_exit_code_2(kind: str, tmp_path: Path) -> Non
 def test_effort_of_a_foreign_recording_shows_its_payload(
     shared_bags: Path, repository: Path, tmp_path: Path
 ) -> None:
-    """A SCARA arm holds 98.0 N, and 137.2 N after it grasps 4 kg: the difference is the payload."""
+    """A SCARA arm holds 98.0 N, and 137.2 N after it grasps 4 kg: only their ratio is certain.
+
+    Whether the force is in newtons cannot be told from one sliding joint that holds one load.
+    """
     folder, found = shared_bags / 'abitobot', tmp_path / 'result.json'
     done = evaluate(
         *(folder, '--config', repository / 'msg_configs' / 'abitobot.yaml'),
         *('--urdf', folder / 'robot.urdf', '--compare-effort', '--json', found),
     )
-    assert 'shows up as a difference' in done.stdout
+    assert 'what the effort of arm_3_link_joint means is not known' in done.stdout
+    assert 'kg' not in done.stdout.split('what the measured efforts mean')[1]
     plateaus = json.loads(found.read_text())['effort']['arm_3_link_joint']
     grasped = [p for p in plateaus if 137.0 < p['measured'] < 137.4]
-    assert [p['payload_kg_that_explains_it'] for p in grasped] == [pytest.approx(4.0, abs=0.01)]
+    assert len(grasped) == 1
     before = [p for p in plateaus if p['end_s'] < grasped[0]['start_s'] and not p['saturated']]
     assert before[0]['measured'] == pytest.approx(97.99, abs=0.05)
     assert before[0]['model'] == pytest.approx(98.0, abs=0.05)
-    clipped = [p for p in plateaus if p['saturated']]
-    assert clipped
-    assert {p['payload_kg_that_explains_it'] for p in clipped} == {None}
+    assert any(p['saturated'] for p in plateaus)
 
 
 def test_no_recording_of_others_crashes_or_hangs(shared_bags: Path, tmp_path: Path) -> None:

@@ -170,7 +170,7 @@ def test_a_wrong_field_is_refused_by_name(
         ('delays: {tick_ms: 0}', 'delays.tick_ms: expected greater than 0'),
         ('gravity_mps2: -9.81', 'gravity_mps2: expected greater than 0'),
         ('links: {arn: {mass_kg: 1}}', 'links.arn: the URDF has no link "arn"; did you mean arm?'),
-        ('imu: {attitude: guess}', "imu.attitude: expected 'auto', 'orientation' or"),
+        ('imu: {attitude: guess}', "imu.attitude: expected 'auto', 'orientation', 'acceler"),
         ('imu: {specific_force: 1}', 'imu.specific_force: '),
         ('links: {base: {mass_kg: 0}, arm: {mass_kg: 0}}', 'expected a robot with mass, got 0 kg'),
         ('uncertainty: {payload.mass_kg: -1}', 'uncertainty.payload.mass_kg: expected greater'),
@@ -208,10 +208,12 @@ def test_a_joint_without_any_limit_is_warned_of_and_not_judged(tmp_path: Path) -
     assert 'joints.slide: no limit here and no effort in the URDF' in config.warnings[0]
 
 
-def test_a_limit_said_to_be_unknown_is_not_warned_of(tmp_path: Path) -> None:
-    """`limit_n: null` says on purpose that the joint is not judged."""
-    config = config_of(tmp_path, swap('limit_n: 100', 'limit_n: null'))
-    assert (config.settings.limits.torque[1], config.warnings) == (math.inf, ())
+def test_a_limit_said_to_be_unknown_is_not_asked_for(tmp_path: Path) -> None:
+    """`limit_n: null` says on purpose that the joint is not judged: only its weight is told."""
+    urdf = URDF.replace('<axis xyz="0 -2 0"/>', '<axis xyz="0 0 1"/>')
+    yaml = swap('limit_nm: 30', 'limit_nm: null')  # upright, so it carries no weight
+    config = config_of(tmp_path, yaml, urdf)
+    assert (config.settings.limits.torque[0], config.warnings) == (math.inf, ())
 
 
 def test_a_mimic_joint_is_held_at_its_offset(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ def made(
     order, no = np.arange(n, dtype=np.intp), np.zeros(n, np.bool_)
     pairs = Pairs(
         JointRows(at[::-1], at[::-1], q[::-1], qd[::-1], effort[::-1], at[::-1], no),
-        ImuRows(at, at, np.array(gravity, np.float64).reshape(n, 3), no),
+        ImuRows(at, at, np.array(gravity, np.float64).reshape(n, 3), no, ~no),
         order[::-1],
         order,
     )

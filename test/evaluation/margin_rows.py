@@ -34,7 +34,7 @@ def rows(
     nan, no, order = np.full((n, 2), np.nan), np.zeros(n, np.bool_), np.arange(n, dtype=np.intp)
     pairs = Pairs(
         JointRows((at - S // 2)[::-1], at, position, nan, nan, at, no),
-        ImuRows(at, at, np.array(down).reshape(n, 3), no),
+        ImuRows(at, at, np.array(down).reshape(n, 3), no, ~no),
         order[::-1],
         order,
     )

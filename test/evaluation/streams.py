@@ -323,7 +323,7 @@ carries = st.builds(
     st.just(0),
     mostly(st.floats(0, 8)),
     st.tuples(*[mostly(st.floats(-0.2, 0.2))] * 3),
-    st.sampled_from(['hand', '/hand', '', 'arm']),
+    st.sampled_from(['hand', '/hand', 'r/hand', '', 'arm']),
 )
 # Milliseconds between messages: mostly regular, some gaps, some bursts.
 _waits = st.one_of(st.integers(1, 20), st.integers(1, 20), st.sampled_from([1, 90, 400, 1500]))

@@ -28,10 +28,12 @@ from evaluation.streams import (
 )
 from robots import tracked
 
+from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, WARN, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import margins
 
 FREE = Limits((1e3, 1e3), tip_warn=0.01, tip_error=0.001)
@@ -230,19 +232,85 @@ def test_a_joint_is_missing_when_its_last_message_is_older_than_silence_may_be(
     assert found == ([('joint_states', 1100, None, 1.0)] if missing else [])
 
 
-def test_a_payload_that_cannot_be_is_told_and_leaves_the_one_before() -> None:
-    """An impossible payload raises an alert, and the payload before it stays in force."""
-    run = sorted(
-        [*run_of(2.0), Carry(T0 + 500 * MS + 1, -1.0), Carry(T0 + 800 * MS + 1, 2.0)],
+BAD_LOADS = [
+    Carry(0, -1.0), Carry(0, math.nan), Carry(0, 1.0, (math.nan, 0.0, 0.0)),
+    Carry(0, 2.0, frame='tool0'), Carry(0, 2.0, frame='shand'), Carry(0, 0.0, frame='base'),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize('bad', BAD_LOADS, ids=str)
+def test_after_a_payload_that_cannot_be_no_margin_is_known_until_a_good_one(bad: Carry) -> None:
+    """From an impossible payload until the next good one, no margin is known, live or recorded."""
+    run: list[Message] = sorted(
+        [*run_of(2.0), replace(bad, time=T0 + 500 * MS + 1), Carry(T0 + 800 * MS + 1, 2.0)],
         key=lambda m: m.time,
     )
     assert told(run, T0 + 2 * S, 'PAYLOAD_INVALID') == [('payload', 500, 1100, 1.0)]
     seen, _ = live(settings(), run, T0 + 2 * S)
     torque = {m.time: x.torque[0] for m, x in seen if x is not None}
-    first, bad, good = (abs(torque[T0 + t * MS]) for t in (400, 600, 1000))
-    assert first == bad
+    # It counts from the next joint state on, as every payload does.
+    unknown = [m.time for m, x in seen if x is None and not isinstance(m, Carry)]
+    assert (unknown[1], unknown[-1]) == (T0 + 520 * MS, T0 + 811 * MS)
+    first, good = (abs(torque[T0 + t * MS]) for t in (400, 1000))
     # 2 kg at the hand's origin, 1 m out, for 1 kg at 1.1 m.
-    assert good - bad == pytest.approx(9.81 * (2.0 - 1.1))
+    assert good - first == pytest.approx(9.81 * (2.0 - 1.1))
+    rows, _ = recorded(settings(), split(run, [150]), T0 + 2 * S)
+    blind = [int(t) for part in rows for t in part.time[~part.known]]
+    assert blind == unknown
+
+
+@pytest.mark.parametrize(
+    ('bad', 'words'),
+    [
+        (Carry(0, 2.0, frame='ra/tool0'), "expected the frame hand, got 'ra/tool0'"),
+        (Carry(0, math.nan), 'expected a mass from 0 to 100000 kg, got nan kg'),
+        (Carry(0, 1.0, (0.0, math.inf, 0.0)), 'within 1000 m, got 0 inf 0 m'),
+    ],
+    ids=str,
+)
+def test_a_payload_alert_says_what_came_and_what_was_expected(bad: Carry, words: str) -> None:
+    """The alert about a payload names the frame or value that came and the one expected."""
+    run: list[Message] = sorted([*run_of(1.0), replace(bad, time=T0 + 500 * MS + 1)],
+                                key=lambda m: m.time)  # fmt: skip
+    _, alerts = live(settings(), run, T0 + S)
+    _, evaluator = recorded(settings(), [run], T0 + S)
+    for log in (alerts, evaluator.watch.log):
+        sentences = [describe(a, settings()) for a in log if a.rule.code == 'PAYLOAD_INVALID']
+        assert [words in sentence for sentence in sentences] == [True]
+
+
+def test_a_load_on_a_robot_that_carries_none_makes_margins_unknown() -> None:
+    """A load declared for a robot without payload link makes margins unknown; 0 kg does not."""
+    bare = settings()
+    bare = replace(bare, robot=replace(bare.robot, payload_link=None, payload=Payload()))
+    run: list[Message] = sorted(
+        [*run_of(2.0), Carry(T0 + 500 * MS + 1, 0.0), Carry(T0 + S + 1, 0.5)],
+        key=lambda m: m.time,
+    )
+    seen, alerts = live(bare, run, T0 + 2 * S)
+    known = [m.time for m, x in seen if x is not None and m.time > T0 + 100 * MS]
+    assert known[-1] < T0 + 1020 * MS
+    assert len(known) > 130
+    assert 'no payload.link is configured' in describe(alerts[-1], bare)
+
+
+def test_another_load_declared_by_a_person_makes_margins_known_again() -> None:
+    """A payload set as a parameter ends what an impossible message began."""
+    evaluator = LiveEvaluator(settings())
+    evaluator.start(T0)
+    for message in run_of(1.0):
+        give(evaluator, message)
+    evaluator.carry(T0 + S, math.nan, (0.0, 0.0, 0.0), 'hand')
+    told = settings()
+    same = replace(told, robot=replace(told.robot, payload=evaluator.payload))
+    evaluator.adopt(same)
+    assert not evaluator.load_known
+    evaluator.adopt(replace(told, robot=replace(told.robot, payload=Payload(3.0))))
+    evaluator.tick(T0 + S + MS)
+    give(evaluator, Joints(T0 + S + 2 * MS))
+    assert evaluator.margins is not None
+    evaluator.tick(T0 + 4 * S)
+    assert not [a for a in evaluator.watch.active if a.rule.code == 'PAYLOAD_INVALID']
 
 
 def test_positions_that_cannot_be_are_told_until_they_can() -> None:

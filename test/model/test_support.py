@@ -1,6 +1,7 @@
 """The support polygon against convex hulls of others, and many samples against one at a time."""
 
 import math
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -233,6 +234,64 @@ def many(robot: Robot, points: list[Points], cogs: Points) -> list[Support]:
             found[row].append(support)
     assert [len(x) for x in found] == [1] * len(points)
     return [support for (support,) in found]
+
+
+# A table's legs (m), which stand below the tracks' plane: first, second, ... counter-clockwise.
+LEGS = [(0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2)]
+
+
+@pytest.mark.parametrize('uneven', [2e-4, 5e-4, 9e-4, 2e-3])
+def test_a_table_rocks_about_the_legs_that_are_longer(uneven: float) -> None:
+    """With its last leg shorter by more than the tolerance it stands on the others, else on it.
+
+    The load is near the second leg: a longer last leg makes a diagonal with that one.
+    """
+    short, long = (
+        [(x, y, -0.05 + d) for (x, y), d in zip(LEGS, (0.0, 0.0, 0.0, by), strict=True)]
+        for by in (uneven, -uneven)
+    )
+    samples: list[Points] = [short, long] * 8
+    found = many(standing_on(short, 1e-4), samples, [(-0.1, 0.1, 0.3)] * len(samples))
+    corners = (
+        {tuple(sorted(s.polygon)) for s in found[::2]},
+        {tuple(sorted(s.polygon)) for s in found[1::2]},
+    )
+    assert corners == ({(0, 1, 2)}, {(0, 1, 3)})
+    assert {(s.standing, s.raised) for s in found} == {(3, True)}
+
+
+def stands_on(points: np.ndarray, cog: np.ndarray, tolerance: float) -> set[int]:
+    """Return the points (n, 3) within `tolerance` of the plane that carries the cog, by trial.
+
+    Of three points that have the cog between them, and no other point below their plane.
+    """
+    for three in combinations(range(len(points)), 3):
+        a, b, c = points[list(three)]
+        normal = np.cross(b - a, c - a)
+        share = np.linalg.solve(np.array([[*p[:2], 1.0] for p in (a, b, c)]).T, [*cog[:2], 1.0])
+        height = (points - a) @ (normal / normal[2])
+        if (share > 0.0).all() and (height > -1e-12).all():
+            return set(np.flatnonzero(height <= tolerance).tolist())
+    return set()
+
+
+@pytest.mark.parametrize('tolerance', [1e-4, 5e-4, 3e-3])
+def test_uneven_tables_stand_on_the_legs_that_reach_the_ground(tolerance: float) -> None:
+    """As found by trying every three legs: 300 tables, legs of up to 8 mm difference, any load."""
+    rng = np.random.default_rng(11)
+    turn = np.linspace(0.0, 2.0 * np.pi, 7, endpoint=False)
+    points = np.empty((300, 7, 3))
+    points[:, :, 0], points[:, :, 1] = 0.3 * np.cos(turn), 0.2 * np.sin(turn)
+    points[:, :, 2] = rng.uniform(-0.058, -0.05, points.shape[:2])
+    cogs = rng.uniform([-0.15, -0.1, 0.3], [0.15, 0.1, 0.3], (300, 3))
+    samples: list[Points] = [[(x, y, z) for x, y, z in p] for p in points.tolist()]
+    centres = [(x, y, z) for x, y, z in cogs.tolist()]
+    robot = standing_on(samples[0], tolerance)
+    expected = [len(stands_on(p, c, tolerance)) for p, c in zip(points, cogs, strict=True)]
+    assert min(expected) >= 3
+    assert [s.standing for s in many(robot, samples, centres)] == expected
+    alone = [support_of(robot, p, c).standing for p, c in zip(samples, centres, strict=True)]
+    assert alone == expected
 
 
 @pytest.mark.parametrize('seed', range(4))

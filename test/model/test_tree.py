@@ -115,8 +115,9 @@ def rod(mass: float = 2.0) -> Robot:
 
 @pytest.mark.parametrize(
     ('gravity', 'limit', 'mass'),
-    [(1.0, 3.0, 2.0), (1.0, 1.0, 0.0), (1.0, 0.5, -math.inf), (10.0, 30.0, 2.0),
-     (0.5, 3.0, 5.0), (1.0, math.inf, math.inf), (0.0, 0.0, math.inf)],
+    [(1.0, 3.0, 2.0), (1.0, 1.0, 0.0), (1.0, 0.5, -math.inf), (1.0, 0.98, -math.inf),
+     (1.0, 0.9999, -math.inf), (10.0, 30.0, 2.0), (0.5, 3.0, 5.0), (1.0, math.inf, math.inf),
+     (0.0, 0.0, math.inf)],
 )  # fmt: skip
 def test_the_payload_left_to_a_rod_is_the_limit_less_its_weight(
     gravity: float, limit: float, mass: float

@@ -98,6 +98,21 @@ def _tells(session: Session, q: tuple[float, ...]) -> bool:
     return there and 'past its tipping point' in verdict_of(session).message
 
 
+# Postures that load shoulder and elbow differently.
+LOADED = ((0.0, 0.0, 0.3, 2.0), (0.0, 0.6, 1.5, 2.0), (0.0, 1.0, -1.2, 2.0))
+
+
+def rest(session: Session, q: tuple[float, ...], carried: float, scale: float = 1.0) -> None:
+    """Let a robot rest for three looks with a load (kg) and an effort that is `scale` x torque."""
+    effort = scale * static_torque(PACKBOT.robot, q, DOWN, Payload(carried))
+    for _ in range(3):
+        wait_until(
+            lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort.tolist())
+        )
+        give(session, q, 0.0, effort.tolist())
+        session.feel()
+
+
 def test_a_robot_that_slides_before_it_tips_is_told() -> None:
     """With a friction of 0.3 the tracks slide at 16.7 degrees: 1.7 are left on a slope of 15."""
     limits = replace(PACKBOT.limits, friction=0.3)
@@ -126,15 +141,12 @@ def test_a_robot_that_tips_before_it_slides_is_not_told_of_sliding() -> None:
 
 
 def test_a_load_that_the_motors_feel_is_offered() -> None:
-    """Efforts of 6 kg where 4 are declared: told after three looks in a row."""
-    session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
-    effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
-    wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
-    told = []
-    for _ in range(4):
-        session.feel()
-        told.append(session.advisory.estimate is not None)
-    assert told == [False, False, True, True]
+    """Efforts of 6 kg where 4 are declared: told after three looks at rest."""
+    session = session_with()
+    for q in LOADED:
+        rest(session, q, carried=6.0)
+    wait_until(lambda: session.advisory.estimate, session.feel)
+    session.feel()
     alert = next(a for a in session.active if a.rule.code == 'PAYLOAD_DIFFERS')
     assert alert.peak == pytest.approx(2.0, abs=0.01)
     words = session.faults.sentence(alert, session.settings)
@@ -145,11 +157,11 @@ def test_a_load_that_the_motors_feel_is_offered() -> None:
 
 def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared() -> None:
     """An undeclared payload stays an alert in motion, until efforts agree with the declared one."""
-    session, q = session_with(), (0.0, 0.6, 1.5, 2.0)
+    session, q = session_with(), LOADED[-1]
+    for posture in LOADED:
+        rest(session, posture, carried=6.0)
+    wait_until(lambda: session.advisory.estimate, session.feel)
     effort = static_torque(PACKBOT.robot, q, DOWN, Payload(6.0)).tolist()
-    wait_until(lambda: session.evaluator.margins, lambda: give(session, q, 0.0, effort))
-    for _ in range(3):
-        session.feel()
     moving = joint_state_cdr(
         time.time_ns(), '', PACKBOT.robot.joint_names, q, (0.0, 0.3, 0.0, 0.0), effort
     )
@@ -158,7 +170,31 @@ def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared(
     assert session.advisory.estimate is not None
     session.evaluator.payload = Payload(6.0)
     give(session, q, 0.0, effort)
-    session.feel()
+    wait_until(lambda: session.advisory.estimate is None, session.feel)
+
+
+@pytest.mark.parametrize('scale', [0.0, math.nan, 1.0 / 12.0, 12.0])
+def test_efforts_that_are_no_torque_weigh_nothing(scale: float) -> None:
+    """Efforts that are zero, missing or of another unit suggest no payload and no sign."""
+    session = session_with()
+    for q in LOADED:
+        rest(session, q, carried=6.0, scale=scale)
+    wait_until(lambda: session.advisory.efforts, session.feel)
+    for _ in range(3):
+        session.feel()
+    assert session.advisory.estimate is None
+    assert not raised(session, 'PAYLOAD_DIFFERS')
+    assert not raised(session, 'EFFORT_SIGN')
+
+
+def test_efforts_of_the_other_sign_are_named() -> None:
+    """EFFORT_SIGN names each loaded joint whose effort is against its load."""
+    session = session_with()
+    for q in LOADED:
+        rest(session, q, carried=4.0, scale=-1.0)
+    wait_until(lambda: raised(session, 'EFFORT_SIGN'), session.feel)
+    named = {alert.rule.subject for alert in raised(session, 'EFFORT_SIGN')}
+    assert {'shoulder_joint', 'elbow_joint'} <= named
     assert session.advisory.estimate is None
 
 

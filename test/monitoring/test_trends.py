@@ -10,13 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Limits, Settings
-from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import Stability
-from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.monitoring.trends import Trends
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
@@ -195,28 +192,3 @@ def test_the_robot_slides_where_the_slope_is_the_angle_of_friction(
 def test_without_a_friction_nothing_slides() -> None:
     """Without a known friction, sliding is not judged."""
     assert slide_left(LEVEL, math.inf) == math.inf
-
-
-@given(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-0.8, 0.8))
-def test_the_motors_tell_the_load(declared: float, carried: float, tilt: float) -> None:
-    """Efforts at rest give the payload's mass, and whether it differs from the declared one."""
-    q, down = (0.3, 0.4, -0.2, 0.0), gravity_on_slope(9.81, tilt, 1.0)
-    effort = static_torque(PACKBOT.robot, q, down, Payload(carried))
-    found = payload_estimate(PACKBOT, q, STILL, effort.tolist(), down.tolist(), Payload(declared))
-    assert found is not None
-    assert found.mass == pytest.approx(carried, abs=1e-6)
-    if not 0.499 < abs(declared - carried) < 0.501:
-        assert found.differs == (abs(declared - carried) > 0.5)
-
-
-def test_the_motors_tell_nothing_of_a_load_while_they_move() -> None:
-    """No payload is estimated from efforts in motion, unknown, zero or of the wrong sign."""
-    q, ten, nan = (0.0, 0.4, -0.2, 0.0), (0.0, 90.0, 40.0, 0.0), (math.nan,) * 4
-    moving = (0.0, 0.2, 0.0, 0.0)
-    assert payload_estimate(PACKBOT, q, moving, ten, LEVEL, Payload(4.0)) is None
-    assert payload_estimate(PACKBOT, q, STILL, nan, LEVEL, Payload(4.0)) is None
-    assert payload_estimate(PACKBOT, q, STILL, (0.0,) * 4, LEVEL, Payload(4.0)) is None
-    model = static_torque(PACKBOT.robot, q, LEVEL, Payload(4.0))
-    assert payload_estimate(PACKBOT, q, STILL, (-model).tolist(), LEVEL, Payload(4.0)) is None
-    stuck = (model + np.array((0.0, 10.0, -10.0, 0.0))).tolist()
-    assert payload_estimate(PACKBOT, q, STILL, stuck, LEVEL, Payload(4.0)) is None

@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
+from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.nodes.doctor.checks import FAIL, OK, WARN, Finding, examine
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
@@ -61,6 +62,24 @@ def test_a_healthy_set_up_has_no_finding() -> None:
     """Everything is OK, and each check says so."""
     assert findings(healthy()) == []
     assert len(list(examine(healthy(), CONFIG))) >= 9
+
+
+@pytest.mark.parametrize(
+    ('scale', 'words'), [(1.0, ''), (-1.0, 'effort_sign: -1'), (0.12, 'effort_scale'), (0.0, '')]
+)
+def test_what_an_effort_means_is_told_before_the_test(scale: float, words: str) -> None:
+    """Other sign and other unit are warned of, with what to set, from a few seconds at rest."""
+    robot, q = CONFIG.settings.robot, (0.0, 0.6, 1.5, 2.0)
+    effort = scale * static_torque(robot, q, (0.0, 0.0, -9.81))
+    of = dict(zip(robot.joint_names, zip(q, effort.tolist(), strict=True), strict=True))
+    position, told_effort = zip(*(of[name] for name in NAMES), strict=True)
+    sample = joint_state(position=position, effort=told_effort)
+    told = [f for f in findings(healthy(joint=sample)) if f.about.startswith('effort of ')]
+    assert bool(told) is bool(words)
+    assert all(words in f.do for f in told)
+    if words:
+        about = {f.about for f in told}
+        assert {'effort of shoulder_joint', 'effort of elbow_joint'} <= about
 
 
 @pytest.mark.parametrize(
@@ -124,9 +143,22 @@ def test_what_is_wrong_with_a_topic_is_named(
 ) -> None:
     """Absent, of another type, not matching, shared, slow, with gaps: each with what to do."""
     around = healthy()
+    assert around.joint_states is not None
     changed = replace(around, joint_states=replace(around.joint_states, **change))
     found = findings(changed)
     assert [f for f in found if f.level == level and advice in f.do], found
+
+
+@pytest.mark.parametrize(
+    ('absent', 'said'), [('imu', 'tip-over is not checked'), ('joint_states', 'no torque is')]
+)
+def test_an_input_that_is_not_used_is_no_fault(absent: str, said: str) -> None:
+    """Of an input that the configuration does without, the doctor says what is not checked."""
+    whole = healthy()
+    around = replace(whole, imu=None) if absent == 'imu' else replace(whole, joint_states=None)
+    assert [f for f in examine(around, CONFIG) if f.level != OK] == []
+    (found,) = [f for f in examine(around, CONFIG) if f.about == absent]
+    assert said in found.seen
 
 
 LIFT = YAML.replace('limit_nm: 30', 'limit_nm: 30\n    sign: -1\n    offset_deg: 10')

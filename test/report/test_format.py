@@ -55,18 +55,10 @@ def test_messages_that_are_missing_by_their_rate_are_told(
     assert missing_text({'messages': messages, 'rate_hz': rate}, 20.0) == text
 
 
-@pytest.mark.parametrize(('low', 'doubted'), [(0.99, True), (0.2, True), (0.1, False)])
-def test_a_load_that_nobody_declared_is_a_doubt(low: float, doubted: bool) -> None:  # noqa: FBT001
-    """An estimated payload is a doubt only if its whole interval is beyond noise."""
-    load = {'value': 1.0, 'low': low, 'high': 2.0 - low}
-    found = doubts_of({'model_check': {'payload': load}})
-    begins = 'measured efforts at rest suggest 1.00 kg more payload'
-    assert [text.startswith(begins) for text in found] == [True] * doubted
-
-
-def test_where_no_load_could_be_told_nothing_is_doubted() -> None:
-    """Without a payload estimate, as without efforts, the payload is not doubted."""
-    assert doubts_of({'model_check': {'payload': None}}) == []
+def test_what_the_efforts_say_is_a_doubt_unless_it_is_a_reason_already() -> None:
+    """Findings about efforts stand beside the verdict, once."""
+    result = {'reasons': ['a load'], 'model_check': {'findings': ['a load', 'a sign']}}
+    assert doubts_of(result) == ['a sign']
 
 
 @pytest.mark.parametrize(

@@ -121,16 +121,54 @@ def test_proportions_have_the_bounds_of_scipy(
     assert found.demonstrated == pytest.approx(one.low, abs=1e-9)
 
 
-def test_availability_bounds_cover_as_often_as_they_say() -> None:
+def test_availability_bounds_of_a_test_ended_by_failure_cover_as_often_as_they_say() -> None:
     """Of 4000 simulated campaigns, 90 % hold the true availability within their bounds."""
     rng, held, trials = np.random.default_rng(1), 0, 4000
     truth = 50.0 / (50.0 + 5.0)
     for up, down in zip(
         rng.gamma(6, 50.0, trials).tolist(), rng.gamma(6, 5.0, trials).tolist(), strict=True
     ):
-        found = availability(up, 6, down, 0.9)
+        found = availability(up, 6, down, 0.9, failure_terminated=True)
         held += found.low <= truth <= found.high
     assert held / trials == pytest.approx(0.9, abs=0.02)
+
+
+@pytest.mark.parametrize('confidence', [0.8, 0.95])
+@pytest.mark.parametrize('expected', [0.5, 2.0, 4.0, 6.0, 12.0, 60.0])
+def test_the_availability_shown_by_a_test_ended_by_time_is_at_most_the_true_one(
+    expected: float, confidence: float
+) -> None:
+    """At least as often as the confidence says, by the exact sum over the number of failures.
+
+    Of a fixed operating time the number of failures is Poisson, and the repairs' sum is gamma.
+    """
+    most = int(stats.poisson.isf(1e-12, expected))
+    held = float(stats.poisson.pmf(0, expected))  # no failure shows no availability
+    for failures in range(1, most + 1):
+        # The repairs' time (in mean repairs) above which the true availability is not passed.
+        down = largest_covered(expected, failures, confidence)
+        held += float(stats.poisson.pmf(failures, expected) * stats.gamma.sf(down, failures))
+    assert confidence <= held
+
+
+def largest_covered(expected: float, failures: int, confidence: float) -> float:
+    """Return the time of repairs at which the availability shown is the true one.
+
+    MTBF and mean time to repair are 1 h, so it is 1/2. The availability shown falls with the time
+    of repairs in proportion: its odds times that time are the same for any time.
+    """
+    shown = availability(expected, failures, 1.0, confidence).demonstrated
+    return shown / (1.0 - shown)
+
+
+def test_availability_bounds_of_a_test_ended_by_time_cover_at_least_as_often_as_they_say() -> None:
+    """20000 campaigns of 300 h, 50 h between failures, 5 h a repair (seed 7), at 80 %."""
+    rng, trials, truth = np.random.default_rng(7), 20_000, 50.0 / 55.0
+    counts_of = rng.poisson(300.0 / 50.0, trials).tolist()
+    found = [availability(300.0, n, float(rng.gamma(n, 5.0)) if n else 0.0, 0.8) for n in counts_of]
+    assert np.mean([f.demonstrated <= truth for f in found]) >= 0.8
+    assert np.mean([f.low <= truth <= f.high for f in found]) >= 0.8
+    assert np.mean([truth <= f.high for f in found]) >= 0.9
 
 
 def test_the_textbook_growth_test() -> None:

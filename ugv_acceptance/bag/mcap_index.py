@@ -25,6 +25,8 @@ from ugv_acceptance.bag.chunks import (
 )
 
 MAGIC = b'\x89MCAP0\r\n'
+# Key of a channel's metadata that says where its messages come from, and its one value.
+ORIGIN, SIMULATED = 'origin', 'simulated'
 UNKNOWN = '?'  # the type of a channel whose schema was not found
 _FOOTER_BYTES = 29 + len(MAGIC)
 _MAX_SUMMARY_BYTES = 1 << 30
@@ -32,12 +34,16 @@ _MAX_SUMMARY_BYTES = 1 << 30
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A channel of one file: topic, ROS type ('' if it has no schema), encoding of messages."""
+    """A channel of one file: topic, ROS type ('' if it has no schema), encoding of messages.
+
+    `origin` is what its metadata say its messages come from, '' where they say nothing.
+    """
 
     id: int
     topic: str
     type: str
     encoding: str
+    origin: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +111,7 @@ def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int,
                     channel.topic,
                     schemas.get(channel.schema_id, UNKNOWN) if channel.schema_id else '',
                     channel.message_encoding,
+                    channel.metadata.get(ORIGIN, ''),
                 )
         except BadBag as error:  # noqa: PERF203 (one garbled record spoils no other)
             index.findings.append(str(error))

@@ -17,7 +17,7 @@ from ugv_acceptance import BadBag
 from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, PAYLOAD, Kind
 from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES
 from ugv_acceptance.bag.foreign import ForeignIndex, open_ros1, open_sqlite
-from ugv_acceptance.bag.mcap_index import Channel, McapIndex
+from ugv_acceptance.bag.mcap_index import SIMULATED, Channel, McapIndex
 from ugv_acceptance.bag.mcap_source import open_mcap
 from ugv_acceptance.bag.metadata import Metadata, files_of
 from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
@@ -26,6 +26,13 @@ _BLOCK = 1 << 20
 # A compressed file may unpack to this many times its size, or to as much as a chunk may: no real
 # recording compresses better, and a decompression bomb of a few kB must not fill the disk.
 _MAX_RATIO = 200
+# Types that hold much the same as an input, but are not read.
+_UNREAD = {
+    'joint_states': (
+        'control_msgs/msg/DynamicJointState',
+        'control_msgs/msg/JointTrajectoryControllerState',
+    )
+}
 _MAGIC = {b'\x89MCAP0\r\n': 'mcap', b'SQLite f': 'sqlite3', b'#ROSBAG ': 'ros1'}
 
 
@@ -72,6 +79,12 @@ class Bag:
     def duration_s(self) -> float:
         """Seconds from the first to the last log time."""
         return (self.end_ns - self.start_ns) * 1e-9
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the recording itself says of any of its topics that it was simulated."""
+        channels = (c for m in self.members for c in m.index.channels.values())
+        return any(channel.origin == SIMULATED for channel in channels)
 
     def sha256(self) -> str:
         """Return the SHA-256 of the file; of several, that of their digests in order of `paths`.
@@ -237,32 +250,36 @@ def _protected(members: Iterable[Member]) -> str:
 
 def choose_topics(
     bag: Bag,
-    joint_states: str = 'joint_states',
-    imu: str = 'imu/data',
+    joint_states: str | None = 'joint_states',
+    imu: str | None = 'imu/data',
     payload: str = 'payload',
     *,
     imu_required: bool = True,
 ) -> Topics:
     """Choose the topics to read: by configured name, else by type if exactly one topic has it.
 
-    A leading slash in a name does not matter. Raises BadBag, which lists the topics, if the choice
-    is ambiguous. Without `imu_required` the IMU is None for a bag without an IMU topic.
+    A leading slash in a name does not matter; an input whose name is None is not read. Raises
+    BadBag, which lists the topics, if the choice is ambiguous. Without `imu_required` the IMU is
+    None for a bag without an IMU topic.
     """
-    joints = _choice(bag, JOINT_STATE, joint_states)
-    if joints is None:
+    joints = None if joint_states is None else _choice(bag, JOINT_STATE, joint_states)
+    if joints is None and joint_states is not None:
         raise _no_topic(bag, JOINT_STATE, joint_states)
-    measured = _choice(bag, IMU, imu)
-    if measured is None and (imu_required or _candidates(bag, IMU)):
+    measured = None if imu is None else _choice(bag, IMU, imu)
+    if measured is None and imu is not None and (imu_required or _typed(bag, IMU)):
         raise _no_topic(bag, IMU, imu)
     return Topics(joints, measured, _choice(bag, PAYLOAD, payload))
 
 
+def _typed(bag: Bag, kind: Kind[Any]) -> list[str]:
+    """Return the topics of a type, in whatever encoding."""
+    return [name for name, topic in bag.topics.items() if topic.type == kind.type]
+
+
 def _candidates(bag: Bag, kind: Kind[Any]) -> list[str]:
-    return [
-        name
-        for name, topic in bag.topics.items()
-        if topic.type == kind.type and wire_of(Channel(0, name, topic.type, topic.encoding))
-    ]
+    """Return the topics of a type that can be read."""
+    of = bag.topics
+    return [n for n in _typed(bag, kind) if wire_of(Channel(0, n, kind.type, of[n].encoding))]
 
 
 def _choice(bag: Bag, kind: Kind[Any], configured: str) -> str | None:
@@ -282,5 +299,29 @@ def _no_topic(bag: Bag, kind: Kind[Any], configured: str) -> BadBag:
     )
     return BadBag(
         f'{bag.paths[0]}: expected topic {configured!r} or exactly one of type {kind.type}; '
-        f'the bag holds: {listed or "no topics"}'
+        f'{_way_out(bag, kind)}; the bag holds: {listed or "no topics"}'
     )
+
+
+def _way_out(bag: Bag, kind: Kind[Any]) -> str:
+    """Return what is in the way of reading an input, and what to do about it."""
+    key = 'imu' if kind is IMU else 'joint_states'
+    several = _candidates(bag, kind)
+    if several:
+        return (
+            f'got {" and ".join(several)}: set topics.{key}.name in the configuration to one of '
+            'them' + (', and the other topics to those of the same robot' if _robots(bag) else '')
+        )
+    encodings = sorted({bag.topics[name].encoding for name in _typed(bag, kind)})
+    if encodings:
+        return f'got it encoded as {" and ".join(encodings)}, which is not read: record it as cdr'
+    names = [n for n, t in bag.topics.items() if t.type in _UNREAD.get(key, ())]
+    if names:
+        types = ' and '.join(sorted({bag.topics[name].type for name in names}))
+        return f'got {types} on {" and ".join(names)}, which is not read: record {kind.type} too'
+    return f'got none: record a topic of type {kind.type}'
+
+
+def _robots(bag: Bag) -> bool:
+    """Return whether several topics of both inputs are held, as when two robots were recorded."""
+    return all(len(_candidates(bag, kind)) > 1 for kind in (JOINT_STATE, IMU))

@@ -20,7 +20,8 @@ from ugv_acceptance.bag.reader import Bag, Topic, Topics, choose_topics, open_ba
 
 Paths = Path | str | Sequence[Path | str]
 # The topics of joint states, IMU and payload where nobody names others.
-NAMES = ('joint_states', 'imu/data', 'payload')
+Names = tuple[str | None, str | None, str]
+NAMES: Names = ('joint_states', 'imu/data', 'payload')
 Message = JointStateSample | ImuSample | PayloadSample | BadSample
 
 
@@ -40,7 +41,7 @@ class Recording:
     """An opened recording; iterating it yields the samples that an evaluation reads, in log order.
 
     `names` are the topics of joint states, IMU and payload; if there is no topic of that name, the
-    only topic of the type is used.
+    only topic of the type is used. None: that input is not read.
 
     Examples
     --------
@@ -53,7 +54,7 @@ class Recording:
     """
 
     bag: Bag = field(repr=False)
-    names: tuple[str, str, str] | None = None
+    names: Names | None = None
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -106,7 +107,7 @@ def _decoded(decoders: Mapping[str, Decoder[Any]], topic: str, data: bytes) -> M
     return message
 
 
-def open_recording(path: Paths, *, names: tuple[str, str, str] | None = None) -> Recording:
+def open_recording(path: Paths, *, names: Names | None = None) -> Recording:
     """Open a recording: a rosbag2 folder, MCAP (also .zstd), SQLite or ROS 1 files.
 
     Several paths are the parts of one recording. `names` are the topics of joint states, IMU and

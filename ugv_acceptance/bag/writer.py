@@ -12,6 +12,7 @@ from rosbags.typesys.store import Typestore
 
 from ugv_acceptance import BadBag, BadSample, __version__
 from ugv_acceptance.bag.atomic_files import write_text
+from ugv_acceptance.bag.mcap_index import ORIGIN, SIMULATED
 from ugv_acceptance.bag.mcap_writer import Compression, McapWriter
 from ugv_acceptance.bag.metadata import NAME
 
@@ -39,8 +40,8 @@ class BagWriter:
     """Records a rosbag2 folder; a context manager that closes it, also after an error.
 
     At most `flush_s` seconds of log time (or `chunk_bytes`) are held back, which is what a killed
-    process loses; `flush` writes what is held at once, for a caller with a clock. The folder must
-    be new or empty, else BadBag.
+    process loses; `flush` writes what is held at once, for a caller with a clock. A recording that
+    is `simulated` says so with every topic. The folder must be new or empty, else BadBag.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class BagWriter:
         compression: Compression = 'zstd',
         chunk_bytes: int = 1 << 20,
         flush_s: float = 0.5,
+        simulated: bool = False,
     ) -> None:
         self.directory = Path(directory)
         if self.directory.exists() and (
@@ -60,6 +62,7 @@ class BagWriter:
         self.path = self.directory / f'{self.directory.name}_0.mcap'
         self._chunk_bytes = chunk_bytes
         self._flush_ns = int(flush_s * _NS)
+        self._origin = {ORIGIN: SIMULATED} if simulated else {}
         self._topics: dict[str, _Topic] = {}
         self._file = self.path.open('wb')
         self._mcap = McapWriter(self._file, f'ugv_acceptance {__version__}', compression)
@@ -86,6 +89,7 @@ class BagWriter:
         metadata = {
             'offered_qos_profiles': yaml.safe_dump(profile, sort_keys=False),
             'topic_type_hash': type_hash,
+            **self._origin,
         }
         channel = self._mcap.channel(name, type_, schema, metadata)
         self._topics[name] = _Topic(type_, channel, profile, type_hash)
@@ -148,7 +152,7 @@ class BagWriter:
             'compression_mode': '',
             'relative_file_paths': [self.path.name],
             'files': [{'path': self.path.name, **span}],
-            'custom_data': None,
+            'custom_data': self._origin or None,
             'ros_distro': 'jazzy',
         }
 

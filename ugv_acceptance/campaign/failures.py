@@ -1,4 +1,4 @@
-"""The failures of a campaign: from the alerts of its runs and from the failure log.
+"""The failures of a campaign: from the results of its runs and from the failure log.
 
 Class, impact and repairability are those of Carlson and Murphy's taxonomy. An alert shows only the
 effect of a failure, so the class derived from it is a suspicion; a log entry replaces it.
@@ -20,6 +20,20 @@ from ugv_acceptance.type_aliases import Json
 
 # Levels at which an alert counts as a failure; a warning does not.
 CRITICAL = frozenset({'ERROR', 'STALE'})
+# A measured effort of this share of the limit has reached it: the motor is at its end.
+REACHED = 0.999
+# Meanings of an effort (of the result's model check) by which it says nothing about a limit.
+NO_TORQUE = frozenset({'scaled', 'none', 'constant'})
+# Safeguard -> the alerts that show the same failure, and where to look first without one.
+SHOWN_BY: dict[str, tuple[tuple[str, ...], FailureSource]] = {
+    'tipping': (('TIP_OVER',), FailureSource.INTERACTION),
+    'torque_limit': (('TORQUE_LIMIT',), FailureSource.EFFECTOR),
+    'measured_effort': (('EFFORT_LIMIT',), FailureSource.EFFECTOR),
+    'chassis_acceleration': (
+        ('TIP_OVER', 'TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT'),
+        FailureSource.INTERACTION,
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +41,7 @@ class Failure:
     """A failure in a run: when (s since its start), what, and its class in the taxonomy.
 
     `times` is how often the alert came in this run, about which `subjects`. `origin` is alert, log,
-    or both. Only `chargeable` failures count.
+    or both, or verdict. Only `chargeable` failures count.
     """
 
     run: str
@@ -53,18 +67,45 @@ class Failure:
         return {**asdict(self), 'class': self.path}
 
 
-def from_alerts(run: str, result: Json) -> list[Failure]:
-    """Return the failures shown by a run's critical alerts: one per code, whatever the subjects.
+def from_result(run: str, result: Json) -> list[Failure]:
+    """Return the failures that a run's result shows: those of its alerts, then of its verdict.
 
-    A fall passes several edges, a fault comes and goes: that is one cause unless a log says more.
-    A failure still active at the end is terminal. One that ended within the run was repaired, or
-    went by itself, in the field; of others nothing is known.
+    Critical alerts are one failure per code, whatever the subjects: a fall passes several edges, a
+    fault comes and goes, and that is one cause unless a log says more. So are measured efforts at
+    or beyond a limit. A failure still active at the end is terminal. One that ended within the run
+    was repaired, or went by itself, in the field; of others nothing is known. A safeguard that
+    failed without such an alert is a failure of its own.
     """
     groups: dict[str, list[Json]] = {}
     for alert in result['alerts']:
-        if alert['level'] in CRITICAL:
+        if alert['level'] in CRITICAL or _saturates(alert, result):
             groups.setdefault(alert['code'], []).append(alert)
-    return [_from_group(run, code, group) for code, group in groups.items()]
+    return [
+        *(_from_group(run, code, group) for code, group in groups.items()),
+        *_from_safeguards(run, result, groups),
+    ]
+
+
+def _saturates(alert: Json, result: Json) -> bool:
+    """Return whether an alert says that a measured effort reached the limit of its joint."""
+    limit = result['torque'].get(alert['subject'], {}).get('limit')
+    if alert['code'] != 'EFFORT_LIMIT' or limit is None or alert['peak'] is None:
+        return False
+    joint = result['model_check']['joints'].get(alert['subject'], {})
+    reached: bool = alert['peak'] >= REACHED * limit
+    return reached and joint.get('meaning') not in NO_TORQUE
+
+
+def _from_safeguards(run: str, result: Json, shown: Mapping[str, object]) -> Iterator[Failure]:
+    for safeguard in result['safeguards']:
+        if safeguard['verdict'] != 'FAIL' or safeguard['waived'] is not None:
+            continue
+        codes, source = SHOWN_BY.get(safeguard['name'], ((), None))
+        if not shown.keys() & set(codes):
+            near = [a['start_s'] for a in result['alerts'] if a['code'] in codes]
+            suspect = UNKNOWN if source is None else source.value
+            at, what = min(near, default=0.0), safeguard['reasons'][0]
+            yield Failure(run, at, what, suspect, UNKNOWN, UNKNOWN, 'verdict')
 
 
 def _from_group(run: str, code: str, group: Sequence[Json]) -> Failure:

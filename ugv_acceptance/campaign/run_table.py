@@ -3,11 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from ugv_acceptance.campaign.failures import Failure, from_alerts
+from ugv_acceptance.campaign.failures import Failure, from_result
+from ugv_acceptance.report.format import doubts_of
 from ugv_acceptance.type_aliases import Json
 
-BROKEN, NOT_JUDGED = 'BROKEN', 'NOT_JUDGED'
-VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', BROKEN, NOT_JUDGED)
+DOUBTFUL, BROKEN, NOT_JUDGED = 'DOUBTFUL', 'BROKEN', 'NOT_JUDGED'
+VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', DOUBTFUL, BROKEN, NOT_JUDGED)
 # Reasons kept of a run; its own result has all.
 _REASONS = 3
 
@@ -16,9 +17,10 @@ _REASONS = 3
 class Row:
     """One run of the table: times in s, its start in ns.
 
-    A run that could not be read is BROKEN; one that something else kept from being judged is
-    NOT_JUDGED; both with the reason. `judged_s` is the time in which the margins were known: only
-    that counts as operated without a failure. `also` names other copies of the same recording.
+    A run that passed although something speaks against it is DOUBTFUL; one that could not be read
+    is BROKEN; one that something else kept from being judged is NOT_JUDGED; all with the reason.
+    `judged_s` is the time in which the margins were known: only that counts as operated without a
+    failure. `also` names other copies of the same recording.
     """
 
     name: str
@@ -51,17 +53,19 @@ class Row:
 
 
 def row_of(name: str, key: str, result: Json) -> Row:
-    """Return the row of a run that was judged."""
+    """Return the row of a run that was judged; a PASS with doubts is DOUBTFUL."""
+    verdict, reasons = result['verdict'], result['reasons']
+    doubts = doubts_of(result) if verdict == 'PASS' else []
     return Row(
         name,
-        result['verdict'],
-        tuple(result['reasons'][:_REASONS]),
+        DOUBTFUL if doubts else verdict,
+        tuple([*doubts, *reasons][:_REASONS]),
         result['bag']['sha256'],
         result['start_ns'],
         result.get('recorded'),
         result['coverage']['duration_s'],
         result['coverage']['evaluated_s'],
-        tuple(from_alerts(name, result)),
+        tuple(from_result(name, result)),
         result=f'runs/{key}.json',
     )
 

@@ -1,7 +1,8 @@
 """The statement of a campaign for JSON: hours, failures, MTBF, success, trend.
 
 The same runs give the same statement, by whatever workers and in whatever order. Hours are those
-that could be judged; runs that are INCONCLUSIVE or BROKEN are counted, but not as a success. While
+that could be judged; runs that are INCONCLUSIVE, DOUBTFUL or BROKEN are counted, but not as a
+success. While
 a run is NOT_JUDGED its verdict is unknown: then nothing is stated but what was seen so far.
 """
 
@@ -27,7 +28,7 @@ from ugv_acceptance.studies.reliability import (
 from ugv_acceptance.type_aliases import Json
 
 # Version of the layout; changes where a reader of campaigns must change.
-CAMPAIGN_VERSION = 2
+CAMPAIGN_VERSION = 3
 # What a campaign states; None while it cannot.
 STATED = (
     'mtbf_h',
@@ -99,8 +100,10 @@ def statement(
         shown = mtbf(hours, len(times), question.confidence, failure_terminated=by_failure)
         said |= {
             'mtbf_h': {**bounded(shown), 'ended_by': 'failure' if by_failure else 'time'},
-            'endurance': _endurance(rows, question.confidence),
-            'availability': _availability(judged, failures, question.confidence),
+            'endurance': _endurance(rows, failures, question.confidence),
+            'availability': _availability(
+                hours, failures, question.confidence, by_failure=by_failure
+            ),
             'success': _success(rows, question.confidence),
             'trend': _trend(times, hours, question.confidence, by_failure=by_failure),
             'requirement': _requirement(question, hours, len(times), shown),
@@ -150,22 +153,24 @@ def _runs(rows: Sequence[Row]) -> Json:
     }
 
 
-def _endurance(rows: Sequence[Row], confidence: float) -> Json | None:
+def _endurance(rows: Sequence[Row], failures: Sequence[Failure], confidence: float) -> Json | None:
     """Return the MTBF (h) that the longest run demonstrates by itself; None without such a run."""
     row = max(rows, key=lambda r: r.judged_s, default=None)
     if row is None or row.judged_s <= 0.0:
         return None
-    hours, failed = row.judged_s / 3600.0, sum(f.chargeable for f in row.failures)
+    hours, failed = row.judged_s / 3600.0, sum(f.chargeable for f in failures if f.run == row.name)
     shown = demonstrated_mtbf(hours, failed, confidence)
     return {'run': row.name, 'hours': hours, 'failures': failed, 'demonstrated_h': shown}
 
 
-def _availability(hours: float, failures: Sequence[Failure], confidence: float) -> Json:
+def _availability(
+    hours: float, failures: Sequence[Failure], confidence: float, *, by_failure: bool
+) -> Json:
     """Return the availability by repairs of known duration, and the number of unknown ones."""
     counted = [f for f in failures if f.chargeable]
     known = [f.repair_h for f in counted if f.repair_h is not None]
     repaired = len(known) == len(counted)
-    shown = availability(hours, len(known), sum(known), confidence)
+    shown = availability(hours, len(known), sum(known), confidence, failure_terminated=by_failure)
     empty = replace(shown, value=None, low=0.0, high=1.0, demonstrated=0.0)
     return {
         **bounded(shown if repaired else empty),

@@ -24,9 +24,15 @@ if TYPE_CHECKING:
     from ugv_acceptance.campaign.work import Brief, Done
 
 
-VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', 'BROKEN')
+VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', 'DOUBTFUL', 'BROKEN')
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_BROKEN = 8
+# Verdicts whose runs are named with the reason, and what they have in common.
+_NAMED = {
+    'DOUBTFUL': 'passed with doubts',
+    'BROKEN': 'could not be read',
+    'NOT_JUDGED': 'were not judged',
+}
 
 
 def print_campaign(said: Json, out: Path, console: Console | None = None) -> None:
@@ -36,7 +42,7 @@ def print_campaign(said: Json, out: Path, console: Console | None = None) -> Non
     for what, text in lines(said):
         table.add_row(escape(what), escape(text))
     console.print(table)
-    for word, what in (('BROKEN', 'could not be read'), ('NOT_JUDGED', 'were not judged')):
+    for word, what in _NAMED.items():
         runs = [run for run in said['each_run'] if run['verdict'] == word]
         for run in runs[:_MOST_BROKEN]:
             text = f'    {word} {run["name"]}: {run["reasons"][0]}'
@@ -72,12 +78,14 @@ def lines(said: Json) -> list[tuple[str, str]]:
         ('MTBF', mtbf_text(said['mtbf_h'], share)),
         (
             'success',
-            f'{interval_percent(said["success"])} at {share} (only PASS counts as success)',
+            f'{success_text(said["success"])} at {share} (only PASS counts as success)',
         ),
         ('trend', trend_text(said['trend'])),
     ]
     if said['availability']['repairs_known']:
-        found.append(('availability', f'{interval_percent(said["availability"])} at {share}'))
+        text = interval_percent(said['availability'])
+        shown = f'at least {said["availability"]["demonstrated"]:.1%}'
+        found.append(('availability', f'{text}; {shown} at {share}'))
     if said['endurance']:
         found.append(('longest run', endurance_text(said['endurance'], share)))
     if said['requirement']:
@@ -101,6 +109,11 @@ def interval_percent(found: Json) -> str:
     """Return a share with its bounds as text in percent."""
     value = 'unknown' if found['value'] is None else f'{found["value"]:.1%}'
     return f'{value}, {found["low"]:.1%} to {found["high"]:.1%}'
+
+
+def success_text(found: Json) -> str:
+    """Return how many of all runs passed, and their share with its bounds, as text."""
+    return f'{found["passed"]} of {found["runs"]} runs: {interval_percent(found)}'
 
 
 def trend_text(found: Json) -> str:
@@ -141,13 +154,25 @@ def comparison_lines(found: Json, confidence: float) -> list[tuple[str, str]]:
     first, second = found['groups']
     rows = [('comparison', _group_text(first)), ('', _group_text(second))]
     order = f'{second["name"]} over {first["name"]}'
-    for name, key in (('MTBF', 'mtbf'), ('odds of a pass', 'success')):
+    passed = [f'{group["passed"]} of {group["runs"]} passed' for group in (second, first)]
+    for name, key, words in (
+        ('MTBF', 'mtbf', f'{order} {_ratio_text(found["mtbf"])}'),
+        ('success', 'success', f'{passed[0]}, and {passed[1]}'),
+    ):
         test = found[key]
-        ratio = 'unknown' if test['ratio'] is None else f'{test["ratio"]:.3g}'
         shown = 'a difference' if test['p'] < 1.0 - confidence else 'no difference shown'
-        text = f'{order} {ratio}: {shown} at {confidence:.0%} (p {test["p"]:.3f}; power '
+        text = f'{words}: {shown} at {confidence:.0%} (p {test["p"]:.3f}; power '
         rows.append((f'  {name}', f'{text}{test["power"]:.0%})'))
     return rows
+
+
+def _ratio_text(test: Json) -> str:
+    """Return a ratio with its interval: one without bounds is not printed as a number."""
+    if test['high'] is None and not test['low']:
+        return 'unknown'
+    value = 'unknown' if test['ratio'] is None else f'{test["ratio"]:.3g}'
+    high = 'no upper bound' if test['high'] is None else f'{test["high"]:.3g}'
+    return f'{value} ({test["low"]:.3g} to {high})'
 
 
 def _group_text(group: Json) -> str:
@@ -217,11 +242,12 @@ def campaign(
     """Judge many runs and state what they show: MTBF, availability, success, trend.
 
     Writes campaign.json, campaign.html and one result for each run into --out. A run that is
-    INCONCLUSIVE or cannot be read is counted, never dropped. While a run was not judged (a worker
-    died, a scheduler or a network is gone) nothing is stated and the exit code is 3: run the same
-    command again to judge the missing runs. With --require-mtbf the exit code is 0 if the MTBF is
-    demonstrated, 1 if it is excluded, 3 otherwise; without it 0 if every run passed, 1 if one
-    failed, 2 if one could not be read, 3 if one is inconclusive.
+    INCONCLUSIVE or cannot be read is counted, never dropped; one that passed with doubts (relaxed
+    limits, a waived safeguard, efforts that contradict) is DOUBTFUL, and no success. While a run
+    was not judged (a worker died, a scheduler or a network is gone) nothing is stated and the exit
+    code is 3: run the same command again to judge the missing runs. With --require-mtbf the exit
+    code is 0 if the MTBF is demonstrated, 1 if it is excluded, 3 otherwise; without it 0 if every
+    run passed, 1 if one failed, 2 if one could not be read, 3 if one is inconclusive or doubtful.
 
     \b
     Examples:
@@ -268,7 +294,7 @@ def exit_code(said: dict[str, Any]) -> int:
         return EXIT['INCONCLUSIVE']
     if said['requirement'] is not None:
         return EXIT[said['requirement']['verdict']]
-    worst = (('FAIL', 1), ('BROKEN', 2), ('INCONCLUSIVE', 3))
+    worst = (('FAIL', 1), ('BROKEN', 2), ('INCONCLUSIVE', 3), ('DOUBTFUL', 3))
     return next((code for word, code in worst if said['runs'][word]), 0)
 
 

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
 
@@ -12,16 +12,21 @@ from rich.progress import Progress, TextColumn
 from rich.table import Table
 
 from ugv_acceptance.evaluation.alerts.messages import level_words
-from ugv_acceptance.report.format import doubts_of, missing_text, not_checked_lines
+from ugv_acceptance.report.format import (
+    assumed_line,
+    doubts_of,
+    missing_text,
+    not_checked_lines,
+    origin_line,
+)
 
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_ALERTS = 12
 _MOST_EFFORTS = 11
+_MOST_WARNINGS = 6
 # More messages than this have a rate, if they can be used.
 _FEW = 100
-# A payload (kg) estimated below minus this means that the arm rests on something.
-_LIGHT = 0.1
 # Levels of alerts, the least severe first.
 _SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
@@ -64,6 +69,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     paths = result['bag']['path']
     heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
     console.print(heading, soft_wrap=True)
+    for line in (origin_line(result), assumed_line(result)):
+        console.print(f'    {escape(line)}', soft_wrap=True)
     for reason in result['reasons'][:5]:
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
@@ -75,6 +82,7 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'      {escape(line)}', soft_wrap=True)
     for doubt in doubts_of(result):
         console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
+    _print_warnings(result['robot']['warnings'] if 'robot' in result else (), console)
     if result['criteria']['path'] is not None:
         _print_criteria(result['criteria']['results'], console)
     console.print(_margins(result))
@@ -82,6 +90,15 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     _print_alerts(result, console)
     if 'effort' in result:
         _print_effort(result, console)
+
+
+def _print_warnings(warnings: Sequence[str], console: Console) -> None:
+    """Print what is odd with the robot's own files: margins are only as good as these."""
+    for text in warnings[:_MOST_WARNINGS]:
+        console.print(f'    [bold yellow]warning:[/] {escape(text)}', soft_wrap=True)
+    more = len(warnings) - _MOST_WARNINGS
+    if more > 0:
+        console.print(f'    and {more} more warnings (`ugv-acceptance model` lists them)')
 
 
 def _print_criteria(outcomes: list[dict[str, Any]], console: Console) -> None:
@@ -107,8 +124,10 @@ def _margins(result: dict[str, Any]) -> Table:
             _number(joint['time_in_violation_s'], 's', 2),
         )
     stability = result['stability']
+    unread = result['inputs']['imu']['topic'] is None
+    edge = 'not checked' if unread else stability['edge'] or 'no polygon'
     table.add_row(
-        f'tip-over ({stability["edge"] or "no polygon"})',
+        f'tip-over ({edge})',
         '',
         '',
         _number(stability['min_angle_deg'], 'deg'),
@@ -134,6 +153,9 @@ def _print_data(result: dict[str, Any], console: Console) -> None:
     )
     for key in ('joint_states', 'imu'):
         source = result['inputs'][key]
+        if source['topic'] is None:
+            console.print(f'  {key}: not read')
+            continue
         rate = source['rate_hz']
         faults = ', '.join([*source['faults'], *_malformed(source)])
         missing = missing_text(source, coverage['duration_s'])
@@ -193,23 +215,27 @@ def _print_alerts(result: dict[str, Any], console: Console) -> None:
 
 
 def _print_effort(result: dict[str, Any], console: Console) -> None:
-    """Print measured effort beside static torque, most payload-sensitive joints first."""
+    """Print what efforts mean and say, then efforts at rest beside static torques."""
+    check = result['model_check']
+    console.print('what the measured efforts mean:')
+    for joint in check['joints'].values():
+        console.print(f'  {escape(joint["sentence"])}', soft_wrap=True)
+    for load in check['loads']:
+        console.print(f'  {_load_line(load)}', soft_wrap=True)
+    for finding in check['findings']:
+        console.print(f'  {escape(finding)}', soft_wrap=True)
     joints = [(name, plateaus) for name, plateaus in result['effort'].items() if plateaus]
     if not joints:
         console.print('no measured effort at rest to compare')
         return
-    console.print(
-        'measured effort and static torque at rest; a payload that is not declared shows up as a '
-        'difference:',
-        soft_wrap=True,
-    )
     joints.sort(key=lambda joint: -max(abs(p['effort_per_kg']) for p in joint[1]))
     lines = [
         _plateau_line(name, p)
         for name, plateaus in joints
         for p in plateaus
-        if p['payload_kg_that_explains_it'] is not None or abs(p['difference']) > 1.0
+        if p['effort_per_kg'] or abs(p['difference']) > 1.0
     ]
+    console.print('measured effort and static torque at rest:')
     for line in lines[:_MOST_EFFORTS]:
         console.print(line, soft_wrap=True)
     console.print(
@@ -217,16 +243,19 @@ def _print_effort(result: dict[str, Any], console: Console) -> None:
     )
 
 
+def _load_line(load: dict[str, Any]) -> str:
+    mass = load['mass_kg']
+    return (
+        f'{load["start_s"]:.0f}-{load["end_s"]:.0f} s: payload {max(mass["value"], 0.0):.2f} kg '
+        f'(95 %: {max(mass["low"], 0.0):.2f} to {max(mass["high"], 0.0):.2f} kg) by measured '
+        f'efforts, {load["declared_kg"]:.2f} kg declared'
+    )
+
+
 def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
-    p, payload = plateau, plateau['payload_kg_that_explains_it']
+    p = plateau
     text = (
         f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  measured {p["measured"]:.1f}, '
         f'model {p["model"]:.1f}, difference {p["difference"]:+.1f} {p["unit"]}'
     )
-    if p['saturated']:
-        return f'{text}: saturated: the effort stays at a limit'
-    if payload is None:
-        return f'{text}: no payload explains it'
-    if payload < -_LIGHT:
-        return f'{text}: the arm pushes against something'
-    return f'{text} = {max(payload, 0.0):.2f} kg of payload'
+    return f'{text}: saturated: the effort stays at a limit' if p['saturated'] else text

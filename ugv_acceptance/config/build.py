@@ -13,6 +13,7 @@ from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
@@ -81,7 +82,9 @@ def settings_from(build: Build) -> Settings:
         _limits(build, [(joints[name], section) for name, section in measured.items()]),
         Delays(**build.file.delays.model_dump()),
         build.file.unsafe_limits or '',
+        build.file.payload is not None and build.file.payload.known,
     )
+    _check_inputs(build, settings)
     _check_ranges(build, settings)
     return settings
 
@@ -93,12 +96,61 @@ def _check_ranges(build: Build, settings: Settings) -> None:
         raise build.refuse(wrong.path, wrong.refusal)
     for found in relaxed(settings):
         build.warn(found.path, f'relaxed: {found.words}; reason: {settings.unsafe}')
+    error, tip = settings.limits.torque_error, math.degrees(settings.limits.tip_error)
+    if error > 1.0:
+        build.warn(
+            ('limits', 'torque_error'),
+            f'a joint counts as within its limit up to {error:.0%} of it',
+        )
+    if tip <= 0.0:
+        build.warn(
+            ('limits', 'tip_error'),
+            'a robot counts as standing until it is '
+            + (f'{-tip:g} degrees past its tipping point' if tip else 'past its tipping point'),
+        )
+
+
+def _check_inputs(build: Build, settings: Settings) -> None:
+    """Refuse an input that is absent without what stands in its place, and what has no effect."""
+    topics, imu = build.file.topics, build.file.imu
+    if topics.imu is None and settings.hears_imu:
+        raise build.refuse(
+            ('topics', 'imu'),
+            'expected a topic, or null with imu.attitude: level, which declares that the base '
+            f'stands level; got null with imu.attitude: {imu.attitude}',
+        )
+    if topics.imu is not None and not settings.hears_imu:
+        raise build.refuse(
+            ('imu', 'attitude'), 'level is for robots without an IMU: expected topics.imu: null too'
+        )
+    if imu.specific_force and not settings.hears_imu:
+        raise build.refuse(
+            ('imu', 'specific_force'), 'expected false with imu.attitude: level, got true'
+        )
+    if topics.joint_states is None and settings.hears_joints:
+        raise build.refuse(
+            ('topics', 'joint_states'),
+            'expected a topic, or null with the positions of all joints under held; '
+            f'got null with {_list(settings.robot.joint_names)} under joints',
+        )
+    if not (settings.hears_joints or settings.hears_imu):
+        raise build.refuse(
+            ('topics',), 'expected joint states or an IMU: nothing is left that could be measured'
+        )
+    frame, link = topics.payload.frame_id, settings.robot.payload_link
+    if frame and link and not same_frame(frame, link):
+        build.warn(
+            ('topics', 'payload', 'frame_id'),
+            f'{frame} is not the payload link, {link}: loads declared in it cannot be used',
+        )
 
 
 def _measured(build: Build) -> dict[str, JointSection]:
     """Return the joints whose positions come in messages, in the file's order."""
     movable = [joint.name for joint in build.urdf.joints if joint.kind != 'fixed']
     named = build.file.joints
+    if named is None and build.file.topics.joint_states is None:
+        return {}
     if named is None:
         mimics = dict(build.urdf.mimics)
         rest = (n for n in movable if n not in build.file.held and n not in mimics)
@@ -120,6 +172,29 @@ def _known(build: Build, path: Path, name: str, known: Sequence[str], what: str)
         near = get_close_matches(name, known, 1, 0.5)
         hint = f'did you mean {near[0]}?' if near else f'it has {_list(known)}'
         raise build.refuse(path, f'the URDF has no {what} {shown(name)}; {hint}')
+
+
+def assumed_numbers(build: Build) -> tuple[tuple[str, str], ...] | None:
+    """Return the numbers that are only assumed, with the reasons; None if the file says nothing.
+
+    BadConfig for a name that begins with no link, joint or section of the file.
+    """
+    said, urdf = build.file.assumed, build.urdf
+    if said is None:
+        return None
+    of = [link.name for link in urdf.links] + [joint.name for joint in urdf.joints]
+    sections = [name for name in type(build.file).model_fields if name != 'assumed']
+    for name in said:
+        subject, _, what = name.partition('.')
+        if not what or subject not in (*of, *sections):
+            near = get_close_matches(subject, [*of, *sections], 1, 0.5)
+            hint = f'; did you mean {near[0]}?' if near else ''
+            raise build.refuse(
+                ('assumed', name),
+                'expected a link, joint or section of this file, a point, and which number of it, '
+                f'such as shoulder_joint.limit, got {shown(name)}{hint}',
+            )
+    return tuple(said.items())
 
 
 def _list(names: Sequence[str]) -> str:
@@ -214,7 +289,8 @@ def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:
 def _imu(file: File) -> ImuInput:
     values = file.imu.model_dump()
     mounting = rotation_from_rpy(values.pop('mounting_rpy'))
-    return ImuInput(mounting=mounting, frame=(file.topics.imu.frame_id or '').lstrip('/'), **values)
+    named = file.topics.imu.frame_id if file.topics.imu else None
+    return ImuInput(mounting=mounting, frame=(named or '').lstrip('/'), **values)
 
 
 def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:

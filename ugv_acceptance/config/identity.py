@@ -9,6 +9,7 @@ from ugv_acceptance.config.units import shown
 
 # Entries that a report shows; one that nobody entered is marked as missing.
 PARTS = {
+    'origin': 'simulated or real',
     'robot_serial': 'robot serial number',
     'payload': 'payload',
     'flippers': 'flippers',

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.build import Build, checked, settings_from
+from ugv_acceptance.config.build import Build, assumed_numbers, checked, settings_from
+from ugv_acceptance.config.contact_check import compared
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.strength import worst_torques
 from ugv_acceptance.config.topics import Topics, topics_from
 from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.evaluation.criteria.not_judged import LEAST
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
@@ -20,6 +22,8 @@ PACKAGE = 'ugv_acceptance'
 DEFAULT = Path('packbot')
 # A larger file (bytes) is not a robot description.
 LARGEST_FILE = 20_000_000
+# Share of the largest torque of any joint from which one without a limit is warned of.
+HEAVY = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +32,9 @@ class Config:
 
     `sha256` is that of both files' bytes. `uncertainty` pairs the names of numbers with their +/-
     as written in the file. `warnings` do not stop an evaluation; each names file and field.
+    `not_compared` are the contact points that no collision geometry of the URDF could confirm.
+    `assumed` pairs the names of numbers that nobody measured with the reason for their values; None
+    if the file does not say which those are.
     """
 
     name: str
@@ -39,6 +46,8 @@ class Config:
     sha256: str
     uncertainty: tuple[tuple[str, float], ...]
     warnings: tuple[str, ...]
+    not_compared: tuple[str, ...] = ()
+    assumed: tuple[tuple[str, str], ...] | None = None
 
 
 def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> Config:
@@ -70,8 +79,10 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
     model = read_urdf(urdf_bytes, str(urdf_at))
     build = Build(document, file, model, list(model.warnings))
     settings = settings_from(build)
-    topics = topics_from(build)
+    topics = topics_from(build, settings)
     _check_strength(build, settings)
+    _check_unjudged(build, settings)
+    doubts = _check_contacts(build, settings)
     return Config(
         file.robot.name,
         file.robot.serial,
@@ -82,6 +93,8 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
         hashlib.sha256(yaml_bytes + urdf_bytes).hexdigest(),
         tuple(file.uncertainty.items()),
         tuple(build.warnings),
+        doubts,
+        assumed=assumed_numbers(build),
     )
 
 
@@ -161,3 +174,30 @@ def _check_strength(build: Build, settings: Settings) -> None:
                 f'{limit:g} {worst.unit} cannot hold the own weight in every posture:'
                 f' {worst.torque:.1f} {worst.unit} needed',
             )
+
+
+def _check_unjudged(build: Build, settings: Settings) -> None:
+    """Warn of joints without a limit that carry much of the arm's weight and of its payload."""
+    robot, limits = settings.robot, settings.limits.torque
+    if all(map(math.isfinite, limits)):
+        return
+    found = worst_torques(robot, robot.payload)
+    for worst, limit in zip(found, limits, strict=False):
+        largest = max(other.torque for other in found if other.unit == worst.unit)
+        if math.isinf(limit) and worst.torque > max(HEAVY * largest, LEAST):
+            build.warn(
+                ('joints', worst.joint, 'limit'),
+                f'no limit, so its torque is not judged: it carries up to {worst.torque:.1f} '
+                f'{worst.unit}',
+            )
+
+
+def _check_contacts(build: Build, settings: Settings) -> tuple[str, ...]:
+    """Warn of contact points outside the collision geometry; return those without geometry."""
+    found = compared(settings.robot, build.urdf.shapes)
+    for contact, off in found.outside:
+        build.warn(
+            ('contacts', contact.name, 'position'),
+            f'{off:.2f} m outside of the collision geometry of the URDF: can it stand there?',
+        )
+    return tuple(contact.name for contact in found.unknown)

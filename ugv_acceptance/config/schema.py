@@ -126,11 +126,14 @@ class TopicSection(Section):
     frame_id: str | None = None
 
 
-class TopicsSection(Section):
-    """The topics of the inputs: joint states, IMU, payload."""
+JOINT_STATES, IMU_DATA = TopicSection(name='joint_states'), TopicSection(name='imu/data')
 
-    joint_states: TopicSection = TopicSection(name='joint_states')
-    imu: TopicSection = TopicSection(name='imu/data')
+
+class TopicsSection(Section):
+    """The topics of the inputs: joint states, IMU, payload; null: the robot has no such input."""
+
+    joint_states: TopicSection | None = JOINT_STATES
+    imu: TopicSection | None = IMU_DATA
     payload: TopicSection = TopicSection(name='payload')
 
 
@@ -158,13 +161,14 @@ class ImuSection(Section):
 
     mounting_rpy: Angles = (0.0, 0.0, 0.0)
     position: Position = _IMU.position
-    attitude: Literal['auto', 'orientation', 'accelerometer'] = 'auto'
+    attitude: Literal['auto', 'orientation', 'accelerometer', 'level'] = 'auto'
     specific_force: Annotated[bool, Field(strict=True)] = _IMU.specific_force
     low_pass: Time = _IMU.low_pass
     rest_acceleration: Annotated[Positive, _number('acceleration')] = _IMU.rest_acceleration
     rest_rate: Annotated[Positive, _number('angular rate')] = _IMU.rest_rate
     agreement: Annotated[Positive, _number('angle')] = _IMU.agreement
     agreement_delay: Time = _IMU.agreement_delay
+    noise_free: Annotated[bool, Field(strict=True)] = _IMU.noise_free
 
 
 class ContactSection(Section):
@@ -182,11 +186,15 @@ class GroundSection(Section):
 
 
 class PayloadSection(Section):
-    """The payload carried until a message on the payload topic declares another."""
+    """The payload carried until a message on the payload topic declares another.
+
+    `known`: it is carried from the start, so that nothing is open before the first message.
+    """
 
     link: Name
     mass: Mass = 0.0
     cog: Position = (0.0, 0.0, 0.0)
+    known: Annotated[bool, Field(strict=True)] = False
 
 
 class LimitsSection(Section):
@@ -239,3 +247,4 @@ class File(Section):
     unsafe_limits: Reason | None = None
     gravity: Annotated[Positive, _number('acceleration')] = _ROBOT.gravity
     uncertainty: dict[str, Annotated[NotNegative, _number()]] = {}
+    assumed: dict[str, Reason] | None = None

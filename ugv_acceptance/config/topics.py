@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 from ugv_acceptance.config.build import Build
-from ugv_acceptance.config.schema import QosSection, TopicSection
+from ugv_acceptance.config.schema import IMU_DATA, JOINT_STATES, QosSection, TopicSection
+from ugv_acceptance.evaluation.settings import Settings
 
 TYPES = {
     'joint_states': 'sensor_msgs/msg/JointState',
@@ -22,7 +23,8 @@ class Topic:
     """The topic of one input, with its type and quality of service (QoS).
 
     `reliability` is best_effort or reliable, `durability` volatile or transient_local, `depth` the
-    length of the queue. `frame_id` is the frame its messages should name; None: any.
+    length of the queue. `frame_id` is the frame its messages should name; None: any. An input that
+    is not `used` is not listened to: the configuration says that the robot has none, or needs none.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Topic:
     durability: str
     depth: int
     frame_id: str | None
+    used: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +45,27 @@ class Topics:
     payload: Topic
 
     @property
-    def names(self) -> tuple[str, str, str]:
-        """The names of the topics of joint states, IMU and payload."""
-        return self.joint_states.name, self.imu.name, self.payload.name
+    def names(self) -> tuple[str | None, str | None, str]:
+        """The names of the topics of joint states, IMU and payload; None: it is not used."""
+        joints, imu = (t.name if t.used else None for t in (self.joint_states, self.imu))
+        return joints, imu, self.payload.name
+
+    @property
+    def used(self) -> dict[str, Topic]:
+        """The topics to listen to, by the name of their input."""
+        every = {'joint_states': self.joint_states, 'imu': self.imu, 'payload': self.payload}
+        return {name: topic for name, topic in every.items() if topic.used}
 
 
-def topics_from(build: Build) -> Topics:
+def topics_from(build: Build, settings: Settings) -> Topics:
     """Return the topics; BadConfig if two share a name or a type is not the supported one."""
     given = build.file.topics
-    sections = {'joint_states': given.joint_states, 'imu': given.imu, 'payload': given.payload}
+    sections = {
+        'joint_states': given.joint_states or JOINT_STATES,
+        'imu': given.imu or IMU_DATA,
+        'payload': given.payload,
+    }
+    used = {'joint_states': settings.hears_joints, 'imu': settings.hears_imu, 'payload': True}
     names = [section.name for section in sections.values()]
     for key, section in sections.items():
         if names.count(section.name) > 1:
@@ -58,12 +73,13 @@ def topics_from(build: Build) -> Topics:
                 ('topics', key, 'name'),
                 f'expected a topic of its own, got {section.name}, which another input has too',
             )
-    return Topics(**{key: _topic(build, key, section) for key, section in sections.items()})
+    return Topics(**{k: _topic(build, k, s, used=used[k]) for k, s in sections.items()})
 
 
-def _topic(build: Build, key: str, section: TopicSection) -> Topic:
+def _topic(build: Build, key: str, section: TopicSection, *, used: bool) -> Topic:
     kind = section.type or TYPES[key]
     if kind != TYPES[key]:
         raise build.refuse(('topics', key, 'type'), f'expected {TYPES[key]}, got {kind}')
     qos = section.qos or _QOS[key]
-    return Topic(section.name, kind, qos.reliability, qos.durability, qos.depth, section.frame_id)
+    frame = section.frame_id
+    return Topic(section.name, kind, qos.reliability, qos.durability, qos.depth, frame, used)

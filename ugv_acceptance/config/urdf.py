@@ -1,4 +1,4 @@
-"""Reads a URDF: links, masses, joints and limits of any tree; visuals are ignored.
+"""Reads a URDF: links, masses, joints, limits and collision geometry; visuals are ignored.
 
 Parsed by defusedxml, which refuses entities and external files.
 """
@@ -13,6 +13,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.config.contact_check import Shape
 from ugv_acceptance.config.units import LARGEST, shown
 from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Link, Matrix, Vector
 
@@ -21,13 +22,17 @@ KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """The links and joints of a URDF; `mimics` pairs a mimic joint with its offset (rad or m)."""
+    """The links and joints of a URDF; `mimics` pairs a mimic joint with its offset (rad or m).
+
+    `shapes` is the collision geometry of all links.
+    """
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     mimics: tuple[tuple[str, float], ...]
     warnings: tuple[str, ...]
+    shapes: tuple[Shape, ...] = ()
 
 
 def read_urdf(text: bytes, source: str) -> Urdf:
@@ -43,7 +48,8 @@ def read_urdf(text: bytes, source: str) -> Urdf:
     _check_unique('joint', [joint.name for joint in joints], source)
     _check_tree(links, joints, source)
     mimics = tuple(_mimics(root, source))
-    return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings))
+    shapes = tuple(_shapes(root))
+    return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings), shapes)
 
 
 def _parse(text: bytes, source: str) -> Element:
@@ -153,6 +159,37 @@ def _mimics(root: Element, source: str) -> Iterable[tuple[str, float]]:
         if mimic is not None:
             name = element.get('name', '')
             yield name, _number(mimic, 'offset', f'{source}: joint {name}/mimic', 0.0)
+
+
+def _shapes(root: Element) -> Iterable[Shape]:
+    """Yield the collision geometry of all links; what cannot be read is no error, but unread."""
+    for link in root.findall('link'):
+        name = link.get('name', '')
+        for collision in link.findall('collision'):
+            geometry = collision.find('geometry')
+            found = None if geometry is None else next(iter(geometry), None)
+            kind = 'none' if found is None else str(found.tag)
+            try:
+                xyz, rotation = _origin(collision, '')
+                size = None if found is None else _size(kind, found)
+            except BadConfig:
+                yield Shape(name, kind, ZERO, IDENTITY, None)
+            else:
+                yield Shape(name, kind, xyz, rotation, size)
+
+
+def _size(kind: str, element: Element) -> Vector | None:
+    """Return half the size (m) of a box, cylinder or sphere; None for another geometry."""
+    if kind == 'box':
+        x, y, z = _triple(element, 'size', '', '')
+        return (x / 2.0, y / 2.0, z / 2.0)
+    if kind == 'cylinder':
+        radius = _number(element, 'radius', '', None)
+        return (radius, radius, _number(element, 'length', '', None) / 2.0)
+    if kind == 'sphere':
+        radius = _number(element, 'radius', '', None)
+        return (radius, radius, radius)
+    return None
 
 
 def _name(element: Element, what: str, source: str) -> str:

@@ -11,17 +11,22 @@ from typing import Any
 
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
+from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
+from ugv_acceptance.evaluation.least_margins import (
+    TILT_NOT_CHECKED,
+    least_tilt,
+    with_most_used,
+)
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
-# What the page says where nothing is wrong or nothing is known.
-FINE = 'all margins kept'
+# What the page says where nothing is known.
 UNKNOWN = 'margins are not known'
 WAIT = 'do not move the robot on these numbers; check the inputs'
 
@@ -55,6 +60,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
     cause, advice = _cause(snapshot, level)
+    cause = cause or kept_words(settings)
     return {
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
@@ -100,13 +106,17 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
             f'{-degrees:.1f} degrees past the tipping point',
         )
         tilt = f'{ways[degrees < 0]} to the {side}'
+    elif not settings.hears_imu:
+        tilt = TILT_NOT_CHECKED
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
     return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])
 
 
 def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
-    """Return rows by urgency: active, severe, unseen and new first; tip-over before motors.
+    """Return rows by urgency: active, severe, unseen and new first.
+
+    A contradiction of the IMU comes before tip-over, and tip-over before motors.
 
     A caution is left out while the danger of the same code and subject is active.
     """
@@ -114,13 +124,14 @@ def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
     rows = [row for row in rows if row.level != WARN or (row.code, row.subject) not in worse]
 
     def key(row: AlertRow) -> tuple[object, ...]:
-        tips = row.code in {'TIP_OVER', 'NO_SUPPORT'}
-        return (row.end is not None, -row.level, not tips, not row.unseen, -row.start, row.key)
+        first = -urgency(row.code, row.level)
+        return (row.end is not None, -row.level, first, not row.unseen, -row.start, row.key)
 
     return sorted(rows, key=key)
 
 
 def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
+    """Return what the level comes from, and what to do; '' where nothing is wrong."""
     active = [row for row in _by_urgency(snapshot.alerts) if row.end is None]
     over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None]
     if active and not (level == STALE and snapshot.problem):
@@ -131,7 +142,7 @@ def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
     if over and level != OK:
         do = 'reset it' if 'reset' in over[0].offers else 'acknowledge it'
         return f'{over[0].state}: {over[0].text}', f'{do} when the robot stands well again'
-    return FINE, ''
+    return '', ''
 
 
 def _alert(row: AlertRow, now: int) -> Plain:

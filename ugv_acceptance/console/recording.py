@@ -115,8 +115,13 @@ class ShownRecording:
             int(track.state[k]) if known else nothing.state,
             payload,
             alerts,
-            (*(self._input(w, k, when) for w in range(2)), self._payload_input(when)),
+            (*(self._input(w, k, when) for w in self._used()), self._payload_input(when)),
         )
+
+    def _used(self) -> list[int]:
+        """Return the numbers of the inputs that the configuration uses."""
+        used = (self.settings.hears_joints, self.settings.hears_imu)
+        return [which for which in range(2) if used[which]]
 
     def _near(self, when: int) -> list[tuple[int, Alert]]:
         return [

@@ -24,7 +24,8 @@ def doubtful_spans(log: Sequence[Alert]) -> Iterator[Span]:
     """Yield the spans (ns) before alerts in which what they contradict was still believed."""
     for alert in log:
         if alert.rule.reach:
-            yield alert.start - alert.rule.reach, alert.start
+            # What is known in the nanosecond of the alert came just before it.
+            yield alert.start - alert.rule.reach, alert.start + 1
 
 
 def drawn_in_doubt(alert: Alert, spans: Sequence[Span]) -> bool:

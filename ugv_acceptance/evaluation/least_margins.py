@@ -7,6 +7,9 @@ from typing import SupportsFloat
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
+# What stands in place of the tilt left where nobody measures it.
+TILT_NOT_CHECKED = 'tip-over not checked (no IMU: the base was declared level)'
+
 
 def least_tilt(angles: Iterable[SupportsFloat]) -> tuple[str, float]:
     """Return the side to which least tilt is left, and how much (rad); ('', NaN): none is known.
@@ -36,4 +39,5 @@ def most_used(torque: Iterable[SupportsFloat], settings: Settings) -> tuple[str,
 def with_most_used(tilt: str, torque: Iterable[SupportsFloat], settings: Settings) -> str:
     """Return words on the tilt left, and behind them the joint that uses most of its limit."""
     joint, use = most_used(torque, settings)
-    return f'{tilt}, {joint} at {use:.0%} of its limit' if joint else tilt
+    used = f'{joint} at {use:.0%} of its limit' if joint else ''
+    return ', '.join(words for words in (tilt, used) if words)

@@ -19,13 +19,20 @@ from ugv_acceptance.evaluation.chassis.motion import (
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import NEVER, JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.inputs.payload import payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
+from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.sliding import slides_first
-from ugv_acceptance.model.stability import NO_CONTACT, Stability, Stance, stability_of, stance_of
+from ugv_acceptance.model.stability import (
+    NO_CONTACT,
+    NOT_KNOWN,
+    Stability,
+    Stance,
+    stability_of,
+    stance_of,
+)
 from ugv_acceptance.model.statics import torque_of
 
 
@@ -50,12 +57,14 @@ class LiveEvaluator:
     """Takes messages as numbers with their receipt time (ns); holds the newest margins and alerts.
 
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
-    the alert rules and the log of alerts, `evaluated` counts the margins computed.
+    the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
+    newest that could be used; while not `load_known`, the newest declared could not.
     """
 
     settings: Settings
     watch: RuleSet = field(init=False)
     payload: Payload = field(init=False)
+    load_known: bool = True
     margins: Margins | None = None
     evaluated: int = 0
     _mechanics: Mechanics = field(init=False)
@@ -68,6 +77,7 @@ class LiveEvaluator:
     _gravity: Vector = NOWHERE
     _began: int | None = None
     _known_until: int | None = None
+    _level: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.watch = RuleSet(self.settings)
@@ -78,6 +88,13 @@ class LiveEvaluator:
         self._chassis = ChassisMotion(self.settings, self.watch.chassis)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
+        self._level = not self.settings.hears_imu
+        if self._level:
+            self._gravity = (0.0, 0.0, -self.settings.robot.gravity)
+            self._fresh[1].last = FOREVER
+        if not self.settings.hears_joints:
+            self._fresh[0].last = FOREVER
+            self._stand()
 
     def start(self, now: int) -> None:
         """Begin to listen at `now` (ns): an input of which no message comes will become stale."""
@@ -116,13 +133,20 @@ class LiveEvaluator:
             if rate >= signal.on or rate <= -signal.on or not signal.quiet:
                 signal.step(now, abs(rate))
         if known:
-            load = self.payload
-            self._posture = posture_of(self._mechanics, joints.q, load.mass, load.cog)
-            self._stance = stance_of(self._mechanics, self._posture)
-            self._chassis.stands = self._stance, tuple(joints.q), load
+            self._stand()
         else:
             self._posture = self._stance = None
         return self._evaluate(now, stamp)
+
+    def _stand(self) -> None:
+        """Take the newest joint positions, which are known, with the newest payload."""
+        load = self.payload
+        if not self.load_known:
+            self._posture = self._stance = None
+            return
+        self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
+        self._stance = stance_of(self._mechanics, self._posture)
+        self._chassis.stands = self._stance, tuple(self._joints.q), load
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -137,8 +161,11 @@ class LiveEvaluator:
     ) -> Margins | None:
         """Take an Imu message (axes of the sensor `frame`); return as `joint_state` does.
 
-        A covariance_0 of -1 says that the orientation, or the rate, was not measured (REP-145).
+        A covariance_0 of -1 says that the orientation, or the rate, was not measured (REP-145). The
+        message is ignored where the base was declared level.
         """
+        if self._level:
+            return self.margins
         self._arrived(1, now, stamp, self.watch.imu)
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame
@@ -149,7 +176,8 @@ class LiveEvaluator:
         self._gravity = gravity
         margins = self._evaluate(now, stamp)
         angles: Any = margins.stability.angle if margins else None
-        rate = NO_RATE if omega_covariance_0 == -1.0 else WITNESSED
+        unknown = omega_covariance_0 == -1.0 or not self._imu.motion.gyro_trusted
+        rate = NO_RATE if unknown else WITNESSED
         if covariance_0 == -1.0 and rate:
             rate = UNWITNESSED
         self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
@@ -167,20 +195,29 @@ class LiveEvaluator:
         return self._chassis.moving(self.margins.gravity, angles)
 
     def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
-        """Take a declared payload (kg, m), in force from the next joint state on."""
-        payload = payload_from(self.settings.robot, mass, com, frame)
-        self.watch.payload.step(now, 0.0 if payload else 1.0)
+        """Take a declared payload (kg, m), in force from the next joint state on.
+
+        After one that cannot be used margins are unknown until a good one comes.
+        """
+        robot = self.settings.robot
+        payload = payload_from(robot, mass, com, frame)
+        self.watch.declared(now, '' if payload else payload_fault(robot, mass, com, frame))
+        self.load_known = payload is not None
         if payload:
             self.payload = payload
+        if not self.settings.hears_joints:
+            self._stand()
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits, delays and payload from now on; the robot's joints are the same.
 
         Learnt periods and active alerts stay; an active alert keeps the rule it was raised by.
         """
-        if settings.robot.payload != self.settings.robot.payload:
-            self.payload = settings.robot.payload
-        self.settings = self.watch.settings = self._imu.settings = settings
+        carried = settings.robot.payload
+        if carried not in (self.settings.robot.payload, self.payload):
+            self.payload, self.load_known = carried, True
+        self.settings = self.watch.settings = settings
+        self._imu.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
         for fresh in self._fresh:
@@ -192,6 +229,8 @@ class LiveEvaluator:
             due = fresh.deadline
             if due is not None and now > due:
                 signals.stale.set(due, 1.0)
+        if self.load_known and self.watch.payload.raw:  # a person declared another since
+            self.watch.declared(now, '')
         self.watch.relax(now if self._began is None else self._began)
         self._began = None
         if now > self._alive_until():
@@ -232,7 +271,7 @@ class LiveEvaluator:
     def _alive_until(self) -> int:
         """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
         joints, imu = self._fresh
-        seen = min(self._joints.seen)
+        seen = min(self._joints.seen, default=FOREVER)
         if seen == NEVER or imu.last is None:
             return NEVER
         return min(seen + joints.limit, imu.last + imu.limit)
@@ -253,7 +292,7 @@ class LiveEvaluator:
             return None
         self._known_until = until
         torque: Any = torque_of(posture, gravity)
-        stability = stability_of(self._stance, gravity)
+        stability = NOT_KNOWN if self._level else stability_of(self._stance, gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)
@@ -271,6 +310,8 @@ class LiveEvaluator:
             if value >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, value)
                 error.step(now, value)
+        if self._level:
+            return
         for (warn, error), angle in zip(watch.tip, angles, strict=True):
             if -angle >= warn.on or not (warn.quiet and error.quiet):
                 warn.step(now, -angle)

@@ -16,8 +16,12 @@ from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joints import JointMerger, JointRows
-from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
-from ugv_acceptance.evaluation.inputs.timeouts import InputTimeout
+from ugv_acceptance.evaluation.inputs.payload import (
+    PayloadHistory,
+    payload_fault,
+    payload_from,
+)
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, InputTimeout
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -93,13 +97,29 @@ class RecordedEvaluator:
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
         joints = JointRows(never, never, empty, empty, empty, never, never < 0)
-        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0)
+        imu = ImuRows(never, never, np.full((1, 3), np.nan), never < 0, never < 0)
         self._carry = _Newest(joints, never, imu, never)
+        if not self.settings.hears_imu:
+            level = np.array([[0.0, 0.0, -robot.gravity]])
+            down = ImuRows(never, never, level, never > 0, never < 0)
+            self._carry = _Newest(joints, never, down, never + FOREVER)
+        for fresh in self._unheard():
+            fresh.last = FOREVER
+
+    def _unheard(self) -> Iterator[InputTimeout]:
+        """Yield the timeouts of inputs that are not needed: they are never stale."""
+        heard = (self.settings.hears_joints, self.settings.hears_imu)
+        yield from (fresh for fresh, need in zip(self.fresh, heard, strict=True) if not need)
 
     @property
     def orientations(self) -> dict[str, int]:
         """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
+
+    @property
+    def imu(self) -> ImuTracker:
+        """The tracker of the IMU, with what its checks judged."""
+        return self._imu
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
@@ -125,9 +145,13 @@ class RecordedEvaluator:
 
         It is when an input becomes stale, unless the next batch brings a message before.
         """
-        joints = self._joints.merge_columns(batch.joints)
-        imu = self._imu.columns(batch.imu)
-        joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+        felt = batch.imu if self.settings.hears_imu else ()
+        imu = self._imu.columns(felt)
+        if self.settings.hears_joints:
+            joints = self._joints.merge_columns(batch.joints)
+            joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
+        else:
+            joints, joint_limits = _without_joints(imu), np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
         self._watch_inputs(joints, joint_limits, imu)
         self._take_payloads(batch.payload)
@@ -141,7 +165,7 @@ class RecordedEvaluator:
         rows = self._margins(newest, load)
         lost = self._lost(rows)
         self._watch_pairs(rows, lost)
-        chassis = self._chassis.take(batch.imu, rows, load, (lost.place, lost.time))
+        chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
             _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
@@ -176,10 +200,11 @@ class RecordedEvaluator:
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
-            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
-            self.watch.payload.step(when, 0.0 if payload else 1.0)
+            told = self.settings.robot, s.mass[k], s.com[k], s.frame_id
+            payload = payload_from(*told)
+            self.watch.declared(when, '' if payload else payload_fault(*told))
+            self._payload.declare(when, payload)
             if payload:
-                self._payload.declare(when, payload)
                 self.first_payload = self.first_payload or (when, payload)
 
     def _margins(self, newest: _Newest, load: Load) -> MarginRows:
@@ -191,13 +216,18 @@ class RecordedEvaluator:
         time = np.concatenate((joints.time[1:], imu.time[1:]))
         order = np.argsort(time, kind='stable')
         from_joints = order < len(joints.time) - 1
+        of_joints = np.cumsum(from_joints, dtype=np.intp)
+        of_imu = np.cumsum(~from_joints, dtype=np.intp)
+        if not self.settings.hears_joints:  # only IMU messages bring margins
+            order, of_joints = order[~from_joints], of_joints[~from_joints]
+            of_imu = of_imu[~from_joints]
         time = time[order]
-        pairs = Pairs(joints, imu, np.cumsum(from_joints), np.cumsum(~from_joints))
+        pairs = Pairs(joints, imu, of_joints, of_imu)
         j, i = pairs.of_joints, pairs.of_imu
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
-        whole = np.asarray(np.isfinite(joints.q).all(axis=1))
+        whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(load[0])
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
-        table, state = self._table(pairs, load, whole, known)
+        table, state = self._table(pairs, whole, known, load)
         n = len(self.settings.robot.joint_names)
         return MarginRows(
             time=time,
@@ -214,11 +244,15 @@ class RecordedEvaluator:
         )
 
     def _table(
-        self, pairs: Pairs, load: Load, whole: NDArray[np.bool_], known: NDArray[np.bool_]
+        self,
+        pairs: Pairs,
+        whole: NDArray[np.bool_],
+        known: NDArray[np.bool_],
+        payload: Sequence[Floats | float],
     ) -> tuple[Floats, NDArray[np.int8]]:
         """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
 
-        `load` is the payload of each joint row, `whole` says which joint rows have all positions,
+        `whole` says which joint rows have all positions and a known `payload` (mass and place),
         `known` which rows have margins.
         """
         q = pairs.joints.q
@@ -226,19 +260,22 @@ class RecordedEvaluator:
         table = np.empty((n + (13 if self.detail else 4), len(known)))
         state = np.full(len(known), UNKNOWN, np.int8)
         rows: Rows = ALL
-        if not known.all():
+        if not self.settings.hears_imu or not known.all():
             table.fill(np.nan)
+        if not known.all():
             rows = np.flatnonzero(known)
         j, i = pairs.of_joints[rows], pairs.of_imu[rows]
         if not len(j):
             return table, state
         columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
-        mass, x, y, z = load
+        mass, x, y, z = (_known(number, whole) for number in payload)
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
         gravity = tuple(axis[i] for axis in pairs.imu.gravity.T)
         with np.errstate(over='ignore', invalid='ignore'):
             for line, torque_gradient in zip(table, posture.torque_gradients, strict=False):
                 line[rows] = _product(torque_gradient, j, gravity)
+        if not self.settings.hears_imu:
+            return table, state
         for some, stance in self._stances(posture, len(q), j):
             found = self._stability(stance, pick(gravity, some))
             place = some if isinstance(rows, slice) else rows[some]
@@ -284,14 +321,19 @@ class RecordedEvaluator:
             worse = _with(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
-        state = rows.state if all_known else rows.state[rows.known]
+        if self.settings.hears_imu:
+            self._watch_stand(rows, time, lost)
+        self.watch.predict_rows(rows)
+
+    def _watch_stand(self, rows: MarginRows, time: Times, lost: '_Lost') -> None:
+        """Judge how the robot stands, in the rows with margins; `time` has `lost` among them."""
+        state = rows.state[rows.known]
         feed(self.watch.support, time, _with(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
         if self.watch.slide.on < np.inf:
             gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
             friction = self.settings.limits.friction
             slope = slides_first(tuple(gravity.T), least, friction)
             feed(self.watch.slide, time, _with(slope, lost))
-        self.watch.predict_rows(rows)
 
     def _lost(self, rows: MarginRows) -> '_Lost':
         """Return when margins became unknown that were known before."""
@@ -326,6 +368,17 @@ def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floa
     x, y, z = pick(torque_gradient, rows)
     product: Floats = x * gravity[0] + y * gravity[1] + z * gravity[2]
     return product
+
+
+def _known(number: Floats | float, whole: NDArray[np.bool_]) -> Floats | float:
+    """Return a number of the payload with 0 where it is not known, so that it can be computed."""
+    return number if isinstance(number, float) else np.where(whole, number, 0.0)
+
+
+def _without_joints(imu: ImuRows) -> JointRows:
+    """Return the joint states of a robot without measured joints, one row an IMU message."""
+    none, no = np.empty((len(imu.time), 0)), np.zeros(len(imu.time), np.bool_)
+    return JointRows(imu.time, imu.stamp, none, none, none, imu.time, no)
 
 
 def _lead(before: Any, rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows

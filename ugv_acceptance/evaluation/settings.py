@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
+# The attitude of an IMU that is not there: the base was declared to stand level.
+LEVEL = 'level'
+
 
 @dataclass(frozen=True, slots=True)
 class JointInput:
@@ -33,6 +36,9 @@ class ImuInput:
     `low_pass` (s) is the filter's time constant; `rest_acceleration` (m/s2) and `rest_rate` (rad/s)
     define rest; `agreement` (rad) is how far orientation and accelerometer may differ at rest, for
     at most `agreement_delay` (s). `frame` is the frame its messages must name; '': not checked.
+    With `attitude` LEVEL there is no IMU: somebody declared that the base stands level, so torques
+    are known and tip-over is not. `noise_free`: its numbers have no noise (a simulator), so that
+    equal ones in a row are no fault.
     """
 
     mounting: Matrix = IDENTITY
@@ -45,6 +51,7 @@ class ImuInput:
     agreement: float = 0.0872664625997165
     agreement_delay: float = 1.0
     frame: str = ''
+    noise_free: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,3 +113,13 @@ class Settings:
     delays: Delays = Delays()
     unsafe: str = ''
     payload_known: bool = False
+
+    @property
+    def hears_joints(self) -> bool:
+        """Whether margins need joint states: not of a robot without measured joints."""
+        return bool(self.joints)
+
+    @property
+    def hears_imu(self) -> bool:
+        """Whether margins need an IMU: not where the base was declared level."""
+        return self.imu.attitude != LEVEL

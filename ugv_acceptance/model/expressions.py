@@ -117,12 +117,16 @@ def _order(x: Scalar) -> tuple[int, float]:
 
 
 def sin(x: Scalar) -> Scalar:
-    """Return the sine of x (rad)."""
+    """Return the sine of x (rad); of an array too, for robots that are used only once."""
+    if isinstance(x, np.ndarray):
+        return np.sin(x)  # type: ignore[return-value]  # Scalar leaves arrays out
     return math.sin(x) if isinstance(x, float) else _node('sin', x)
 
 
 def cos(x: Scalar) -> Scalar:
-    """Return the cosine of x (rad)."""
+    """Return the cosine of x (rad); of an array too."""
+    if isinstance(x, np.ndarray):
+        return np.cos(x)  # type: ignore[return-value]
     return math.cos(x) if isinstance(x, float) else _node('cos', x)
 
 

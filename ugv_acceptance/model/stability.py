@@ -73,6 +73,10 @@ class Stability:
     state: State
 
 
+# The stability of a robot whose attitude nobody measures.
+NOT_KNOWN = Stability(_NONE, _NONE, _NONE, math.nan, UNKNOWN)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Margins:
     """Static torques and tip angles of samples: what every sample of a recording is judged by.

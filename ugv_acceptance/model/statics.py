@@ -107,7 +107,7 @@ def payload_capacity(
         mass = (limit - np.sign(slope) * empty) / np.abs(slope)
     size = np.linalg.norm(np.asarray(gravity, dtype=np.float64), axis=-1)[..., np.newaxis]
     mass = np.where(np.abs(slope) <= LEAST_LEVER * size, np.inf, mass)
-    least: Floats = np.where(np.abs(empty) > limit, -np.inf, mass).min(axis=-1)
+    least: Floats = np.where(np.abs(empty) > limit, -np.inf, mass).min(axis=-1, initial=np.inf)
     return least
 
 

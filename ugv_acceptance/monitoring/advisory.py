@@ -11,7 +11,9 @@ from dataclasses import dataclass, field
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.effort.plateaus import PayloadEstimate, payload_estimate
+from ugv_acceptance.evaluation.effort.facts import JointMeaning
+from ugv_acceptance.evaluation.effort.live_rests import LiveRests, PayloadEstimate
+from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
@@ -19,8 +21,6 @@ from ugv_acceptance.monitoring.trends import Ahead, Trends, end_words
 
 # Age (ns) at which computed advice is renewed.
 FRESH = 250_000_000
-# Consecutive estimates (one a second) of another payload before it is reported.
-PERSISTENT = 3
 # Time to a limit (s) below which the operator is warned at once; time (ns) between such warnings.
 URGENT, AGAIN = 2.0, 1_000_000_000
 
@@ -29,8 +29,9 @@ URGENT, AGAIN = 2.0, 1_000_000_000
 class Advisory:
     """Keeps the advice of one session up to date; `advice` is the newest, best first.
 
-    `estimate` is the payload that the motors' efforts suggest, if it differs from the declared one;
-    `on_problem(text)` writes to the log.
+    `efforts` is what the joints' efforts mean and say, None before the robot has rested; `estimate`
+    is the payload that they suggest, if it differs from the declared one. `on_problem(text)` writes
+    to the log.
     """
 
     evaluator: LiveEvaluator
@@ -38,13 +39,18 @@ class Advisory:
     on_problem: Callable[[str], None]
     advice: tuple[Advice, ...] = ()
     estimate: PayloadEstimate | None = None
+    efforts: Understanding | None = None
+    rests: LiveRests = field(init=False)
     _made: int = 0
     _told: int = 0
-    _felt: int = 0
     _pool: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
     )
     _asked: 'Future[tuple[Advice, ...]] | None' = None
+    _judging: 'Future[Understanding] | None' = None
+
+    def __post_init__(self) -> None:
+        self.rests = LiveRests(self.evaluator.settings)
 
     def renew(self, now: int, active: list[Alert]) -> None:
         """Start computing new advice if an active alert needs it and the last is too old."""
@@ -71,23 +77,41 @@ class Advisory:
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def feel(self) -> None:
-        """Estimate the payload from the measured efforts; to be called once a second."""
+        """Remember the efforts at rest and judge them now and then; to be called once a second."""
         margins, evaluator = self.evaluator.margins, self.evaluator
-        found = None
-        if margins is not None:
-            rates, efforts = evaluator.measured
-            found = payload_estimate(
-                evaluator.settings, margins.q, rates, efforts, margins.gravity, evaluator.payload
-            )
-        self.felt(found)
-
-    def felt(self, found: PayloadEstimate | None) -> None:
-        """Take an estimate of the payload; None (such as in motion) changes nothing."""
-        if found is None:
+        if self._judging is not None and self._judging.done():
+            judged, self._judging = self._judging, None
+            error = judged.exception()
+            if error is None:
+                self.felt(judged.result())
+            else:
+                self.on_problem(f'efforts: fault of the monitor: {error!r}')
+        if margins is None:
             return
-        self._felt = self._felt + 1 if found.differs else 0
-        if self._felt == 0 or self._felt >= PERSISTENT:
-            self.estimate = found if self._felt else None
+        rates, efforts = evaluator.measured
+        due = self.rests.see(
+            margins.time, margins.q, rates, efforts, margins.gravity, margins.torque
+        )
+        if due and self._judging is None:
+            self._judge()
+
+    def _judge(self) -> None:
+        """Judge the efforts remembered so far, in the thread for advice."""
+        case = self.evaluator.settings, (), self.rests.rests()
+        self._judging = self._pool.submit(understand, *case)
+
+    def felt(self, found: Understanding) -> None:
+        """Take what the efforts mean and say; in motion the payload suggested before stays."""
+        self.efforts = found
+        if self.rests.judged_by(found):
+            estimate = self.rests.estimate(found)
+            self.estimate = estimate if estimate is not None and estimate.differs else None
+
+    @property
+    def opposed(self) -> list[JointMeaning]:
+        """The joints whose effort has the opposite sign."""
+        joints = () if self.efforts is None else self.efforts.joints
+        return [joint for joint in joints if joint.opposed]
 
     def do(self, alert: Alert) -> str:
         """Return what to do about an alert: the computed advice for its margin, else general."""
@@ -136,7 +160,7 @@ class Advisory:
     def slide(self) -> float:
         """Return the slope (rad) left until the tracks slide; infinite if it is not known."""
         margins, settings = self.evaluator.margins, self.evaluator.settings
-        if margins is None:
+        if margins is None or not settings.hears_imu:
             return math.inf
         return float(slide_left(margins.gravity, settings.limits.friction))
 

@@ -9,8 +9,10 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
+from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
-from ugv_acceptance.evaluation.least_margins import least_tilt, with_most_used
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
+from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.evaluation.settings import Settings
@@ -50,16 +52,19 @@ def verdict_of(session: Session) -> Status:
     if active:
         return _worst(session, active, left, values | known)
     if margins is None:
-        text = 'waiting for joint_states and imu: no margins yet'
+        waited = ' and '.join(name for name in session.counts if name != 'payload')
+        text = f'waiting for {waited}: no margins yet'
         return Status(STALE, '', text, values | known)
     if alarm_tracker.waiting:
         return _over(session, alarm_tracker.waiting[-1], left, values | known)
-    return Status(OK, '', f'all margins kept: {left}', values | known)
+    return Status(OK, '', f'{kept_words(session.settings)}: {left}', values | known)
 
 
 def _left(margins: Margins, settings: Settings) -> str:
     side, angle = least_tilt(margins.stability.angle)
     tilt = _tilt_words(side, angle) if side else 'no tilt margin'
+    if not settings.hears_imu:
+        return with_most_used('', margins.torque, settings)
     return with_most_used(tilt, margins.torque, settings)
 
 
@@ -121,9 +126,9 @@ def _named(alert: Alert) -> dict[str, object]:
     return {'code': rule.code, 'subject': rule.subject, 'class': suspect_of(rule.code)}
 
 
-def _severity(alert: Alert) -> tuple[int, bool]:
-    """Return the sort key of an alert: its level, and at equal level tip-over before others."""
-    return alert.rule.level, alert.rule.code in {'TIP_OVER', 'NO_SUPPORT'}
+def _severity(alert: Alert) -> tuple[int, int]:
+    """Return the sort key of an alert: its level, and its urgency at that level."""
+    return alert.rule.level, urgency(alert.rule.code, alert.rule.level)
 
 
 def alert_status(change: Change, session: Session) -> Status:
@@ -187,7 +192,10 @@ def margin_statuses(
                 'utilisation': use,
             }
             yield Status(level, f'Torque {name}', text, numbers)
-    yield _tip_status(margins, active, moving)
+    if settings.hears_imu:
+        yield _tip_status(margins, active, moving)
+    else:
+        yield Status(STALE, 'Tip-over', TILT_NOT_CHECKED)
 
 
 def _tip_status(

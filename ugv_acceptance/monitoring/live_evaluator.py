@@ -147,7 +147,7 @@ class LiveEvaluator:
     ) -> None:
         """Declare the payload (kg; m in the payload link), in force from the next joint state on.
 
-        An implausible one raises the alert PAYLOAD_INVALID, and the payload stays as it was.
+        One that cannot be used raises PAYLOAD_INVALID: no margin is known until a good one comes.
         """
         self._evaluator.carry(self._now(time_ns), mass, center_of_mass, frame_id)
 

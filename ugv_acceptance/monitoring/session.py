@@ -13,11 +13,13 @@ from typing import Any
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import limits_hash
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
+from ugv_acceptance.monitoring.certainty import CODE, Certainty
 from ugv_acceptance.monitoring.faults import Faults
 from ugv_acceptance.monitoring.receipt_clock import Clock, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.trends import Trends
@@ -75,8 +77,9 @@ class Session:
 
     `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
     stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
-    dates what comes in, `stamps` converts header stamps to its time. `take_joint_state`, `take_imu`
-    and `take_payload` take a serialised message and never raise.
+    dates what comes in, `stamps` converts header stamps to its time; `sources` are of uncertainty:
+    a margin that is kept by less than its bound is told. `take_joint_state`, `take_imu` and
+    `take_payload` take a serialised message and never raise.
     """
 
     settings: Settings
@@ -85,15 +88,18 @@ class Session:
     on_problem: Callable[[str], None]
     clock: Clock = field(default_factory=ReceiptClock)
     stamps: StampShift = field(default_factory=StampShift)
+    sources: tuple[Source, ...] = ()
     evaluator: LiveEvaluator = field(init=False)
     faults: Faults = field(init=False)
     alarm_tracker: AlarmTracker = field(init=False)
     counts: dict[str, InputCount] = field(init=False)
+    _counts: dict[str, InputCount] = field(init=False)
     take_joint_state: Callable[[bytes], None] = field(init=False)
     take_imu: Callable[[bytes], None] = field(init=False)
     take_payload: Callable[[bytes], None] = field(init=False)
     trends: Trends = field(init=False)
     advisory: Advisory = field(init=False)
+    certainty: Certainty = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
     limits_hash: str = field(init=False)
     _known: bool = False
@@ -105,7 +111,10 @@ class Session:
         self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
         self.trends = Trends(self.settings)
         self.advisory = Advisory(self.evaluator, self.trends, self.on_problem)
-        self.counts = {name: InputCount() for name in INPUTS}
+        self.certainty = Certainty(self.settings, self.sources)
+        heard = {'joint_states': self.settings.hears_joints, 'imu': self.settings.hears_imu}
+        self._counts = {name: InputCount() for name in INPUTS}
+        self.counts = {n: count for n, count in self._counts.items() if heard.get(n, True)}
         self.evaluator.start(self.clock.now())
         decode, evaluator = joint_state_decoder().one, self.evaluator
         take = self._evaluating('joint_states', decode, JOINT_FIELDS, evaluator.joint_state)
@@ -128,11 +137,22 @@ class Session:
         """Let time pass: judge silence and delays, and clear faults that are over."""
         now = self.clock.now()
         self.evaluator.tick(now)
+        if self.sources and now >= self.certainty.due:
+            self._doubt(now)
         self.faults.advance(now)
         self._look()
 
+    def _doubt(self, now: int) -> None:
+        """Report the margins that are kept by less than their uncertainty."""
+        before = self.certainty.told
+        self.certainty.look(now, self.evaluator.margins, self.evaluator.payload)
+        for subject in before.keys() - self.certainty.told.keys():
+            self.faults.clear(now, CODE, subject)
+        for subject, doubt in self.certainty.told.items():
+            self.faults.set(now, CODE, subject, 1.0, doubt.sentence)
+
     def feel(self) -> None:
-        """Check the declared payload against the measured efforts; to be called once a second."""
+        """Check payload and sign of efforts by the measured ones; to be called once a second."""
         self.advisory.feel()
         now, found = self.clock.now(), self.advisory.estimate
         if found is None:
@@ -140,6 +160,12 @@ class Session:
         else:
             more = abs(found.mass - found.declared)
             self.faults.set(now, 'PAYLOAD_DIFFERS', 'payload', more, found.sentence)
+        opposed = {joint.joint for joint in self.advisory.opposed}
+        for name in self.settings.robot.joint_names:
+            if name in opposed:
+                self.faults.set(now, 'EFFORT_SIGN', name, 1.0)
+            else:
+                self.faults.clear(now, 'EFFORT_SIGN', name)
 
     def measure_rates(self) -> None:
         """Measure the `rates` (Hz) of the inputs; to be called once a second."""
@@ -149,7 +175,7 @@ class Session:
 
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; learnt periods and active alerts stay."""
-        self.settings = self.trends.settings = settings
+        self.settings = self.trends.settings = self.certainty.settings = settings
         self.limits_hash = limits_hash(settings)
         self.evaluator.adopt(settings)
         self.tick()
@@ -168,7 +194,7 @@ class Session:
         evaluate: Callable[..., Margins | None],
     ) -> Callable[[bytes], None]:
         """Return a function that decodes a message of input `name` and evaluates its `fields`."""
-        count, alarm_tracker, stamps = self.counts[name], self.alarm_tracker, self.stamps
+        count, alarm_tracker, stamps = self._counts[name], self.alarm_tracker, self.stamps
         receipt, see = self.clock.now, self.trends.see
 
         def take(data: bytes) -> None:
@@ -221,7 +247,7 @@ class Session:
         self._look()
 
     def _malformed(self, name: str, error: BadSample) -> None:
-        count = self.counts[name]
+        count = self._counts[name]
         count.malformed += 1
         count.reason = str(error)
         now = self.clock.now()

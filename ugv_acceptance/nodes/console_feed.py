@@ -31,7 +31,7 @@ from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.monitoring.receipt_clock import StampShift
-from ugv_acceptance.monitoring.session import INPUTS, Session
+from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import Stop, ros
 from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
 from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
@@ -67,12 +67,11 @@ class ConsoleNode(Node):
             stamps=StampShift(bool(self.get_parameter('use_sim_time').value)),
         )
         session = self.session
-        self._heard = {
-            'joint_states': hearing.Newest(session.take_joint_state, hearing.newest_of_joints()),
-            'imu': hearing.Newest(session.take_imu, hearing.newest_attitude(self.settings.imu)),
-        }
-        session.take_joint_state = self._heard['joint_states']
-        session.take_imu = self._heard['imu']
+        joints = hearing.Newest(session.take_joint_state, hearing.newest_of_joints())
+        imu = hearing.Newest(session.take_imu, hearing.newest_attitude(self.settings.imu))
+        session.take_joint_state, session.take_imu = joints, imu
+        both = {'joint_states': joints, 'imu': imu}
+        self._heard = {name: newest for name, newest in both.items() if name in session.counts}
         self._inputs = Inputs(self, config.topics, session, _DEPTH)
         self._due = self._look_due = 0.0
         self._own: dict[str, AlertRow] = {}
@@ -201,7 +200,7 @@ class ConsoleNode(Node):
         say = self.session.faults.sentence
         rows = [row_of(a, say(a, self.settings), advice(a.rule.code)) for a in active]
         self._own = {row.key: row for row in rows}
-        self._rows = tuple(self._input(name, active) for name in INPUTS)
+        self._rows = tuple(self._input(name, active) for name in self.session.counts)
 
     def _problem(self, now: float) -> str:
         """Return why the margins are not to be trusted; '' while the monitor is alive."""

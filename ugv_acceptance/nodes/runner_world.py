@@ -200,7 +200,7 @@ class Guard(Node):
 
     def record(self, folder: Path) -> None:
         """Begin to record all messages into a new folder."""
-        bag = BagWriter(folder)
+        bag = BagWriter(folder, simulated=self._mode == SIM)
         for name, type_, qos in self._topics:
             bag.add_topic(name, type_, qos)
         bag.flush()  # from now on it can be read, whatever happens

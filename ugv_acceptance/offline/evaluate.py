@@ -24,13 +24,16 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 from ugv_acceptance.evaluation.criteria.safeguards import with_objection
 from ugv_acceptance.evaluation.criteria.statement import Objection
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
+from ugv_acceptance.evaluation.criteria.verdict import not_checked_json
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.offline.acknowledgements import add_acknowledgements
+from ugv_acceptance.offline.circumstances import assumed_of, load_of, origin_of
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
+from ugv_acceptance.offline.not_read import not_read
 from ugv_acceptance.type_aliases import Json
 
 
@@ -91,6 +94,9 @@ def evaluate(
     result, judgement = judge(opened, settings, demanded, sources, options)
     result |= _both_loads(opened, judgement, demanded, sources, result)
     result |= _circumstances(opened, robot, identity)
+    unread = [not_checked_json(one) for one in not_read(opened, robot)]
+    result['not_checked'] = [*result['not_checked'], *unread]
+    result['load'] = load_of(judgement.measurement.payloads, opened.start_ns)
     if payload is not None:
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
@@ -159,6 +165,7 @@ def _circumstances(
     began = datetime.fromtimestamp(start // 10**9, timezone.utc)
     return {
         'identity': dict(identity or {}),
+        'origin': origin_of(recording.bag),
         'robot': {
             'name': config.name,
             'serial': config.serial,
@@ -166,6 +173,7 @@ def _circumstances(
             'urdf': str(config.urdf_path),
             'sha256': config.sha256,
             'warnings': list(config.warnings),
+            'assumed': assumed_of(config),
         },
         'software': {
             'version': __version__,

@@ -14,7 +14,9 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
     default_criteria,
 )
+from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
+from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
@@ -71,12 +73,12 @@ def judge(
     The result holds what follows from margins, alerts and data, without robot, software and
     identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
     """
-    bag, topics = recording.bag, recording.chosen()
+    bag, topics = recording.bag, recording.chosen(imu_required=False)
     span = bag.start_ns, bag.end_ns
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
     evaluator = RecordedEvaluator(settings, options.detail or asked.detail)
-    reading = _Reading(settings, evaluator, limits, asked, options)
+    reading = _Reading(settings, sources, evaluator, limits, asked, options)
     batches = bag.batches(topics, workers=options.readers)
     evaluator.start(bag.start_ns)
     for batch in _stretches(batches):
@@ -88,9 +90,10 @@ def judge(
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
         'bag': _bag_result(bag, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
-        'model_check': reading.check.result(),
     }
     statements = [e.statement(*span) for e in reading.examinations]
+    absent = absent_imu(settings, topics.imu)
+    statements.append(absent)
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
@@ -99,13 +102,18 @@ def judge(
     )
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
+    # The cause goes before what follows from it.
+    causes = [objection.reason for objection in absent.objections]
+    result['reasons'].sort(key=lambda reason: reason not in causes)
     return result, Judgement(settings, topics, evaluator, batches.facts, asked)
 
 
-def _examinations(settings: Settings, evaluator: RecordedEvaluator) -> tuple[Examination, ...]:
+def _examinations(
+    settings: Settings, sources: tuple[Source, ...], evaluator: RecordedEvaluator
+) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
-    del settings, evaluator
-    return (ChassisExamination(),)
+    chassis = ChassisExamination()
+    return ModelCheck(settings, sources), ImuExamination(evaluator.imu), chassis
 
 
 @dataclass(slots=True)
@@ -116,12 +124,12 @@ class _Reading:
     """
 
     settings: Settings
+    sources: tuple[Source, ...]
     evaluator: RecordedEvaluator
     limits: CriteriaMeasurement
     asked: CriteriaMeasurement
     options: Options
     summary: Summary = field(init=False)
-    check: ModelCheck = field(init=False)
     told: AlertAdvice = field(init=False)
     held: HeldMargins = field(init=False)
     examinations: tuple[Examination, ...] = field(init=False)
@@ -129,8 +137,7 @@ class _Reading:
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
-        self.check = ModelCheck(self.settings)
-        self.examinations = _examinations(self.settings, self.evaluator)
+        self.examinations = _examinations(self.settings, self.sources, self.evaluator)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)
@@ -170,7 +177,7 @@ class _Reading:
         return [self.limits] if self.asked is self.limits else [self.limits, self.asked]
 
     def _judge(self, rows: MarginRows) -> None:
-        parts = (self.summary.add, self.check.add, *(e.add for e in self._measurements))
+        parts = (self.summary.add, *(e.add for e in self._measurements))
         for take in (*parts, *(e.add for e in self.examinations)):
             take(rows)
 

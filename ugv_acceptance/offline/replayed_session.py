@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from ugv_acceptance.evaluation.advice.search import COMPUTED, advise
 from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
-from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
+from ugv_acceptance.evaluation.effort.understanding import understand
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.monitoring.advisory import Advisory
@@ -50,13 +50,13 @@ class PastAdvisory(Advisory):
             self.advice = advise(*case)
 
     def feel(self) -> None:
-        """Estimate the payload from the measured efforts; to be called once a second."""
-        margins, evaluator = self.evaluator.margins, self.evaluator
-        found = None
-        if margins is not None:
-            known = evaluator.settings, margins.q, *self.measured, margins.gravity
-            found = payload_estimate(*known, evaluator.payload)
-        self.felt(found)
+        """Remember the efforts at rest and judge them now and then; to be called once a second."""
+        margins = self.evaluator.margins
+        if margins is None:
+            return
+        q, gravity, torque = margins.q, margins.gravity, margins.torque
+        if self.rests.see(margins.time, q, *self.measured, gravity, torque):
+            self.felt(understand(self.evaluator.settings, (), self.rests.rests()))
 
     def do(self, alert: Alert) -> str:
         """Return the advice for an alert now, else that of the moment when it was raised."""

@@ -12,13 +12,17 @@ from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.report.format import (
+    assumed_line,
     bound_text,
     doubts_of,
     interval_text,
     limit_text,
+    load_text,
     missing_text,
     not_checked_lines,
     number_text,
+    origin_line,
+    range_text,
     seconds_text,
     worst_text,
 )
@@ -83,16 +87,17 @@ def acceptance_page(
         limit=limit_text,
         bound=bound_text,
         interval=interval_text,
+        range=range_text,
         missing=missing_text,
     )
-    entered = result['identity']
     return environment.get_template('acceptance.html').render(
         result=result,
         marks=MARKS,
         doubts=doubts_of(result),
         unchecked=not_checked_lines(result),
         closing=CLOSING[result['verdict']],
-        identity=[(words, entered.get(key)) for key, words in parts.items()],
+        first_lines=[origin_line(result), assumed_line(result)],
+        identity=[(words, _entered(result, key)) for key, words in parts.items()],
         inputs=[(key, result['inputs'][key]) for key in ('joint_states', 'imu')],
         alerts=result['alerts'][:MOST_ALERTS],
         more_alerts=max(0, len(result['alerts']) - MOST_ALERTS),
@@ -100,6 +105,14 @@ def acceptance_page(
         events=_events(result, strips, settings),
         map=_map(result, strips, settings),
     )
+
+
+def _entered(result: Json, key: str) -> str | None:
+    """Return an entry of the identity; that of the payload with what the run says of it."""
+    entered: str | None = result['identity'].get(key)
+    if key != 'payload':
+        return entered
+    return f'{entered}, as entered; {load_text(result)}' if entered else load_text(result)
 
 
 def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:

@@ -12,7 +12,14 @@ from ugv_acceptance.type_aliases import Json
 # Most runs listed one by one; campaign.json has all.
 MOST_RUNS = 400
 MOST_FAILURES = 400
-MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?', 'BROKEN': '!', 'NOT_JUDGED': '∅'}
+MARKS = {
+    'PASS': '✓',
+    'FAIL': '✗',
+    'INCONCLUSIVE': '?',
+    'DOUBTFUL': '≈',
+    'BROKEN': '!',
+    'NOT_JUDGED': '∅',
+}
 
 
 def campaign_page(said: Json) -> str:

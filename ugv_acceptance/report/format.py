@@ -4,8 +4,8 @@ from ugv_acceptance.evaluation.criteria.quantities import DATA
 from ugv_acceptance.type_aliases import Json
 
 DASH = '\N{EN DASH}'
-# Less than this share of missing messages is jitter, less load (kg) beyond the declared is noise.
-MISSING, HEAVIER = 0.05, 0.2
+# Less than this share of missing messages is jitter.
+MISSING = 0.05
 # From here on the digits of a number are counted, not read, and no column holds them.
 LONG = 1e6
 
@@ -101,20 +101,62 @@ def missing_text(source: Json, duration: float) -> str:
     return f'{share:.0%} missing' if share > MISSING else ''
 
 
+def origin_line(result: Json) -> str:
+    """Return whether a recording is simulated or real, as far as it or a person says."""
+    origin, entered = result['origin'], result['identity'].get('origin')
+    said = 'simulated or real: the recording does not say'
+    if origin['simulated']:
+        said = 'simulated, as the recording says'
+    elif origin['clock']:
+        said = f'simulated or replayed: the recording has a clock, {origin["clock"]}'
+    return f'{said}; entered: {entered}' if entered else said
+
+
+def assumed_line(result: Json) -> str:
+    """Return which numbers of the robot are only assumed, grouped by the reason."""
+    assumed = result['robot']['assumed']
+    if assumed is None:
+        return "the robot's configuration does not say which of its numbers are only assumed"
+    if not assumed:
+        return 'no number of the robot is only assumed, its configuration says'
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in assumed.items():
+        by_reason.setdefault(reason, []).append(name)
+    groups = (f'{", ".join(names)} ({reason})' for reason, names in by_reason.items())
+    return f'assumed, not measured: {"; ".join(groups)}'
+
+
+def load_text(result: Json) -> str:
+    """Return the load that was carried, by the configuration and the messages of the run."""
+    load = result['load']
+    if load['link'] is None:
+        return 'this robot carries none'
+    if not load['told']:
+        return f'{load["configured_kg"]:.2f} kg, as configured; none was told during the run'
+    told = ', '.join(f'{x["mass_kg"]:.2f} kg from {x["at_s"]:.2f} s' for x in load['told'])
+    more = load['changes'] - len(load['told'])
+    return f'{told}{f", and {more} more changes" if more else ""}: told during the run'
+
+
 def doubts_of(result: Json) -> list[str]:
     """Return the reasons to doubt the margins or their limits, one sentence each."""
-    doubts, wider = [], result.get('limits_relaxed')
+    doubts, wider = _waived(result), result.get('limits_relaxed')
     if wider:
-        doubts = [f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}']
-    load = result['model_check']['payload']
-    if load is None or load['low'] < HEAVIER:
-        return doubts
-    text = (
-        f'measured efforts at rest suggest {load["value"]:.2f} kg more payload than declared '
-        f'(95 %: {load["low"]:.2f} to {load["high"]:.2f} kg): '
-        'true margins are smaller, or efforts are wrong'
-    )
-    return [*doubts, text]
+        doubts = [
+            *doubts,
+            f'judged by relaxed limits ({wider["reason"]}): {", ".join(wider["limits"])}',
+        ]
+    said = set(result['reasons'])
+    return [*doubts, *(text for text in result['model_check']['findings'] if text not in said)]
+
+
+def _waived(result: Json) -> list[str]:
+    """Return what the criteria waive that was not kept in this run."""
+    return [
+        f'{held["name"]} waived ({held["waived"]}), and not kept: {held["reasons"][0]}'
+        for held in result.get('safeguards', ())
+        if held['waived'] is not None and held['reasons']
+    ]
 
 
 def not_checked_lines(result: Json) -> list[str]:
@@ -133,6 +175,11 @@ def interval_text(found: Json | None, unit: str = '') -> str:
         return DASH
     half = (found['high'] - found['low']) / 2.0
     return f'{_short(found["value"])} ± {_short(half)} {unit}'.strip()
+
+
+def range_text(found: Json) -> str:
+    """Return a number with both ends of its 95 % interval, which need not lie evenly about it."""
+    return f'{found["value"]:.3g} ({found["low"]:.3g} to {found["high"]:.3g})'
 
 
 def _short(value: float) -> str:

@@ -73,7 +73,7 @@ def record(
     waiting: list[Message] = []
     corruption = Corruption(case.faults, config.settings.robot.joint_names)
     factor = overload(case.faults)
-    with BagWriter(folder) as bag:
+    with BagWriter(folder, simulated=True) as bag:
         for topic, kind, qos in TOPICS:
             bag.add_topic(topic, kind, qos)
         for k, part in enumerate(play(config, case, seed)):

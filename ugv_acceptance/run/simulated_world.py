@@ -100,7 +100,7 @@ class Offline:
 
     def record(self, folder: Path) -> None:
         """Begin to record all messages into a new folder."""
-        self.bag = BagWriter(folder)
+        self.bag = BagWriter(folder, simulated=True)
         sensor = Qos(reliability='best_effort')
         for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
             self.bag.add_topic(topic, kind, qos)

@@ -84,22 +84,33 @@ def proportion(successes: int, trials: int, confidence: float) -> Bounded:
     return Bounded(successes / trials if trials else None, low, high, one_sided, confidence)
 
 
-def availability(up: float, failures: int, down: float, confidence: float) -> Bounded:
+def availability(
+    up: float,
+    failures: int,
+    down: float,
+    confidence: float,
+    *,
+    failure_terminated: bool = False,
+) -> Bounded:
     """Return availability up / (up + down); `down` (h) is the time of all `failures` repairs.
 
-    The bounds are exact if times to failure and to repair are exponential: their ratio is F
-    distributed.
+    Times to failure and to repair are taken as exponential, so that the ratio of their sums is F
+    distributed: exactly if the test ended with its last failure. If it ended by time, the next
+    failure was still to come: as for the MTBF, 2 r + 2 degrees of freedom then bound from below.
     """
     if failures == 0 or down <= 0.0 or up <= 0.0:
         known = up > 0.0 and failures == 0
         return Bounded(1.0 if known else None, 0.0, 1.0, 0.0, confidence)
 
-    def bound(probability: float) -> float:
-        return 1.0 / (1.0 + down / up * float(fdtri(2 * failures, 2 * failures, probability)))
+    def bound(probability: float, times: int) -> float:
+        quantile = float(fdtri(2 * times, 2 * failures, probability))
+        return 1.0 / (1.0 + (down / failures) / (up / times) * quantile)
 
+    # Times to failure that have begun: the last one, if the test ended by time, has not ended.
+    begun = failures if failure_terminated else failures + 1
     tail = (1.0 - confidence) / 2.0
-    value = up / (up + down)
-    return Bounded(value, bound(1.0 - tail), bound(tail), bound(confidence), confidence)
+    low, shown = bound(1.0 - tail, begun), bound(confidence, begun)
+    return Bounded(up / (up + down), low, bound(tail, failures), shown, confidence)
 
 
 @dataclass(frozen=True, slots=True)

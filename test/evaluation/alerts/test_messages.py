@@ -44,9 +44,9 @@ WARNED = 'warning limit: 10.0 degrees left'
         ('POSITION_LEAP', 'slide', ERROR, 10.0, 12.0,
          'implausible jump of slide: 12.0 m/s, over ten times the speed it can move at'),
         ('IMU_GRAVITY', 'imu', ERROR, 0.15, 0.9,
-         'at rest the measured acceleration differs from gravity by 90%'),
+         'while it does not turn, the acceleration of imu differs from gravity by 90%: it is in g'),
         ('IMU_INCONSISTENT', 'imu', ERROR, 0.1, 28.6 * RAD,
-         'orientation and acceleration of the IMU disagree by 28.6 degrees at rest'),
+         'while the IMU does not turn, its orientation and acceleration disagree by 28.6 degrees'),
         ('INPUT_STALE', 'imu', ERROR, 0.5, 1.0, 'no message from imu'),
     ],
 )  # fmt: skip

@@ -110,8 +110,31 @@ def test_the_motor_of_a_robot_that_lies_is_not_judged(roll: float, *, weak: bool
 def test_a_position_that_keeps_every_bit_under_changing_effort_is_frozen(*, frozen: bool) -> None:
     """Effort rises by a fifth of the limit: a real encoder would have moved by some bits."""
     rows = [message(t, 0.2 + (0.0 if frozen else 1e-4 * (-1.0) ** round(100 * t) * (t % 0.07)),
-                    10.0 + 5.0 * t) for t in grid(3.0)]  # fmt: skip
+                    10.0 + 3.0 * t) for t in grid(3.0)]  # fmt: skip
     assert bool(times(run(rows), 'ENCODER_FROZEN')) is frozen
+
+
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize(
+    ('noise', 'rise', 'frozen'),
+    [(2e-4, 8.0, True), (2e-4, 3.0, False), (3e-4, 8.0, True), (4e-3, 8.0, False)],
+)
+def test_a_position_that_only_trembles_under_growing_effort_is_frozen(
+    seed: int, noise: float, rise: float, *, frozen: bool
+) -> None:
+    """0.2 mrad of noise hide no stuck encoder: effort grows by half of its limit in three seconds.
+
+    A fifth is friction; and what trembles by more than 2 mrad moves.
+    """
+    rng = np.random.default_rng(seed)
+    rows = [message(t, 0.2 + noise * rng.normal(), 10.0 + rise * t) for t in grid(3.0)]
+    assert bool(times(run(rows), 'ENCODER_FROZEN')) is frozen
+
+
+def test_a_joint_that_creeps_under_growing_effort_is_not_frozen() -> None:
+    """It moves by 0.02 rad/s: more than its noise within a fifth of a second."""
+    rows = [message(t, 0.2 + 0.02 * t, 10.0 + 8.0 * t) for t in grid(3.0)]
+    assert not times(run(rows), 'ENCODER_FROZEN')
 
 
 def test_a_frozen_encoder_at_rest_cannot_be_told() -> None:

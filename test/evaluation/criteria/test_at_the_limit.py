@@ -11,7 +11,7 @@ from scipy import stats
 
 from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.criteria.criteria import default_criteria
-from ugv_acceptance.evaluation.effort.model_check import independent_samples, least_squares
+from ugv_acceptance.evaluation.effort.regression import independent_samples, least_squares
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import Limits

@@ -9,12 +9,10 @@ import pytest
 from evaluation.streams import T0, Joints, Message, S, batch_of, run_of, settings
 from scipy import stats
 
+from ugv_acceptance.evaluation.criteria.statement import Statement
 from ugv_acceptance.evaluation.downsampling import MOST_SAMPLES
-from ugv_acceptance.evaluation.effort.model_check import (
-    ModelCheck,
-    independent_samples,
-    least_squares,
-)
+from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.effort.regression import independent_samples, least_squares
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import JointInput, Limits, Settings
 from ugv_acceptance.model.robot import Payload
@@ -35,8 +33,8 @@ def swinging(effort: Effort, seconds: float = 40.0) -> list[Message]:
         if isinstance(message, Joints):
             at = (message.time - T0) / S
             step, part = divmod(at, 2.0)
-            rate = 0.0 if part < 1.0 else (0.2 if int(step) % 8 < 4 else -0.2)
-            level = 0.1 + 0.2 * (4 - abs(int(step) % 8 - 4))
+            rate = 0.0 if part < 1.0 else (0.35 if int(step) % 8 < 4 else -0.35)
+            level = 0.1 + 0.35 * (4 - abs(int(step) % 8 - 4))
             q = (level + (rate * (part - 1.0) if rate else 0.0), 0.0)
             torque = float(static_torque(TOLD.robot, q, DOWN)[0])
             message = replace(  # noqa: PLW2901
@@ -46,12 +44,17 @@ def swinging(effort: Effort, seconds: float = 40.0) -> list[Message]:
     return found
 
 
-def check(messages: list[Message]) -> Any:
-    """Return the comparison of a run."""
+def stated(messages: list[Message]) -> Statement:
+    """Return what is stated of a run."""
     evaluator, found = RecordedEvaluator(TOLD), ModelCheck(TOLD)
     evaluator.start(T0)
     found.add(evaluator.batch(batch_of(messages)))
-    return found.result()
+    return found.statement(T0, messages[-1].time)
+
+
+def check(messages: list[Message]) -> Any:
+    """Return the comparison of a run."""
+    return stated(messages).result['model_check']
 
 
 def noise(at: float) -> float:
@@ -60,22 +63,44 @@ def noise(at: float) -> float:
 
 
 def test_bias_and_scale_are_found_within_their_intervals() -> None:
-    """Effort = 0.9 torque + 2 N m + noise."""
-    found = check(swinging(lambda torque, _, at: 0.9 * torque + 2.0 + noise(at)))['joints']['lift']
-    assert found['scale']['low'] < 0.9 < found['scale']['high']
+    """Effort = 0.97 torque + 2 N m + noise: a torque, a little off."""
+    found = check(swinging(lambda torque, _, at: 0.97 * torque + 2.0 + noise(at)))['joints']['lift']
+    assert found['meaning'] == 'torque'
+    assert found['scale']['low'] < 0.97 < found['scale']['high']
     assert found['scale']['high'] - found['scale']['low'] < 0.1
-    assert found['sign'] == 'same'
 
 
 def test_a_wrong_sign_is_told() -> None:
-    """An effort that counts the other way is found as a scale of -1."""
-    found = check(swinging(lambda torque, _, at: -torque + noise(at)))['joints']['lift']
-    assert found['sign'] == 'opposite'
-    assert found['scale']['value'] == pytest.approx(-1.0, abs=0.05)
+    """An effort that counts the other way is named, with what to set, and is no load.
+
+    Of one joint alone its scale is not certain, but its sign is.
+    """
+    statement = stated(swinging(lambda torque, _, at: -torque + noise(at)))
+    found: Any = statement.result['model_check']
+    assert any('set effort_sign: -1 for lift' in text for text in found['findings'])
+    assert any('effort_sign: -1' in one.why for one in statement.not_checked)
+    assert not statement.objections
+    assert not found['contacts']
 
 
-def test_a_load_nobody_declared_is_weighed() -> None:
-    """0.5 kg more in the hand than the model knows, with its interval."""
+@pytest.mark.parametrize(('scale', 'meaning'), [(1.0 / 12.0, 'scaled'), (12.0, 'scaled')])
+def test_another_unit_gives_its_scale_and_no_load(scale: float, meaning: str) -> None:
+    """Effort in another unit: its scale with an interval; nothing else follows from it."""
+    statement = stated(swinging(lambda torque, _, at: scale * (torque + noise(at))))
+    found: Any = statement.result['model_check']
+    lift = found['joints']['lift']
+    assert lift['meaning'] == meaning
+    assert lift['ratio']['low'] < scale < lift['ratio']['high']
+    assert 'bias' not in lift
+    assert (found['loads'], found['contacts']) == ([], [])
+    assert {'measured effort of lift', 'the payload that was carried'} <= {
+        one.what for one in statement.not_checked
+    }
+
+
+@pytest.mark.parametrize('load', [0.6, 3.0])
+def test_a_load_nobody_declared_is_weighed(load: float) -> None:
+    """More in the hand than the model knows, with its interval, and no PASS."""
 
     def effort(torque: float, _: float, at: float) -> float:
         one, none = (
@@ -84,39 +109,59 @@ def test_a_load_nobody_declared_is_weighed() -> None:
         )
         level = float(static_torque(TOLD.robot, (0.0, 0.0), DOWN)[0])
         # All loads are on one line with the arm: they scale with the cosine of its angle.
-        return torque + 0.5 * (one - none) * torque / level + noise(at)
+        return torque + load * (one - none) * torque / level + noise(at)
 
-    found = check(swinging(effort))
-    for told in (found['payload'], found['joints']['lift']['payload_kg']):
-        assert told['low'] < 0.5 < told['high']
-        assert told['high'] - told['low'] < 0.1
+    statement = stated(swinging(effort))
+    found: Any = statement.result['model_check']
+    # One joint cannot tell a load from another scale: whatever is told of it must hold the truth.
+    for told in found['loads']:
+        assert told['mass_kg']['low'] < 1.0 + load < told['mass_kg']['high']
+    assert not found['contacts']
 
 
-def test_friction_is_found_in_motion() -> None:
-    """3 N m against the motion, whatever its speed, both ways; and F says that it moves."""
-    found = check(swinging(lambda torque, rate, at: torque + 3.0 * np.sign(rate) + noise(at)))
-    joint = found['joints']['lift']
-    # All motion is at one speed, so that Coulomb and viscous friction cannot be told apart.
-    assert joint['friction'] is None
-    assert joint['f_test']['f'] > joint['f_test']['critical']
-    assert joint['f_test']['rms_motion'] == pytest.approx(3.0, abs=0.1)
-    assert not joint['f_test']['static_model_holds']
+def test_motion_that_uses_up_the_margin_matters() -> None:
+    """3 N m more error in motion matter where 5 N m are left of 45, and not where 20 are of 60."""
+
+    def moving(limit: float) -> Any:
+        told = replace(TOLD, limits=Limits((limit, 300.0)))
+        evaluator, found = RecordedEvaluator(told), ModelCheck(told)
+        evaluator.start(T0)
+        run = swinging(lambda torque, rate, at: torque + 3.0 * np.sign(rate) + noise(at))
+        found.add(evaluator.batch(batch_of(run)))
+        result: Any = found.statement(T0, T0).result['model_check']
+        return result['joints']['lift']
+
+    for limit, matters in ((45.0, True), (60.0, False), (np.inf, None)):
+        joint = moving(limit)
+        # All motion is at one speed, so that Coulomb and viscous friction cannot be told apart.
+        assert joint['friction'] is None
+        assert joint['f_test']['f'] > joint['f_test']['critical']
+        assert joint['f_test']['added'] == pytest.approx(3.0, abs=0.1)
+        assert joint['f_test']['matters'] is matters
 
 
 def test_without_friction_motion_differs_no_more_than_rest() -> None:
     """The same noise everywhere: F stays below its critical value."""
     joint = check(swinging(lambda torque, _, at: torque + noise(at)))['joints']['lift']
     assert joint['f_test']['f'] < joint['f_test']['critical']
-    assert joint['f_test']['static_model_holds']
+    assert joint['f_test']['matters'] is False
 
 
 @pytest.mark.parametrize(
     ('effort', 'words'),
-    [(lambda *_: np.nan, 'not recorded'), (lambda *_: 5.0, 'constant at 5')],
-)
+    [
+        (lambda *_: np.nan, 'none'), (lambda *_: 0.0, 'none'), (lambda *_: 5e-310, 'none'),
+        (lambda *_: 5.0, 'constant'),
+    ],
+)  # fmt: skip
 def test_an_effort_that_says_nothing_is_told_so(effort: Effort, words: str) -> None:
-    """Missing and constant efforts give no number, and the result says so."""
-    assert check(swinging(effort))['joints']['lift'] == {'effort': words}
+    """Missing, zero and constant efforts give no number, and are told as not checked."""
+    statement = stated(swinging(effort))
+    found: Any = statement.result['model_check']
+    assert found['joints']['lift']['meaning'] == words
+    assert 'bias' not in found['joints']['lift']
+    assert (found['loads'], found['contacts'], statement.objections) == ([], [], ())
+    assert 'measured effort of lift' in ' '.join(one.what for one in statement.not_checked)
 
 
 def test_a_clipped_effort_does_not_count() -> None:
@@ -157,10 +202,11 @@ def test_a_long_run_keeps_a_bounded_number_of_samples() -> None:
         check_of.add(rows)
         if not start:
             short.add(rows)
-    found = check_of.result()
+    found: Any = check_of.statement(T0, T0).result['model_check']
     assert MOST_SAMPLES / 2 <= found['samples'] <= MOST_SAMPLES
     assert found['samples'] * found['spacing_s'] == pytest.approx(9000.0, rel=0.01)
-    assert found['joints'] == short.result()['joints']
+    other: Any = short.statement(T0, T0).result['model_check']
+    assert found['joints'] == other['joints']
 
 
 def test_least_squares_gives_the_line_and_interval_of_scipy() -> None:

@@ -11,14 +11,10 @@ from evaluation.margin_rows import rows
 from evaluation.streams import settings
 from scipy import stats
 
-from ugv_acceptance.evaluation.effort import model_check as comparison
-from ugv_acceptance.evaluation.effort.model_check import (
-    LEAST,
-    Fit,
-    ModelCheck,
-    _Samples,
-    independent_samples,
-)
+from ugv_acceptance.evaluation.effort import joint_check as comparison
+from ugv_acceptance.evaluation.effort.joint_check import LEAST, JointSamples
+from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.effort.regression import Fit, independent_samples
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.type_aliases import Floats
@@ -29,22 +25,22 @@ def samples(
     effort: Callable[[Floats, Floats], Floats],
     *,
     moving: int = 0,
-    torque_gradient: float = 2.0,
-) -> _Samples:
+    margin: float = 20.0,
+) -> JointSamples:
     """Return samples of one joint: `moving` of them at rates of both signs, the others at rest."""
     rng = np.random.default_rng(count)
     torque = rng.uniform(-10.0, 10.0, count)
     rate = np.zeros(count)
     rate[:moving] = rng.uniform(0.1, 1.0, moving) * np.where(np.arange(moving) % 2, 1.0, -1.0)
-    return _Samples(
-        effort(torque, rate), torque, np.full(count, torque_gradient), rate,
+    return JointSamples(
+        effort(torque, rate), torque, rate, np.full(count, margin),
         np.zeros(count, np.bool_), rate == 0.0,
     )  # fmt: skip
 
 
 def test_friction_is_told_apart_by_speed() -> None:
     """1.5 N m against any motion and 0.7 N m s/rad more, of a bias that is neither."""
-    found = comparison._friction(
+    found = comparison.friction(
         samples(80, lambda t, r: t + 1.5 * np.sign(r) + 0.7 * r + 2.0, moving=60)
     )['friction']
     assert found['coulomb']['value'] == pytest.approx(1.5)
@@ -55,11 +51,11 @@ def test_friction_is_told_apart_by_speed() -> None:
 def test_friction_needs_thirty_samples_both_ways(moving: int, told: bool) -> None:  # noqa: FBT001
     """Friction is estimated only from thirty samples in either direction."""
     both = samples(80, lambda t, r: t + np.sign(r), moving=moving)
-    found = comparison._friction(both)
+    found = comparison.friction(both)
     assert (found['friction'] is not None) == told
     assert found['friction_unknown'] == ('' if told else 'too little motion')
     for sign in (1.0, -1.0):
-        one = comparison._friction(replace(both, rate=sign * np.abs(both.rate)))
+        one = comparison.friction(replace(both, rate=sign * np.abs(both.rate)))
         assert one['friction'] is None
         assert not told or one['friction_unknown'] == 'motion in one direction or at one speed'
 
@@ -72,7 +68,7 @@ def test_a_force_that_drives_the_motion_is_no_friction(
     """Friction takes power; what gives it, beyond its interval, has another cause: no number."""
     rng = np.random.default_rng(3)
     noise = rng.normal(0.0, 0.1, 80)
-    found = comparison._friction(
+    found = comparison.friction(
         samples(80, lambda t, r: t + sign * (coulomb * np.sign(r) + viscous * r) + noise, moving=60)
     )
     assert (found['friction'] is None) == (sign < 0.0)
@@ -80,50 +76,22 @@ def test_a_force_that_drives_the_motion_is_no_friction(
 
 
 @pytest.mark.parametrize(('count', 'told'), [(LEAST, True), (LEAST - 1, False)])
-def test_thirty_samples_at_rest_tell_of_bias_scale_and_payload(count: int, told: bool) -> None:  # noqa: FBT001
-    """Effort = 0.8 torque + 3: bias, root mean square and payload by their definitions."""
+def test_thirty_samples_at_rest_tell_of_bias_and_scale(count: int, told: bool) -> None:  # noqa: FBT001
+    """Effort = 0.8 torque + 3: bias, root mean square and scale by their definitions."""
     s = samples(count, lambda t, _: 0.8 * t + 3.0)
-    found, difference = comparison._rest(s), s.effort - s.torque
+    found, difference = comparison.at_rest(s), s.measured - s.torque
     assert (found['bias'] is not None) == told
-    assert (comparison._pooled_payload([s]) is not None) == told
     if told:
         assert found['bias']['value'] == pytest.approx(difference.mean())
         assert found['rms'] == pytest.approx(np.sqrt((difference**2).mean()))
         assert found['scale']['value'] == pytest.approx(0.8)
-        assert found['payload_kg']['value'] == pytest.approx(difference.mean() / 2.0)
-        assert found['sign'] == 'same'
-
-
-@pytest.mark.parametrize(('torque_gradient', 'told'), [(0.51, True), (0.5, False), (-0.51, True)])
-def test_a_joint_that_feels_half_a_newton_metre_a_kg_weighs(
-    torque_gradient: float,
-    told: bool,  # noqa: FBT001
-) -> None:
-    """Less leverage tells nothing of a payload."""
-    s = samples(50, lambda t, _: t + 1.0, torque_gradient=torque_gradient)
-    assert (comparison._rest(s)['payload_kg'] is not None) == told
-    assert (comparison._pooled_payload([s]) is not None) == told
-
-
-def test_joints_weigh_together_by_how_even_they_are() -> None:
-    """Least squares of all, each divided by its own scatter."""
-    rng = np.random.default_rng(8)
-    noisy = samples(60, lambda t, _: t + 1.0 + rng.normal(0.0, 1.0, len(t)))
-    even = samples(70, lambda t, _: t + 3.0 + rng.normal(0.0, 0.1, len(t)), torque_gradient=3.0)
-    found = comparison._pooled_payload([noisy, even])
-    assert found is not None
-    parts = [(s.torque_gradient / s.difference.std(), s.difference / s.difference.std())
-             for s in (noisy, even)]  # fmt: skip
-    x, y = (np.concatenate(part) for part in zip(*parts, strict=True))
-    assert found['value'] == pytest.approx(float(x @ y / (x @ x)))
-    assert found['low'] + found['high'] == pytest.approx(2.0 * found['value'])
 
 
 def test_f_is_that_of_the_mean_squares() -> None:
     """Sum of squares over n - 1, motion over rest; the critical value is scipy's."""
     rng = np.random.default_rng(9)
     s = samples(200, lambda t, r: t + rng.normal(0.0, np.where(r == 0.0, 1.0, 1.4)), moving=90)
-    found = comparison._f_test(s)
+    found = comparison.in_motion(s)
     assert found is not None
     motion, rest = s.difference[:90], s.difference[90:]
     squares = (motion @ motion / 89, rest @ rest / 109)
@@ -133,29 +101,19 @@ def test_f_is_that_of_the_mean_squares() -> None:
     freedom = [independent_samples(x) - 1.0 for x in (motion, rest)]
     assert found['freedom'] == pytest.approx(freedom)
     assert found['critical'] == pytest.approx(stats.f.ppf(0.95, *freedom))
-    assert found['static_model_holds'] == (found['f'] < found['critical'])
+    added = math.sqrt(max(squares[0] - squares[1], 0.0))
+    assert found['added'] == pytest.approx(added)
+    assert found['margin'] == 20.0
+    assert found['matters'] is (2.0 * added > 20.0)
 
 
 @pytest.mark.parametrize(('moving', 'rest', 'told'), [(30, 30, True), (29, 30, False), (30, 29, False)])  # fmt: skip # noqa: E501
 def test_f_needs_thirty_samples_of_each(moving: int, rest: int, told: bool) -> None:  # noqa: FBT001
     """F needs thirty samples in motion and at rest, and some error at rest."""
     s = samples(moving + rest, lambda t, _: t + 0.1 * np.sin(t), moving=moving)
-    assert (comparison._f_test(s) is not None) == told
+    assert (comparison.in_motion(s) is not None) == told
     perfect = samples(moving + rest, lambda t, _: t, moving=moving)
-    assert comparison._f_test(perfect) is None
-
-
-def test_what_an_effort_says_of_itself() -> None:
-    """None, too few, one constant number, or counts of what was used."""
-    nothing = samples(40, lambda t, _: np.full(len(t), np.nan))
-    assert comparison._joint(nothing) == {'effort': 'not recorded'}
-    assert comparison._joint(samples(29, lambda t, _: t)) == {'effort': 'too few samples'}
-    assert comparison._joint(samples(30, lambda t, _: t))['effort'] == 'recorded'
-    still = samples(40, lambda t, _: np.full(len(t), 2.5))
-    assert comparison._joint(still) == {'effort': 'constant at 2.5'}
-    told = comparison._joint(samples(100, lambda t, _: t + 0.1, moving=40))
-    counts = [told[key] for key in ('clipped_samples', 'rest_samples', 'motion_samples')]
-    assert counts == [0, 60, 40]
+    assert comparison.in_motion(perfect) is None
 
 
 @pytest.mark.parametrize(('rate', 'motion'), [(0.05, 0), (0.051, 50), (-0.051, 50), (math.nan, 0)])
@@ -165,73 +123,54 @@ def test_motion_is_faster_than_a_twentieth(rate: float, motion: int) -> None:
     assert s.motion().sum() == motion
 
 
-def still(effort: Floats, torque: Floats, torque_gradient: float = 2.0) -> _Samples:
+def still(effort: Floats, torque: Floats) -> JointSamples:
     """Return samples of a joint at rest."""
     n, no = len(effort), np.zeros(len(effort), np.bool_)
-    return _Samples(effort, torque, np.full(n, torque_gradient), np.zeros(n), no, ~no)
+    return JointSamples(effort, torque, np.zeros(n), np.full(n, 20.0), no, ~no)
+
+
+@pytest.mark.parametrize(
+    ('margin', 'matters'), [(20.0, False), (2.0, True), (-1.0, True), (math.inf, None)]
+)
+def test_an_error_in_motion_matters_by_the_margin_it_could_use_up(
+    margin: float, *, matters: bool | None
+) -> None:
+    """1.5 N m more in motion: twice that in 95 % of the samples; without a limit nobody judges."""
+    s = samples(
+        200, lambda t, r: t + 0.1 * np.sin(9.0 * t) + 1.5 * np.sign(r), moving=90, margin=margin
+    )
+    found = comparison.in_motion(s)
+    assert found is not None
+    assert found['added'] == pytest.approx(1.5, abs=0.05)
+    assert found['f'] > found['critical']
+    assert found['matters'] is matters
+    assert found['margin'] == (None if margin == math.inf else margin)
 
 
 @pytest.mark.parametrize(('half', 'told'), [(0.5, False), (0.501, True)])
 def test_a_scale_needs_torques_that_differ_by_half_a_newton_metre(half: float, told: bool) -> None:  # noqa: FBT001
     """Standard deviation: that of +- half is half; a bias can be told without."""
     torque = np.tile((half, -half), 20)
-    found = comparison._rest(still(0.5 * torque + np.arange(40) % 3, torque))
+    found = comparison.at_rest(still(0.5 * torque + np.arange(40) % 3, torque))
     assert (found['scale'] is not None) is told
     assert found['bias'] is not None
-    assert found['sign'] == 'unknown' or told
-
-
-@pytest.mark.parametrize(
-    ('value', 'half', 'sign'),
-    [
-        (0.5, 0.4, 'same'), (-0.5, 0.4, 'opposite'), (0.5, 0.5, 'unknown'), (-0.4, 0.5, 'unknown'),
-    ],
-)  # fmt: skip
-def test_a_sign_is_told_where_zero_is_outside_the_interval(
-    value: float, half: float, sign: str
-) -> None:
-    """A wrong sign is told only if the scale's whole interval is below zero."""
-    assert comparison._sign(Fit(np.array((value, 0.0)), np.array((half, 9.0)), 9.0)) == sign
-    assert comparison._sign(Fit(np.array((value, 0.0)), np.array((half, 0.0)), 9.0)) == sign
-    assert comparison._sign(None) == 'unknown'
 
 
 def test_an_interval_is_of_one_coefficient() -> None:
     """An interval is that of one coefficient; without a finite one it is None."""
     fit = Fit(np.array((2.0, 5.0, math.nan)), np.array((0.5, 1.0, 1.0)), 9.0)
-    assert comparison._interval(fit) == {'value': 2.0, 'low': 1.5, 'high': 2.5}
-    assert comparison._interval(fit, 1) == {'value': 5.0, 'low': 4.0, 'high': 6.0}
-    assert comparison._interval(fit, 2) is None
-    assert comparison._interval(None) is None
+    assert comparison.interval(fit) == {'value': 2.0, 'low': 1.5, 'high': 2.5}
+    assert comparison.interval(fit, 1) == {'value': 5.0, 'low': 4.0, 'high': 6.0}
+    assert comparison.interval(fit, 2) is None
+    assert comparison.interval(None) is None
     endless = Fit(np.array((2.0,)), np.array((math.inf,)), 9.0)
-    assert comparison._interval(endless) is None
-
-
-def test_a_joint_without_any_scatter_decides_about_the_payload() -> None:
-    """Its difference is 4 N m for a lever of 2; the other one's is about 9 N m."""
-    exact = still(np.full(40, 4.0), np.zeros(40))
-    noisy = still(9.0 + np.tile((0.5, -0.5), 20), np.zeros(40))
-    for joints in ([exact, noisy], [noisy, exact]):
-        found = comparison._pooled_payload(joints)
-        assert found is not None
-        assert found['value'] == pytest.approx(2.0, abs=1e-6)
-
-
-def test_joints_that_do_not_weigh_do_not_count() -> None:
-    """Joints with too few samples or too little leverage do not enter the payload's estimate."""
-    good, few, light = (
-        still(np.full(n, 4.0), np.zeros(n), torque_gradient)
-        for n, torque_gradient in ((40, 2.0), (29, 1.0), (40, 0.1))
-    )
-    alone, together = (comparison._pooled_payload(x) for x in ([good], [few, good, light]))
-    assert alone is not None
-    assert alone == together
+    assert comparison.interval(endless) is None
 
 
 def test_f_has_one_degree_of_freedom_at_least() -> None:
     """F uses at least one degree of freedom, also for samples that all resemble each other."""
     s = samples(60, lambda t, _: t + np.linspace(1.0, 2.0, 60), moving=30)
-    found = comparison._f_test(s)
+    found = comparison.in_motion(s)
     assert found is not None
     assert independent_samples(s.difference[:30]) < 2.0
     assert found['freedom'] == [1.0, 1.0]
@@ -256,7 +195,8 @@ def checked(told: MarginRows, limits: Limits | None = None) -> Any:
     """Return the comparison of rows."""
     check = ModelCheck(replace(TOLD, limits=limits or TOLD.limits))
     check.add(told)
-    return check.result()
+    result: Any = check.statement(0, 0).result['model_check']
+    return result
 
 
 EFFORTS = np.arange(40.0) % 11
@@ -314,12 +254,9 @@ def test_samples_are_a_tenth_of_a_second_apart() -> None:
     """Of 40 rows 50 ms apart every second one is taken; without rows there is nothing."""
     found = checked(run(apart=0.05))
     assert (found['samples'], found['spacing_s']) == (20, 0.1)
-    empty = ModelCheck(TOLD).result()
-    assert (empty['samples'], empty['payload']) == (0, None)
-    assert empty['joints'] == {
-        'lift': {'effort': 'not recorded'},
-        'slide': {'effort': 'not recorded'},
-    }
+    empty: Any = ModelCheck(TOLD).statement(0, 0).result['model_check']
+    assert (empty['samples'], empty['loads'], empty['postures']) == (0, [], 0)
+    assert [joint['meaning'] for joint in empty['joints'].values()] == ['unknown'] * 2
 
 
 def test_a_robot_that_has_tipped_is_not_compared() -> None:
@@ -328,13 +265,3 @@ def test_a_robot_that_has_tipped_is_not_compared() -> None:
     angle = told.angle.copy()
     angle[10:15, 2] = 0.0
     assert checked(replace(told, angle=angle))['samples'] == 35
-
-
-def test_a_kilogram_is_weighed_by_its_lever() -> None:
-    """Level: 9.81 N/kg at 1.1 m; 0.5 kg that nobody declared."""
-    told = run(effort=10.0 + np.arange(40) % 7 + 0.5 * 9.81 * 1.1 + np.tile((0.1, -0.1), 20))
-    level = np.broadcast_to((0.0, 0.0, -9.81), (40, 3))
-    told = replace(told, pairs=replace(told.pairs, imu=replace(told.pairs.imu, gravity=level)))
-    found = checked(told)
-    for payload in (found['payload'], found['joints']['lift']['payload_kg']):
-        assert payload['value'] == pytest.approx(0.5, abs=1e-9)

@@ -12,7 +12,6 @@ from ugv_acceptance.evaluation.effort.plateaus import (
     EffortComparison,
     Plateau,
     _split,
-    opposed_joints,
 )
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.settings import JointInput, Limits
@@ -57,7 +56,6 @@ def test_a_plateau_is_where_the_effort_stands() -> None:
     for found in (first, second):
         assert found.model == pytest.approx(LEVEL_TORQUE)
         assert found.slope == pytest.approx(LEVEL_SLOPE)
-        assert found.payload == pytest.approx((found.measured - LEVEL_TORQUE) / LEVEL_SLOPE)
         assert not found.saturated
     assert (first.start - T0) / S == pytest.approx(0.0, abs=0.051)
     assert (first.end - T0) / S == pytest.approx(5.0, abs=0.11)
@@ -93,17 +91,9 @@ def test_a_joint_in_motion_is_not_compared(rate: float, count: int) -> None:
 
 @pytest.mark.parametrize(('effort', 'saturated'), [(39.9, False), (39.97, True), (-39.97, True)])
 def test_an_effort_at_the_joints_limit_does_not_weigh(effort: float, saturated: bool) -> None:  # noqa: FBT001
-    """The lift's motor gives 40 N m; there nothing can be said of a payload."""
+    """The lift's motor gives 40 N m."""
     (found,) = plateaus([(5.0, 0.0, effort)])
     assert found.saturated == saturated
-    assert (found.payload is None) == saturated
-
-
-def test_an_upright_arm_does_not_weigh() -> None:
-    """A plateau of an upright arm, which feels no load, gives no payload."""
-    (found,) = plateaus([(5.0, 0.0, 5.0)], q=math.pi / 2)
-    assert found.slope == pytest.approx(0.0, abs=1e-9)
-    assert found.payload is None
 
 
 @pytest.mark.parametrize(('level', 'saturated'), [(9.0, False), (11.0, True)])
@@ -136,7 +126,6 @@ def test_the_result_names_each_joint_its_unit_and_difference() -> None:
     (lift,), (slide,) = found['lift'], found['slide']
     assert (lift['unit'], slide['unit']) == ('N m', 'N')
     assert lift['difference'] == pytest.approx(20.0 - LEVEL_TORQUE)
-    assert lift['payload_kg_that_explains_it'] == pytest.approx(lift['difference'] / LEVEL_SLOPE)
     assert lift['effort_per_kg'] == pytest.approx(LEVEL_SLOPE)
     assert lift['start_s'] == pytest.approx(0.0, abs=0.051)
     assert lift['end_s'] == pytest.approx(5.0, abs=0.06)
@@ -151,53 +140,6 @@ def test_a_plateau_is_split_at_whole_seconds_of_its_run() -> None:
     assert list(_split(time[:0], effort[:0])) == []
     assert list(_split(time[:29], effort[:29])) == [slice(0, 29)]
     assert list(_split(time[:20], effort[:20])) == []
-
-
-@pytest.mark.parametrize(
-    ('rate', 'effort', 'named'),
-    [
-        (0.0, -LEVEL_TORQUE, True),
-        (math.nan, -0.6 * LEVEL_TORQUE, True),
-        (0.0, LEVEL_TORQUE, False),
-        (0.0, -0.3 * LEVEL_TORQUE, False),
-        (0.0, -1.7 * LEVEL_TORQUE, False),
-        (0.0, math.nan, False),
-        (0.5, -LEVEL_TORQUE, False),
-    ],
-)
-def test_an_effort_of_the_other_sign_is_named(rate: float, effort: float, named: bool) -> None:  # noqa: FBT001
-    """At rest, about as large as what the load needs, and against it; the slide tells nothing."""
-    torque = (LEVEL_TORQUE, 1.0)
-    found = opposed_joints(TOLD, torque, (rate, 0.0), (effort, -1.0))
-    assert found == (['lift'] if named else [])
-
-
-@pytest.mark.parametrize(
-    ('torque', 'rate', 'effort', 'named'),
-    [
-        (4.5, 0.0, -4.5, True),  # a tenth of 45 N m
-        (4.49, 0.0, -4.49, False),
-        (-4.5, 0.0, 4.5, True),
-        (8.0, 0.02, -8.0, True),
-        (8.0, -0.02, -8.0, True),
-        (8.0, 0.021, -8.0, False),
-        (8.0, -0.021, -8.0, False),
-        (8.0, 0.0, -4.0, True),  # half of it is alike
-        (8.0, 0.0, -12.0, True),
-        (8.0, 0.0, -3.99, False),
-        (8.0, 0.0, -12.01, False),
-        (math.nan, 0.0, -8.0, False),
-    ],
-)
-def test_the_bounds_of_an_effort_of_the_other_sign(
-    torque: float,
-    rate: float,
-    effort: float,
-    named: bool,  # noqa: FBT001
-) -> None:
-    """A tenth of the limit tells, 0.02 rad/s is rest, half of the load is alike."""
-    found = opposed_joints(TOLD, (torque, 0.0), (rate, 0.0), (effort, 0.0))
-    assert found == (['lift'] if named else [])
 
 
 def saturated(
@@ -243,15 +185,6 @@ def test_a_quarter_of_the_samples_at_the_largest_effort_is_a_limit(
     effort = np.full(40, 20.0)
     effort[:count] = np.tile((21.0, -21.0), 20)[:count]
     assert EffortComparison(TOLD)._saturated(0, effort, 0.0, 21.0) is clipped
-
-
-@pytest.mark.parametrize(('slope', 'weighs'), [(1.01, True), (0.99, False)])
-def test_a_joint_that_feels_a_newton_metre_a_kg_weighs(slope: float, weighs: bool) -> None:  # noqa: FBT001
-    """A plateau gives a payload only if a kg changes the joint's torque by 1 N m."""
-    for sign in (1.0, -1.0):
-        (found,) = plateaus([(5.0, 0.0, 5.0)], q=math.acos(sign * slope / LEVEL_SLOPE))
-        assert found.slope == pytest.approx(sign * slope)
-        assert (found.payload is not None) is weighs
 
 
 def test_a_result_counts_seconds_from_the_start() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from ugv_acceptance.evaluation.effort.model_check import independent_samples, least_squares
+from ugv_acceptance.evaluation.effort.regression import independent_samples, least_squares
 from ugv_acceptance.type_aliases import Floats
 
 

@@ -19,10 +19,8 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.messages import demand_words
-from ugv_acceptance.evaluation.effort.plateaus import payload_estimate
-from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_from
+from ugv_acceptance.evaluation.inputs.payload import PayloadHistory, payload_fault, payload_from
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.statics import static_torque
 
 TOLD = settings()
 DOWN = (0.0, 0.0, -9.81)
@@ -91,10 +89,30 @@ def test_only_a_load_that_can_be_is_taken(
     assert found == (Payload(mass, com) if known else None)
 
 
+@pytest.mark.parametrize('frame', ['hand', '/hand', 'ra/hand', '/ra/hand', 'a/b/hand', ''])
+def test_a_tf_prefix_makes_no_other_frame(frame: str) -> None:
+    """A namespace before the payload link's name, or no frame at all, is that link."""
+    assert payload_from(TOLD.robot, 1.0, (0.0, 0.0, 0.0), frame) == Payload(1.0)
+
+
+@pytest.mark.parametrize('frame', ['hand2', 'left_hand', 'hand/base', 'base', 'ra/', ' hand'])
+def test_what_only_looks_like_the_frame_is_another(frame: str) -> None:
+    """A frame whose last part is not the payload link's name is another frame."""
+    assert payload_from(TOLD.robot, 1.0, (0.0, 0.0, 0.0), frame) is None
+
+
 def test_a_robot_without_a_hand_carries_nothing() -> None:
-    """A robot without a payload link takes no payload, whatever the frame."""
+    """A robot without a payload link takes no payload but 0 kg, whatever the frame."""
     robot = Robot('r', TOLD.robot.links[:1], (), ())
     assert payload_from(robot, 1.0, (0.0, 0.0, 0.0), '') is None
+    assert payload_from(robot, 0.0, (0.0, 0.0, 0.0), 'hand') == Payload()
+
+
+def test_a_long_frame_is_told_in_one_short_line() -> None:
+    """A frame of any length or letters stays one readable line in an alert."""
+    words = payload_fault(TOLD.robot, 1.0, (0.0, 0.0, 0.0), 'x\n' * 500)
+    assert words.isprintable()
+    assert len(words) < 200
 
 
 @given(st.lists(st.integers(0, 50), max_size=6), st.lists(st.integers(0, 50), min_size=1))
@@ -111,55 +129,3 @@ def test_a_load_is_in_force_from_its_moment_on(declared: list[int], asked: list[
             mass = history.at(np.array(part, np.int64))[0]
             found += np.broadcast_to(np.asarray(mass), len(part)).tolist()
     assert found == expected
-
-
-def weighed(effort: float, *, declared: float = 1.0, rate: float = 0.0, q: float = 0.0) -> Any:
-    """Return what the motors say where the lift gives an effort (N m)."""
-    load = Payload(declared, (0.1, 0.0, 0.0))
-    return payload_estimate(
-        TOLD, (q, 0.0), (rate, math.nan), (effort, math.nan), DOWN, load
-    )  # fmt: skip
-
-
-def need(mass: float, q: float = 0.0) -> float:
-    """Return the effort (N m) of the lift with a load."""
-    return float(static_torque(TOLD.robot, (q, 0.0), DOWN, Payload(mass, (0.1, 0.0, 0.0)))[0])
-
-
-@pytest.mark.parametrize(
-    ('mass', 'differs'), [(1.0, False), (1.49, False), (1.51, True), (3.0, True), (0.4, True)]
-)
-def test_the_motors_weigh_the_load(mass: float, differs: bool) -> None:  # noqa: FBT001
-    """The efforts estimate the payload by leverage; half a kg off the declared one is told."""
-    found = weighed(need(mass))
-    assert found.mass == pytest.approx(mass)
-    assert found.declared == 1.0
-    assert found.differs == differs
-    assert f'suggest a payload of {mass:.1f} kg, but 1.0 kg is declared' in found.sentence
-
-
-def test_less_than_nothing_is_told_as_nothing() -> None:
-    """A slightly negative estimate is a payload of 0; a large one means that the arm leans."""
-    assert 'a payload of 0.0 kg' in weighed(need(0.0) - 0.4 * LIFT).sentence
-    assert weighed(need(0.0) - 0.6 * LIFT) is None
-
-
-def test_a_robot_that_moves_or_tells_nothing_is_not_weighed() -> None:
-    """No payload is estimated in motion, without effort, or with an upright arm."""
-    assert weighed(need(2.0), rate=0.02) is not None
-    assert weighed(need(2.0), rate=0.021) is None
-    assert weighed(math.nan) is None
-    assert weighed(5.0, q=math.pi / 2) is None
-    steep, steeper = math.acos(1.05 / LIFT), math.acos(0.95 / LIFT)
-    assert weighed(need(2.0, steep), q=steep) is not None
-    assert weighed(need(2.0, steeper), q=steeper) is None
-
-
-@pytest.mark.parametrize(('off', 'known'), [(5.0, True), (15.0, False)])
-def test_what_no_load_explains_is_no_load(off: float, known: bool) -> None:  # noqa: FBT001
-    """No payload is estimated where a prismatic joint's force cannot come from a load."""
-    load = Payload(1.0, (0.1, 0.0, 0.0))
-    told = payload_estimate(
-        TOLD, (0.0, 0.0), (0.0, 0.0), (need(1.0), off), DOWN, load
-    )  # fmt: skip
-    assert (told is not None) == known

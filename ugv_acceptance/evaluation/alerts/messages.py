@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
+from ugv_acceptance.evaluation.inputs.imu_motion import SLACK, SOURCE_KINDS
+from ugv_acceptance.evaluation.inputs.imu_placing import MOUNTING_KINDS, UNIT_KINDS
+from ugv_acceptance.evaluation.inputs.imu_rates import GYRO_KINDS, ORIENTATION_KINDS
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
@@ -143,7 +146,7 @@ ALERTS = {
         'The motor named saturates below its limit and cannot hold its posture.',
     ),
     'ENCODER_FROZEN': AlertText(
-        'the position of {subject} does not change at all while its effort does',
+        'the position of {subject} does not change while its effort does',
         'check its encoder; if that works, something blocks the joint or pulls on it',
         FailureSource.SENSOR,
         'The reported position of a joint does not change: check its encoder.',
@@ -191,22 +194,74 @@ ALERTS = {
         'The orientation of the IMU is wrong: the accelerometer is used instead.',
     ),
     'IMU_GRAVITY': AlertText(
-        'at rest the measured acceleration differs from gravity by {peak:.0%}',
+        'while it does not turn, the acceleration of {subject} differs from gravity by {peak:.0%}'
+        '{seems}',
         'check its unit (m/s2, not g), and that its driver does not subtract gravity',
         FailureSource.SENSOR,
         'The IMU does not measure gravity correctly: tilt cannot be trusted.',
     ),
     'IMU_INCONSISTENT': AlertText(
-        'orientation and acceleration of the IMU disagree by {degrees:.1f} degrees at rest',
+        'while the IMU does not turn, its orientation and acceleration disagree by {degrees:.1f} degrees',
         'check the IMU: its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
+    'IMU_NO_GRAVITY': AlertText(
+        'the tilt is unknown: {subject} gives no orientation that can be used, and its acceleration '
+        'differs from gravity by {peak:.0%}{seems}',
+        'use an IMU that gives an orientation; check the unit of the acceleration (m/s2, not g)',
+        FailureSource.SENSOR,
+        'Nothing tells the tilt now: no margin is known.',
+    ),
+    'IMU_FROZEN': AlertText(
+        'the values of {subject} kept changing, then stood still to the last digit for 1 s',
+        'check the IMU and its driver; of a simulator without noise say imu.noise_free: true',
+        FailureSource.SENSOR,
+        'The IMU repeats its last values: tilt is not known.',
+    ),
+    'IMU_CONTRADICTION': AlertText(
+        'averaged over {window:.0f} s, the acceleration of {subject} contradicts its orientation by '
+        '{degrees:.0f} degrees',
+        'check the IMU: its orientation may be stuck, drift, or have other axes; or its acceleration',
+        FailureSource.SENSOR,
+        'Orientation and acceleration of the IMU contradict each other: tilt cannot be trusted.',
+    ),
+    'IMU_RATES': AlertText(
+        'the rates of {subject} do not fit its orientation: {found}',
+        'correct the unit (rad/s) or the axes of the rates in its driver',
+        FailureSource.SENSOR,
+        'The gyro of the IMU is wrong by its unit or axes; it is not used.',
+    ),
+    'IMU_ROTATION': AlertText(
+        'rates and orientation of {subject} contradict each other: {found}',
+        'check the IMU: its orientation may be stuck or of another sensor; or its rates',
+        FailureSource.SENSOR,
+        'The orientation of the IMU does not turn as its rates say: tilt cannot be trusted.',
+    ),
+    'IMU_MOUNTING': AlertText(
+        'from the first message on {subject} leans by over 45 degrees, so it seems mounted otherwise '
+        'than configured: {found}',
+        'set imu.mounting_rpy_deg as named (its heading cannot be told), or let the driver send z up',
+        FailureSource.DESIGN,
+        'The IMU is mounted otherwise than configured, or its driver has other axes (z down).',
+    ),
+    'IMU_UNIT': AlertText(
+        'the acceleration of {subject} is not in m/s2: {found}',
+        'let its driver send m/s2 with gravity in it, as REP-145 says',
+        FailureSource.SENSOR,
+        'The acceleration of the IMU has another unit, or gravity is missing in it.',
+    ),
+    'IMU_TWO_SOURCES': AlertText(
+        'two sources publish as {subject}: {found}',
+        'stop all but one, or give each IMU a topic of its own',
+        FailureSource.CONTROL_SYSTEM,
+        'The messages of two IMUs are mixed: tilt cannot be trusted.',
+    ),
     'PAYLOAD_INVALID': AlertText(
-        'the declared payload cannot be used',
+        'the declared payload cannot be used: {detail}',
         'declare a mass of 0 kg or more, in the frame of the payload link',
         FailureSource.INTERACTION,
-        'The load that was declared cannot be used.',
+        'The load that was declared cannot be used: no margin is known until a good one comes.',
     ),
     'LIMITS_RELAXED': AlertText(
         '{relaxed}',
@@ -263,12 +318,33 @@ ALERTS = {
         FailureSource.INTERACTION,
         level=WARN,
     ),
+    'MARGIN_UNCERTAIN': AlertText(
+        '{detail}',
+        'treat this margin as used up: bring the load closer, lower the arm, face the slope',
+        FailureSource.INTERACTION,
+        level=WARN,
+    ),
     'MONITOR_FAULT': AlertText(
         'the monitor could not evaluate a message of {subject}: {detail}',
         'internal error of the program: report it with the log of the node',
         FailureSource.CONTROL_SYSTEM,
         level=ERROR,
     ),
+}
+# Sizes of an acceleration at rest, as shares of g, and what unit they suggest.
+SEEMS = (
+    (-1.0, 0.04, UNIT_KINDS[4]),
+    (0.04, 0.2, UNIT_KINDS[1]),
+    (2.5, 4.5, UNIT_KINDS[2]),
+    (70.0, 140.0, UNIT_KINDS[3]),
+)
+# What the numbers of kinds of the IMU's checks mean.
+FOUND = {
+    'IMU_RATES': GYRO_KINDS,
+    'IMU_ROTATION': ORIENTATION_KINDS,
+    'IMU_MOUNTING': MOUNTING_KINDS,
+    'IMU_UNIT': UNIT_KINDS,
+    'IMU_TWO_SOURCES': SOURCE_KINDS,
 }
 # The faults only a live node sees, with their levels; the other alerts a recording shows as well.
 LIVE = {code: text.level for code, text in ALERTS.items() if text.level is not None}
@@ -299,8 +375,26 @@ def describe(alert: Alert, settings: Settings) -> str:
         seconds=-rule.on,
         torque=_torque(rule.subject, settings),
         kind='warning limit' if rule.level == WARN else 'limit',
+        window=(rule.reach - SLACK) / 1e9,
+        found=_found(alert),
+        seems=_seems(alert),
         relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
+        detail=alert.detail,
     )
+
+
+def _found(alert: Alert) -> str:
+    """Return what a check of the IMU found, by the kind that is the alert's peak; '' if none."""
+    kinds = FOUND.get(alert.rule.code, ())
+    kind = int(alert.peak) if math.isfinite(alert.peak) else 0
+    return kinds[kind] if 0 <= kind < len(kinds) else ''
+
+
+def _seems(alert: Alert) -> str:
+    """Return the unit that an acceleration so far from gravity seems to have, '' if none."""
+    share = 1.0 - alert.peak if alert.peak <= 1.0 else 1.0 + alert.peak
+    found = [words for low, high, words in SEEMS if low <= share < high]
+    return f': {found[0]}' if found else ''
 
 
 def _relaxed(name: str, settings: Settings) -> str:

@@ -46,8 +46,10 @@ SOON, LATER = 1.0, 1.5
 # Slowest rates that count: tilt in rad/s, torque as a share of its limit per second.
 TILT_RATE, LOAD_RATE = 0.0175, 0.03
 # A weak motor: effort is constant to EVEN while the posture needs GROWN more (shares of the limit).
-# A frozen encoder: the position is bit-identical for STUCK looks while effort changes by CHANGED.
+# A frozen encoder: the position is bit-identical for STUCK looks while effort changes by CHANGED,
+# or stays within its noise (NOISE in rad or m over LAG looks) while effort changes by more, LEAPT.
 EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
+NOISE, LAG, LEAPT = 0.002, 4, 0.3
 # A motor is weak (1) or not (0).
 WEAK = 0.5
 # A constant effort may mean a weak motor between these shares of the limit.
@@ -84,7 +86,7 @@ class Prediction:
     def __post_init__(self) -> None:
         n = len(self.torque)
         self._looks = np.empty((0, len(SIDES) + 3 * n))
-        self._since = np.full((3, n), np.nan)
+        self._since = np.full((2, 2 * n), np.nan)
 
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
@@ -141,23 +143,41 @@ class Prediction:
     def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
         """Return how much effort (n, j) in N m (N) changed while each joint's position did not.
 
-        The change of the static torque is taken off; 0 until a position stood for STUCK looks.
-        `_since` holds looks, effort and torque at the last change of each position.
+        The change of the static torque is taken off; 0 until a position stood for STUCK looks, to
+        the last bit or but for noise; what changed in noise counts less. `_since` holds looks
+        and effort less torque at the last change of each position, for either kind.
         """
-        rows = np.arange(len(q))[:, None]
-        moved = np.ones(q.shape, np.bool_)
-        moved[1:] = q[1:] != q[:-1]
+        n = q.shape[1]
+        change = self._changed(old, np.hstack((effort - tau, effort - tau)), _moved(q))
+        found: Floats = np.maximum(change[:, :n], change[:, n:] * (CHANGED / LEAPT))
+        return found
+
+    def _changed(self, old: int, open_: Floats, moved: NDArray[np.bool_]) -> Floats:
+        """Return how much `open_` (n, m) changed since each column last `moved` (n, m)."""
+        rows = np.arange(len(moved))[:, None]
         if old:
             moved[:old] = False
         before = ~np.logical_or.accumulate(moved)
         at = np.maximum.accumulate(np.where(moved, rows, 0))
-        looks, effort_then, tau_then = self._since
+        looks, then = self._since
         looks = np.where(before, looks + rows - old + 1, rows - at)
-        effort_then = np.where(before, effort_then, np.take_along_axis(effort, at, 0))
-        tau_then = np.where(before, tau_then, np.take_along_axis(tau, at, 0))
-        self._since = np.array([looks[-1], effort_then[-1], tau_then[-1]])
-        change = np.abs((effort - effort_then) - (tau - tau_then))
-        return np.where(looks >= STUCK, change, 0.0)
+        then = np.where(before, then, np.take_along_axis(open_, at, 0))
+        self._since = np.array([looks[-1], then[-1]])
+        return np.where(looks >= STUCK, np.abs(open_ - then), 0.0)
+
+
+def _moved(q: Floats) -> NDArray[np.bool_]:
+    """Return (n, 2 j) whether each position changed by a bit; by more than its noise.
+
+    Over LAG looks, so that a slow motion counts.
+    """
+    moved = np.ones((len(q), 2 * q.shape[1]), np.bool_)
+    exact, noisy = moved[:, : q.shape[1]], moved[:, q.shape[1] :]
+    exact[1:] = q[1:] != q[:-1]
+    for k in range(1, min(LAG, len(q))):
+        noisy[k] = ~(np.abs(q[k] - q[0]) <= NOISE)
+    noisy[LAG:] = ~(np.abs(q[LAG:] - q[:-LAG]) <= NOISE)
+    return moved
 
 
 def _feed(signals: list[Signal], time: Times, values: Floats) -> None:

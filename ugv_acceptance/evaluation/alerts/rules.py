@@ -7,6 +7,7 @@ from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
 from ugv_acceptance.evaluation.chassis.motion import CALM, CAUTION, LIFT, LOW, ChassisSignals
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
+from ugv_acceptance.evaluation.inputs.imu_motion import MotionSignals
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.permitted_limits import names_of, relaxed
 from ugv_acceptance.evaluation.settings import Settings
@@ -20,6 +21,19 @@ STRANGE = 0.15
 MARGIN_BACK = 0.01745
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
 LEAP = 10.0
+# What confirms a fault of the IMU takes so long (s), and makes as much doubtful: identical values;
+# two windows of rates, two of the unit, one of two sources, each a second late at most.
+FROZEN, TURNED, UNIT, SOURCES = 1.0, 5.0, 4.0, 3.0
+
+
+def urgency(code: str, level: int) -> int:
+    """Return how urgent an alert is among those of its level: the larger, the sooner it is told.
+
+    What contradicts the IMU comes before a tip-over that was drawn from it, and that before others.
+    """
+    if code.startswith('IMU_') and level > WARN:
+        return 2
+    return 1 if code in ('TIP_OVER', 'NO_SUPPORT') else 0
 
 
 @dataclass(slots=True)
@@ -86,6 +100,12 @@ class RuleSet:
             for name, signal in self.relaxed.items():
                 signal.step(now, 1.0 if name in found else 0.0)
 
+    def declared(self, now: int, fault: str) -> None:
+        """Take a declared payload at `now` (ns); `fault` says why it cannot be used; '': it can."""
+        if fault:
+            self.payload.detail = fault
+        self.payload.step(now, 1.0 if fault else 0.0)
+
     def predict(self) -> None:
         """Judge the live samples kept for the prediction; call it before time passes."""
         self.prediction.judge(self.settings.limits.torque)
@@ -98,11 +118,20 @@ class RuleSet:
         return self._signal(code, subject, WARN, at, delay)
 
     def _signal(
-        self, code: str, subject: str, level: int, at: tuple[float, float], on_delay: float
+        self,
+        code: str,
+        subject: str,
+        level: int,
+        at: tuple[float, float],
+        on_delay: float,
+        reach: float = 0.0,
     ) -> Signal:
         delays = self.settings.delays
         off = int((delays.tip_off if code == 'TIP_OVER' else delays.off) * 1e9)
-        return Signal(Rule(code, subject, level, *at, int(on_delay * 1e9), off), self.log)
+        # A warning does not make margins doubtful.
+        back = int(reach * 1e9) if level > WARN else 0
+        rule = Rule(code, subject, level, *at, int(on_delay * 1e9), off, reach=back)
+        return Signal(rule, self.log)
 
     def _torque(self, joint: str, level: int, limit: float) -> Signal:
         at = (limit, limit - min(self.settings.limits.torque_deadband, limit / 2.0))
@@ -153,11 +182,36 @@ class RuleSet:
         apart = (imu.agreement, imu.agreement / 2)
         # With attitude 'orientation' this is a warning only: margins do not need the accelerometer.
         level = WARN if imu.attitude == 'orientation' and not imu.specific_force else ERROR
+        # Contradictions make doubtful what was believed while they were confirmed.
         return AttitudeSignals(
             self._fault('IMU_FRAME', 'imu', ERROR),
             self._fault('IMU_ORIENTATION', 'imu', WARN, delay),
-            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), delay),
-            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay),
+            self._signal('IMU_GRAVITY', 'imu', level, (STRANGE, STRANGE), delay, delay),
+            self._signal('IMU_INCONSISTENT', 'imu', ERROR, apart, delay, delay),
+            self._signal(
+                'IMU_NO_GRAVITY', 'imu', ERROR, (STRANGE, STRANGE), self.settings.delays.fault_on
+            ),
+            self._motion(level),
+        )
+
+    def _motion(self, force_level: int) -> MotionSignals:
+        """Return the signals of the checks in motion; their windows are their delays.
+
+        A check of a source that is not used is a warning only, as is one of the gyro alone.
+        """
+        turn_level = WARN if self.settings.imu.attitude == 'accelerometer' else ERROR
+
+        def kind(code: str, level: int, reach: float, on: float = 0.5) -> Signal:
+            return self._signal(code, 'imu', level, (on, on), 0.0, reach)
+
+        return MotionSignals(
+            frozen=kind('IMU_FROZEN', ERROR, FROZEN),
+            contradiction=kind('IMU_CONTRADICTION', turn_level, 0.0, 1e-6),
+            rates=kind('IMU_RATES', WARN, 0.0),
+            rotation=kind('IMU_ROTATION', turn_level, TURNED),
+            mounting=kind('IMU_MOUNTING', ERROR, 0.0),
+            unit=kind('IMU_UNIT', force_level, UNIT),
+            sources=kind('IMU_TWO_SOURCES', ERROR, SOURCES),
         )
 
     def _input(self, subject: str) -> 'InputSignals':
@@ -186,7 +240,9 @@ class RuleSet:
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
         inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock)]
         of = self.attitude
-        attitude = [of.frame, of.orientation, of.strange, of.disagreement]
+        attitude = [
+            of.frame, of.orientation, of.strange, of.disagreement, of.nothing, *of.motion.all()
+        ]  # fmt: skip
         faults = [self.support, self.payload, self.missing, *attitude]
         return [
             *pairs,

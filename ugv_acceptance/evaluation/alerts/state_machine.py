@@ -38,12 +38,16 @@ class Rule:
 
 @dataclass(slots=True)
 class Alert:
-    """An alert that was raised: times in ns; `peak` is the worst value; `end` None while active."""
+    """An alert that was raised: times in ns; `peak` is the worst value; `end` None while active.
+
+    `detail` says in words what the numbers do not: which value came, and which was expected.
+    """
 
     rule: Rule
     start: int
     peak: float
     end: int | None = None
+    detail: str = ''
 
 
 @dataclass(slots=True)
@@ -52,7 +56,8 @@ class Signal:
 
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
     when the state changes unless the value does first. While `quiet`, only a value of `on` or more
-    can change anything, so callers may skip smaller ones.
+    can change anything, so callers may skip smaller ones. `detail` is what an alert raised next
+    says in words.
     """
 
     rule: Rule
@@ -62,6 +67,7 @@ class Signal:
     due: int | None = None
     peak: float = field(default=-np.inf)
     quiet: bool = True
+    detail: str = ''
     on: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -112,7 +118,7 @@ class Signal:
         """Let time pass up to `now` (ns): raise or clear the alert if that has become due."""
         if self.due is not None and self.due <= now:
             if self.raw:
-                self.alert = Alert(self.rule, self.due, self.peak)
+                self.alert = Alert(self.rule, self.due, self.peak, detail=self.detail)
                 self.log.append(self.alert)
             elif self.alert is not None:
                 self.alert.end = self.due

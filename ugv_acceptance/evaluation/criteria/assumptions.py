@@ -11,6 +11,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
+from ugv_acceptance.evaluation.criteria.not_judged import not_judged
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.settings import Settings
@@ -34,7 +35,7 @@ def assumptions(
     found = [
         NotChecked('ground', 'it is taken as flat, firm, and reaching under every contact point'),
         *_load(settings, first_payload),
-        *_joints(settings),
+        *not_judged(settings),
         *_demands(measurement),
     ]
     if not sources:
@@ -47,13 +48,6 @@ def _load(settings: Settings, first: FirstPayload) -> Iterator[NotChecked]:
     if first is None and not settings.payload_known:
         mass = settings.robot.payload.mass
         yield NotChecked('load', f'none was told during the run; {mass:g} kg is taken for it')
-
-
-def _joints(settings: Settings) -> Iterator[NotChecked]:
-    names = zip(settings.robot.joint_names, settings.limits.torque, strict=True)
-    without = [name for name, limit in names if not math.isfinite(limit)]
-    if without:
-        yield NotChecked(f'torque of {", ".join(without)}', 'no limit in the configuration')
 
 
 def unknown_load(
@@ -71,7 +65,7 @@ def unknown_load(
 
 def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
     """Yield what a file of criteria demands in words only: criteria that cannot fail."""
-    criteria = measurement.criteria
+    criteria, settings = measurement.criteria, measurement.settings
     if criteria.path is None:
         return
     length = (measurement.end - measurement.start) / 1e9
@@ -81,11 +75,12 @@ def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
             yield NotChecked(f'criterion {criterion.name}', why)
     values = [c.demand for c in criteria.criteria if isinstance(c.demand, Value)]
     sides = {v.of for v in values if v.signal == 'tip_angle'}
-    if not sides:
+    if not sides and settings.hears_imu:
         yield NotChecked('degrees of tilt left', 'no criterion demands any')
     elif ANY not in sides and len(sides) < 4:
         yield NotChecked('degrees of tilt left', f'criteria demand them only to the {_of(sides)}')
-    if not any(v.signal in ('torque', 'torque_margin', 'torque_utilisation') for v in values):
+    of_torque = [v for v in values if v.signal.startswith('torque')]
+    if settings.hears_joints and not of_torque:
         yield NotChecked('margin of torques', 'no criterion demands any')
 
 

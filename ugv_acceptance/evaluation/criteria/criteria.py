@@ -152,16 +152,7 @@ def default_criteria(settings: Settings) -> CriteriaSet:
     ]
     criteria = (
         *torque,
-        Criterion(
-            'tip-over',
-            Value('tip_angle', ANY, below=False, limit=limits.tip_error),
-            'the tilt left before the robot tips stays above its limit',
-        ),
-        Criterion(
-            'support',
-            AlertDemand(raised=False, code='NO_SUPPORT', level='ERROR'),
-            'the robot has a support polygon under it',
-        ),
+        *(_standing(limits.tip_error) if settings.hears_imu else ()),
         Criterion(
             'coverage',
             DataDemand('coverage', least=LEAST_COVERAGE),
@@ -178,6 +169,22 @@ def default_criteria(settings: Settings) -> CriteriaSet:
     text = json.dumps([_plain(c) for c in criteria], sort_keys=True)
     sha256 = hashlib.sha256(text.encode()).hexdigest()
     return CriteriaSet('limits of the configuration', 1, criteria, sha256)
+
+
+def _standing(tip_error: float) -> tuple[Criterion, ...]:
+    """Return the criteria on how a robot stands, which only an IMU tells."""
+    return (
+        Criterion(
+            'tip-over',
+            Value('tip_angle', ANY, below=False, limit=tip_error),
+            'the tilt left before the robot tips stays above its limit',
+        ),
+        Criterion(
+            'support',
+            AlertDemand(raised=False, code='NO_SUPPORT', level='ERROR'),
+            'the robot has a support polygon under it',
+        ),
+    )
 
 
 def _plain(criterion: Criterion) -> dict[str, Any]:

@@ -113,6 +113,20 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
     return f'{words}{subject} was {number(worst.value, demand, settings)} {at}; {must} ({spent})'
 
 
+# Why a criterion on a value is not judged where there is none.
+NO_VALUE = 'no value could be computed'
+
+
+def no_value_once(reasons: Sequence[str]) -> list[str]:
+    """Return reasons in which criteria without any value share one sentence, at its first place."""
+    end = f': {NO_VALUE}'
+    without = [reason.removesuffix(end) for reason in reasons if reason.endswith(end)]
+    if len(without) < 2:
+        return list(reasons)
+    shared = f'{NO_VALUE} for {", ".join(without)}'
+    return list(dict.fromkeys(shared if reason.endswith(end) else reason for reason in reasons))
+
+
 def missing_reasons(alerts: Sequence[Alert], settings: Settings) -> list[str]:
     """Return why margins were missing: one sentence for each kind of input fault."""
     kinds = {(a.rule.code, a.rule.subject): a for a in alerts if a.rule.code not in FAILURES}

@@ -72,7 +72,7 @@ def safeguarded(
     found = [
         *_from_margins(data),
         *_unseen(criteria, data),
-        *_from_alerts(alerts, settings),
+        *_from_alerts(alerts, settings, {key for x in statements for key in x.unfounded}),
         *(objection for statement in statements for objection in statement.objections),
     ]
     reasons = dict(criteria.waive)
@@ -115,8 +115,10 @@ def _unseen(criteria: CriteriaSet, data: Json) -> Iterator[Objection]:
     yield Objection('unseen_stretches', INCONCLUSIVE, f'no margins from {named}{more}')
 
 
-def _from_alerts(alerts: Sequence[Alert], settings: Settings) -> Iterator[Objection]:
-    seen = set()
+def _from_alerts(
+    alerts: Sequence[Alert], settings: Settings, unfounded: set[tuple[str, str]]
+) -> Iterator[Objection]:
+    seen = set(unfounded)
     for alert in alerts:
         told = ALERT_OBJECTIONS.get(alert.rule.code)
         if told is None or (alert.rule.code, alert.rule.subject) in seen:

@@ -39,11 +39,16 @@ class NotChecked:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """What an examination found: its part of the `result` by key, objections, what is unchecked."""
+    """What an examination found: its part of the `result` by key, objections, what is unchecked.
+
+    `unfounded` are alerts (code, subject) that rest on what turned out to be no measurement: they
+    stay in the log, but are no objections.
+    """
 
     result: Mapping[str, object] = field(default_factory=dict)
     objections: tuple[Objection, ...] = ()
     not_checked: tuple[NotChecked, ...] = ()
+    unfounded: frozenset[tuple[str, str]] = frozenset()
 
 
 class Examination(Protocol):

@@ -94,6 +94,29 @@ def effects_of(
     return Effects(tuple(sources), table[:, :n], table[:, n:], position, limit, tilt)
 
 
+def torque_effects(
+    robot: Robot, sources: Sequence[Source], q: Floats, gravity: Floats, payload: Payload
+) -> Floats:
+    """Return the effect (s, P, j) of each source on the static torques in P postures (P, j).
+
+    `gravity` (P, 3) m/s2; N m (N). Sources of limits and contacts have none.
+    """
+    columns: Any = tuple(gravity.T)
+    point: Any = _Point(robot, tuple(q.T), columns, payload)
+    nominal = _torques(point, len(q))
+    found = np.zeros((len(sources), *nominal.shape))
+    for k, source in enumerate(sources):
+        if source.what != 'limit' and source.subject != CONTACTS:
+            found[k] = _torques(_moved(point, source, source.value), len(q)) - nominal
+    return found
+
+
+def _torques(point: _Point, count: int) -> Floats:
+    columns = torque_of(_posture(point), point.gravity)
+    table = [np.broadcast_to(column, count) for column in columns]
+    return np.array(table, dtype=np.float64).reshape(len(columns), count).T
+
+
 def combined(effects: Floats, method: str) -> Floats:
     """Return the combined bound (...) of effects (s, ...): root sum of squares, or sum."""
     size = np.abs(effects)
@@ -312,6 +335,7 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
 
 def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: Bounds) -> None:
     """Add the bound at the worst moment to each joint's and to the tip-over margin of `result`."""
+    result['stability']['uncertainty'] = None  # there is no demand on it without an IMU
     for measure in limits.measures.values():
         if not isinstance(measure, ValueMeasure):
             continue

@@ -30,10 +30,13 @@ from ugv_acceptance.evaluation.criteria.measurement import (
     ValueMeasure,
 )
 from ugv_acceptance.evaluation.criteria.messages import (
+    NO_VALUE,
     demand_words,
     missing_reasons,
+    no_value_once,
     violation_words,
 )
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.criteria.quantities import measured_of, shown, unit_of
 from ugv_acceptance.evaluation.criteria.safeguards import (
     Safeguarded,
@@ -122,7 +125,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     evidence = tuple(_related(measure, findings))
     short = short_of_data(measure.evaluated, criterion, findings)
     if not measure.samples:
-        return Outcome(INCONCLUSIVE, f'{criterion.name}: no value could be computed', measured)
+        return Outcome(INCONCLUSIVE, f'{criterion.name}: {NO_VALUE}', measured)
     if not _met(measure):
         if measure.demand.dwell is not None and short:
             return Outcome(INCONCLUSIVE, short, measured, evidence)
@@ -256,14 +259,18 @@ def _overall(
     for word in (FAIL, INCONCLUSIVE):
         of = [(c.demand, o.reason) for c, o in outcomes if o.verdict == word]
         values = [demand for demand, _ in of if isinstance(demand, Value)]
-        reasons = [*(reason for _, reason in of), *reasons_of(held, word, values)]
-        reasons = list(dict.fromkeys(reasons))
+        reasons = [*no_value_once([reason for _, reason in of]), *reasons_of(held, word, values)]
         if reasons and word == INCONCLUSIVE:
-            reasons += missing_reasons(findings.alerts, findings.settings)
+            # First what is wrong, then what could not be judged for it.
+            causes = missing_reasons(findings.alerts, findings.settings)
+            stated = [o.reason for s in findings.statements for o in s.objections]
+            reasons = [*(r for r in stated if r in reasons), *causes, *reasons]
         if reasons:
             return word, list(dict.fromkeys(reasons))
     share = findings.data['coverage']['fraction']
-    text = 'all margins kept' if findings.measurement.criteria.path is None else 'all criteria met'
+    text = 'all criteria met'
+    if findings.measurement.criteria.path is None:
+        text = kept_words(findings.settings)
     wider = relaxed_words(findings.settings)
     return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
 

@@ -1,6 +1,9 @@
-"""Compares measured effort with static torque while joints rest, and estimates the payload."""
+"""Lists what a joint's effort was while it rested, beside the static torque, for a person to read.
 
-from collections.abc import Iterator, Sequence
+It lists; what the numbers mean is said by model_check.py.
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -9,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.downsampling import Sampler
+from ugv_acceptance.evaluation.effort.model_errors import levers
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.type_aliases import Floats, Times
 
 # A joint slower than this (rad/s or m/s) is at rest; samples are taken this far apart (ns).
@@ -23,22 +25,16 @@ SPACING = 50_000_000
 BIN = 1_000_000_000
 STEP_SHARE = 0.05
 STEP_LEAST = 1.0
-# A joint with less torque per kg of payload than this (N m or N) does not determine the payload.
-SLOPE_LEAST = 1.0
 # An effort this close to a limit (as a share of it) is clipped there.
 CLIPPED = 0.999
-# The sign of an effort is checked if the static torque is at least this share of the limit; it is
-# opposite if effort and minus the torque differ by at most this share of the torque.
-TELLING, ALIKE = 0.1, 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Plateau:
     """A period at rest with constant effort: medians of measured effort and static torque (N m; N).
 
-    `start`, `end` in ns; `slope` is the torque per kg of payload (N m or N); `payload` (kg) would
-    explain the difference, None if the joint does not determine it. `saturated`: the effort was
-    clipped at a limit.
+    `start`, `end` in ns; `slope` is the torque per kg of payload (N m or N). `saturated`: the
+    effort was clipped at a limit.
     """
 
     start: int
@@ -46,7 +42,6 @@ class Plateau:
     measured: float
     model: float
     slope: float
-    payload: float | None
     saturated: bool
 
 
@@ -61,25 +56,6 @@ class _Held:
     def rows(self, rows: slice) -> '_Held':
         """Return the given samples."""
         return _Held(self.torque[rows], self.q[rows], self.gravity[rows])
-
-
-def opposed_joints(
-    settings: Settings, torque: Sequence[float], rates: Sequence[float], effort: Sequence[float]
-) -> list[str]:
-    """Return the joints at rest whose effort is about minus their static torque: a wrong sign.
-
-    `torque` and `effort` in N m (N), `rates` in rad/s (m/s); unknown rates or efforts are NaN.
-    """
-    joints = zip(
-        settings.robot.joint_names, settings.limits.torque, torque, rates, effort, strict=True
-    )
-    return [
-        name
-        for name, limit, tau, rate, measured in joints
-        if TELLING * limit <= abs(tau)
-        and not abs(rate) > REST
-        and abs(measured + tau) <= ALIKE * abs(tau)
-    ]
 
 
 @dataclass(slots=True)
@@ -110,14 +86,9 @@ class EffortComparison:
         """Return a plateau; `most` is the largest effort (N m; N) of the whole run."""
         measured, model = float(np.median(effort)), float(np.median(held.torque))
         q, gravity = np.median(held.q, axis=0), np.median(held.gravity, axis=0)
-        robot = self.settings.robot
-        cog = robot.payload.cog
-        loads = [static_torque(robot, q, gravity, Payload(m, cog))[j] for m in (0.0, 1.0)]
-        slope = float(loads[1] - loads[0])
+        slope = float(levers(self.settings.robot, q, gravity)[j])
         saturated = self._saturated(j, effort, model, most)
-        tells = abs(slope) >= SLOPE_LEAST and not saturated
-        payload = (measured - model) / slope if tells else None
-        return Plateau(int(time[0]), int(time[-1]), measured, model, slope, payload, saturated)
+        return Plateau(int(time[0]), int(time[-1]), measured, model, slope, saturated)
 
     def _saturated(self, j: int, effort: Floats, model: float, most: float) -> bool:
         """Return whether an effort stands at a known limit, or at the largest of the run."""
@@ -141,7 +112,6 @@ class EffortComparison:
                     'difference': p.measured - p.model,
                     'unit': self.settings.robot.joint(name).units.effort,
                     'effort_per_kg': p.slope,
-                    'payload_kg_that_explains_it': p.payload,
                     'saturated': p.saturated,
                 }
                 for p in self.plateaus(j)
@@ -165,67 +135,3 @@ def _split(time: NDArray[np.int64], effort: Floats) -> Iterator[slice]:
             if k - first >= 3:
                 yield slice(edges[first], edges[k])
             first = k
-
-
-# An estimate needs at least FELT torque per kg over all joints (N m/kg); a load that differs by
-# less than DIFFERS (kg) counts as the declared one; the estimate must explain the share EXPLAINED
-# of the difference.
-FELT, DIFFERS, EXPLAINED = 1.0, 0.5, 0.75
-
-
-@dataclass(frozen=True, slots=True)
-class PayloadEstimate:
-    """The payload `mass` (kg) that explains the measured efforts, and the declared one."""
-
-    mass: float
-    declared: float
-
-    @property
-    def differs(self) -> bool:
-        """Whether the estimate differs from the declared payload by at least DIFFERS."""
-        return abs(self.mass - self.declared) >= DIFFERS
-
-    @property
-    def sentence(self) -> str:
-        """The sentence for the operator."""
-        return (
-            f'measured efforts suggest a payload of {max(self.mass, 0.0):.1f} kg, '
-            f'but {self.declared:.1f} kg is declared'
-        )
-
-
-def payload_estimate(
-    settings: Settings,
-    q: Sequence[float],
-    qd: Sequence[float],
-    effort: Sequence[float],
-    gravity: Sequence[float],
-    payload: Payload,
-) -> PayloadEstimate | None:
-    """Return the payload that best explains the measured `effort` (j,): declared or another.
-
-    None while a joint moves, if no effort is known, if the posture does not determine it, or if no
-    payload explains the efforts. rad, rad/s, N m (N), m/s2.
-    """
-    measured, rates = np.array(effort, dtype=np.float64), np.nan_to_num(np.array(qd))
-    # Many drivers that measure no effort send zeros.
-    known = np.isfinite(measured) & (measured != 0.0)
-    known &= np.isfinite(np.array(settings.limits.torque))
-    if not known.any() or (np.abs(rates) > REST).any():
-        return None
-    loads = [Payload(mass, payload.cog) for mass in (payload.mass, payload.mass + 1.0)]
-    model, heavier = (static_torque(settings.robot, q, gravity, load)[known] for load in loads)
-    felt, open_ = heavier - model, measured[known] - model
-    if not felt @ felt >= FELT**2:
-        return None
-    more = float(felt @ open_ / (felt @ felt))
-    rest = open_ - more * felt
-    # A difference that no load explains says nothing about the load.
-    if rest @ rest > max((1.0 - EXPLAINED) * (open_ @ open_), DIFFERS**2 * (felt @ felt)):
-        return None
-    # A load cannot have a negative mass: the arm leans on something, or a sign is wrong.
-    return (
-        None
-        if payload.mass + more < -DIFFERS
-        else PayloadEstimate(payload.mass + more, payload.mass)
-    )

@@ -14,7 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts.state_machine import WARN, Signal, feed
+from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, feed
+from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
 from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
@@ -44,24 +46,55 @@ ORIENTATIONS = ('used', 'not_given', 'told_nothing')
 class ImuRows:
     """Gravity from IMU messages, one row a message: `gravity` (n, 3) m/s2 in `base_link`.
 
-    NaN where it is unknown. `unusable` (n,) says that gravity is unknown or a number implausible.
-    `time` is of receipt, `stamp` of the header (ns).
+    NaN where it is unknown. `unusable` (n,) says that the message's own numbers cannot be used.
+    `time` is of receipt, `stamp` of the header (ns). `gyro_trusted` (n,) is False while the gyro
+    contradicts the orientation.
     """
 
     time: Times
     stamp: Times
     gravity: Floats
-    unusable: NDArray[np.bool_]
+    unusable: Mask
+    gyro_trusted: Mask
 
 
 @dataclass(frozen=True, slots=True)
 class AttitudeSignals:
-    """The signals of IMU faults: foreign frame, empty orientation, wrong g, disagreement."""
+    """The signals of IMU faults: foreign frame, empty orientation, wrong g, disagreement.
+
+    `nothing`: neither orientation nor acceleration tells the tilt; `motion`: those of checks that
+    work in motion.
+    """
 
     frame: Signal
     orientation: Signal
     strange: Signal
     disagreement: Signal
+    nothing: Signal
+    motion: MotionSignals
+
+
+@dataclass(slots=True)
+class ImuSeen:
+    """What the messages of a recording showed: how many of them, and of those how many at rest.
+
+    `rested`: the acceleration could be held against gravity. `no_rate` and `no_force` declare the
+    rate or the acceleration as not measured (covariance -1), `turned` have a rate other than 0.
+    """
+
+    messages: int = 0
+    rested: int = 0
+    no_rate: int = 0
+    no_force: int = 0
+    turned: int = 0
+
+    def take(self, columns: Sequence[ImuColumns]) -> None:
+        """Take messages."""
+        for s in columns:
+            self.messages += len(s.log_time)
+            self.no_rate += int((s.angular_velocity_covariance_0 == -1.0).sum())
+            self.no_force += int((s.linear_acceleration_covariance_0 == -1.0).sum())
+            self.turned += int(s.angular_velocity.any(axis=1).sum())
 
 
 @dataclass(slots=True)
@@ -69,19 +102,33 @@ class ImuTracker:
     """Turns IMU messages into gravity; holds the low-pass filter and the signals of IMU faults.
 
     While a fault of a level above WARN is active, gravity is unknown. `taken` counts messages by
-    ORIENTATIONS; an orientation is 'not_given' if its covariance is -1 (REP-145).
+    ORIENTATIONS; an orientation is 'not_given' if its covariance is -1 (REP-145). `motion` holds
+    the checks that work in motion, `seen` what a recording showed, for its statement.
     """
 
     settings: Settings
     faults: AttitudeSignals
     low_pass: LowPass = field(init=False)
     taken: list[int] = field(default_factory=lambda: [0, 0, 0])
+    motion: MotionChecks = field(init=False)
+    seen: ImuSeen = field(default_factory=ImuSeen)
     _frame: str | None = None
     _foreign: float = 0.0
     _busy: bool = False
 
     def __post_init__(self) -> None:
         self.low_pass = LowPass(self.settings.imu.low_pass)
+        self.motion = MotionChecks(self.settings, self.faults.motion)
+
+    @property
+    def gyro_trusted(self) -> bool:
+        """False while the gyro contradicts the orientation: unit, axes, or not known which."""
+        return self.motion.gyro_trusted
+
+    def adopt(self, settings: Settings) -> None:
+        """Judge by other settings from now on."""
+        self.settings = settings
+        self.motion.adopt(settings)
 
     def step(
         self,
@@ -98,6 +145,8 @@ class ImuTracker:
         size = _norm(smooth)
         imu, g = self.settings.imu, self.settings.robot.gravity
         if frame != self._frame:
+            if self._frame is not None:
+                self.motion.frame(now)
             self._frame, self._foreign = frame, _foreign(frame, imu.frame)
         x, y, z, w = orientation
         spin, off = _norm(omega), abs(size - g)
@@ -118,16 +167,20 @@ class ImuTracker:
         of, seen = self.faults, self._busy or self._foreign or empty >= 0.5
         # Small values cannot change quiet signals: most calls are saved.
         seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
-        if seen and self._judge(now, empty, strange, doubted):
-            return NOWHERE, True
+        lost = seen and self._judge(now, empty, strange, doubted)
+        motion = self.motion
+        motion.step(now, stamp, orientation, omega, acceleration, told)
         if imu.specific_force:
-            if not believable or size < FALL * g:
-                return NOWHERE, True
-            return _force(smooth, omega, imu), False
-        if not believable and imu.attitude == 'auto':
-            return NOWHERE, True
-        up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
-        return (-g * up[0], -g * up[1], -g * up[2]), not believable or up[0] != up[0]
+            known = believable and size >= FALL * g
+            down = _force(smooth, omega, imu) if known else NOWHERE
+        elif not believable and imu.attitude == 'auto':
+            known, down = False, NOWHERE
+        else:
+            up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
+            known, down = up[0] == up[0], (-g * up[0], -g * up[1], -g * up[2])  # noqa: PLR0124
+        if not (known and of.nothing.quiet):
+            of.nothing.step(now, off / g if believable and not known else 0.0)
+        return NOWHERE if lost or motion.lost else down, not believable
 
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
         """Feed the fault signals with a message; return whether a fault makes gravity unknown."""
@@ -145,7 +198,7 @@ class ImuTracker:
         columns = [s for s in segments if len(s.log_time)]
         if not columns:
             none = np.empty(0, np.int64)
-            return ImuRows(none, none, np.empty((0, 3)), none != 0)
+            return ImuRows(none, none, np.empty((0, 3)), none != 0, none == 0)
         time = np.concatenate([s.log_time for s in columns])
         order = np.argsort(time, kind='stable') if (np.diff(time) < 0).any() else slice(None)
         time, stamp = time[order], np.concatenate([s.stamp for s in columns])[order]
@@ -156,24 +209,37 @@ class ImuTracker:
         frame = self.settings.imu.frame
         lengths = [len(s.log_time) for s in columns]
         foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
+        self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
+        self.seen.take(columns)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
-            return self._rows(time, stamp, (q, covariance_0, omega), smooth, foreign)
+            told_by = q, covariance_0, omega, acceleration
+            return self._rows(time, stamp, told_by, smooth, foreign)
+
+    def _take_frames(self, time: Times, names: NDArray[np.str_]) -> None:
+        """Take the frame that each message names, in order of receipt."""
+        changed = np.flatnonzero(names[1:] != names[:-1]) + 1
+        for k in [0, *changed.tolist()]:
+            if names[k] != self._frame:
+                if self._frame is not None:
+                    self.motion.frame(int(time[k]))
+                self._frame = str(names[k])
 
     def _rows(
         self,
         time: Times,
         stamp: Times,
-        told_by: tuple[Floats, Floats, Floats],
+        told_by: tuple[Floats, Floats, Floats, Floats],
         smooth: Floats,
         foreign: Floats,
     ) -> ImuRows:
-        """Return the rows from `told_by` (orientation, covariance, rate) and filtered acceleration.
+        """Return the rows from `told_by` (orientation, covariance, rate, acceleration) and `smooth`.
 
-        Shapes (4, n), (n,), (3, n) and (3, n); `foreign` (n,) is 1 for messages of another frame.
+        Shapes (4, n), (n,), (3, n) and (3, n); `smooth` (3, n) is the filtered acceleration,
+        `foreign` (n,) is 1 for messages of another frame.
         """
         imu, g = self.settings.imu, self.settings.robot.gravity
-        q, covariance_0, omega = told_by
+        q, covariance_0, omega, acceleration = told_by
         size, spin = _norms(smooth), _norms(omega)
         off, still = np.abs(size - g), spin <= imu.rest_rate
         given = covariance_0 != -1.0
@@ -185,6 +251,7 @@ class ImuTracker:
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
+        self.seen.rested += int(rest.sum())
         apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
@@ -195,13 +262,36 @@ class ImuTracker:
             gravity = -g * np.where(use, oriented, leaning)
             if imu.attitude == 'auto' and not believable.all():
                 gravity[:, ~believable] = np.nan
+        unknown = believable & np.isnan(gravity[0])
+        nothing = np.where(unknown, off / g, 0.0) if unknown.any() else np.zeros(len(time))
         faults = (foreign, np.zeros(len(time)), np.where(still, off / g, np.nan), apart)
+        feed(self.faults.nothing, time, nothing)
         if not told.all():
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
+        samples = np.column_stack((q.T, omega.T, acceleration.T, told))
+        trusted = self._judge_motion(time, stamp, samples, gravity)
         self._busy = True
-        return ImuRows(time, stamp, gravity.T, ~believable | np.isnan(gravity[0]))
+        return ImuRows(time, stamp, gravity.T, ~believable, trusted)
+
+    def _judge_motion(self, time: Times, stamp: Times, x: Floats, gravity: Floats) -> Mask:
+        """Give samples (n, 11) to the checks in motion; set gravity to NaN while one says so.
+
+        Return where the gyro is trusted (n,).
+        """
+        of = self.faults.motion
+        before = [(signal, signal.alert, len(signal.log)) for signal in of.all()]
+        self.motion.columns(time, stamp, x)
+        trusted = np.ones(len(time), np.bool_)
+        for signal, alert, seen in before:
+            for start, end in spans(signal, alert, seen):
+                during = (time >= start) & (time < end)
+                if signal.rule.level > WARN:
+                    gravity[:, during] = np.nan
+                if signal is of.rates or signal is of.rotation:
+                    trusted[during] = False
+        return trusted
 
     def _count(self, told: Mask, given: Mask) -> None:
         used, none = int(told.sum()), len(given) - int(given.sum())
@@ -223,16 +313,26 @@ def feed_spans(signal: Signal, time: Times, values: Floats) -> Iterator[tuple[fl
     """Feed a signal with columns; yield begin and end (ns) of each alert, infinite while active."""
     before, seen = signal.alert, len(signal.log)
     feed(signal, time, values)
+    yield from spans(signal, before, seen)
+
+
+def spans(signal: Signal, before: Alert | None, seen: int) -> Iterator[tuple[float, float]]:
+    """Yield begin and end (ns) of a signal's alerts: `before`, and those after `seen` in the log.
+
+    The log holds the alerts of other signals too. The end is infinite while an alert is active.
+    """
+    rule = signal.rule
     for alert in [before, *signal.log[seen:]]:
-        if alert is not None and alert.rule is signal.rule:
+        if alert is None or alert.rule.level != rule.level:
+            continue
+        if (alert.rule.code, alert.rule.subject) == (rule.code, rule.subject):
             yield alert.start, math.inf if alert.end is None else alert.end
 
 
 def _foreign(frame: str, expected: str) -> float:
     """Return 1 if a message names another frame than `expected` (a namespace may precede)."""
-    named = frame.lstrip('/')
-    same = named in ('', expected) or named.endswith(f'/{expected}')
-    return 0.0 if same or not expected else 1.0
+    told = expected and frame.lstrip('/')
+    return 1.0 if told and not same_frame(frame, expected) else 0.0
 
 
 def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.samples import PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload, Robot
@@ -14,28 +15,53 @@ from ugv_acceptance.type_aliases import Floats, Times
 # More than any load (kg) or reach (m) of a robot arm: the number is something else.
 ABSURD_MASS = 1e5
 ABSURD_DISTANCE = 1e3
+# Most letters of a frame's name in a sentence.
+LONGEST_NAME = 60
 # A time (ns) before any message.
 BEFORE = -(2**62)
+# What stands for a load that was declared in a way that cannot be used.
+NOT_KNOWN = Payload(math.nan, (math.nan,) * 3)
 
 
 def payload_from(robot: Robot, mass: float, com: Sequence[float], frame: str) -> Payload | None:
-    """Return the payload of a message, None if it cannot be used.
+    """Return the payload of a message, None if it cannot be used (`payload_fault` says why)."""
+    if payload_fault(robot, mass, com, frame):
+        return None
+    x, y, z = (float(c) for c in com)
+    return Payload(float(mass), (x, y, z))
+
+
+def payload_fault(robot: Robot, mass: float, com: Sequence[float], frame: str) -> str:
+    """Return why the payload of a message cannot be used, in words; '' if it can.
 
     The mass (kg) must be plausible and not negative, the centre of gravity (m) plausible and given
-    in the axes of the robot's payload link (an empty frame means that link).
+    in the axes of the robot's payload link (an empty frame means that link). A robot without a
+    payload link can carry 0 kg only.
     """
-    x, y, z = (float(c) for c in com)
-    known = robot.payload_link is not None and frame.lstrip('/') in ('', robot.payload_link)
-    if not known or not 0.0 <= mass <= ABSURD_MASS:
-        return None
-    if not math.hypot(x, y, z) <= ABSURD_DISTANCE:
-        return None
-    return Payload(float(mass), (x, y, z))
+    link = robot.payload_link
+    if not 0.0 <= mass <= ABSURD_MASS:
+        return f'expected a mass from 0 to {ABSURD_MASS:g} kg, got {mass:g} kg'
+    if not math.hypot(*com) <= ABSURD_DISTANCE:
+        place = ' '.join(f'{c:g}' for c in com)
+        return f'expected a centre of gravity within {ABSURD_DISTANCE:g} m, got {place} m'
+    if link is None and mass > 0.0:
+        return f'expected 0 kg, since no payload.link is configured, got {mass:g} kg'
+    if link is not None and frame and not same_frame(frame, link):
+        return f'expected the frame {link}, got {shown_frame(frame)}'
+    return ''
+
+
+def shown_frame(frame: str) -> str:
+    """Return a frame's name as people read it: quoted, on one line, at most 60 letters."""
+    return repr(frame if len(frame) <= LONGEST_NAME else f'{frame[:LONGEST_NAME]}...')
 
 
 @dataclass(slots=True)
 class PayloadHistory:
-    """The payloads in force while a recording is read; old ones are forgotten."""
+    """The payloads in force while a recording is read; old ones are forgotten.
+
+    From a declaration that cannot be used until the next good one the load is not known: NaN.
+    """
 
     initial: Payload
     _since: list[int] = field(init=False)
@@ -44,16 +70,19 @@ class PayloadHistory:
     def __post_init__(self) -> None:
         self._since, self._declared = [BEFORE], [self.initial]
 
-    def declare(self, when: int, payload: Payload) -> None:
-        """Add a payload, in force from the first joint state received at or after `when` (ns)."""
+    def declare(self, when: int, payload: Payload | None) -> None:
+        """Add a payload, in force from the first joint state received at or after `when` (ns).
+
+        None: what was declared cannot be used.
+        """
         self._since.append(when)
-        self._declared.append(payload)
+        self._declared.append(payload or NOT_KNOWN)
 
     def at(self, times: Times) -> tuple[Floats | float, ...]:
         """Return mass and centre of gravity (4) in force at `times` (n,) in ns, in order.
 
-        Floats if all are the same, else arrays (n,). Payloads that ended before the last of `times`
-        are forgotten.
+        Floats if all are the same, else arrays (n,); NaN where the load is not known. Payloads that
+        ended before the last of `times` are forgotten.
         """
         since = np.array(self._since)
         first, last = (np.searchsorted(since, times[[0, -1]], side='right') - 1).tolist()

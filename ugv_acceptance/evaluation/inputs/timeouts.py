@@ -16,6 +16,8 @@ STARTUP = 500_000_000
 LONGEST_SILENCE = 2.0
 # Time (ns) by which two clocks may differ, or a stamp may jump, before it is worth a warning.
 CLOCK_SLACK = 1_000_000_000
+# The time (ns) of an input that is not needed: it is never stale.
+FOREVER = 1 << 61
 # Time (ns) for which messages may repeat the same stamp.
 STANDSTILL = 500_000_000
 

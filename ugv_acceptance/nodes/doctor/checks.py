@@ -1,12 +1,16 @@
 """Checks a set-up: turns what `probe.py` received into findings, each with what to do."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from statistics import fmean, median
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.effort.facts import NONE, TORQUE, UNKNOWN
+from ugv_acceptance.evaluation.effort.live_rests import LiveRests
+from ugv_acceptance.evaluation.effort.understanding import understand
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import (
     angle_between,
@@ -14,6 +18,7 @@ from ugv_acceptance.model.attitude import (
     up_from_orientation,
 )
 from ugv_acceptance.model.robot import Joint, Vector
+from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
 OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
@@ -22,8 +27,15 @@ CLOCK_SLACK = 1.0
 # The slowest input (Hz) that leaves time to react, and the tilt (rad) a floor may have.
 SLOWEST = 10.0
 LEVEL = math.radians(15)
+# Efforts are looked at this often (ns).
+LOOK = 200_000_000
 # A joint that stands further outside its limits (rad or m) than this cannot be read rightly.
 OUTSIDE = 0.1
+# What is said of an input that the configuration does not use.
+ABSENT = {
+    'joint_states': 'not needed: the robot has no measured joints, so no torque is checked',
+    'imu': 'none: the base was declared level, so tip-over is not checked',
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +58,43 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
     if len(around.monitors) > 1:
         text = f'{len(around.monitors)} monitors of the same name run'
         yield Finding(WARN, 'monitor', text, 'stop all but one, or give them namespaces')
-    yield from _topic('joint_states', around.joint_states, around.seconds)
-    if around.joint_states.samples:
-        yield from _joints(around.joint_states.samples, config)
-    yield from _topic('imu', around.imu, around.seconds)
-    if around.imu.samples:
-        yield from _imu(around.imu.samples, config)
+    looks: tuple[tuple[str, Heard | None, Callable[..., Iterator[Finding]]], ...] = (
+        ('joint_states', around.joint_states, _joints),
+        ('imu', around.imu, _imu),
+    )
+    for name, heard, look in looks:
+        if heard is None:
+            yield Finding(OK, name, ABSENT[name])
+            continue
+        yield from _topic(name, heard, around.seconds)
+        if heard.samples:
+            yield from look(heard.samples, config)
+    if around.joint_states is not None:
+        yield from _efforts(around.joint_states, around.imu, config)
+
+
+def _efforts(joints: Heard, imu: Heard | None, config: Config) -> Iterator[Finding]:
+    """Yield efforts that surely are no torques, or of the other sign, by the seconds heard."""
+    evaluator, rests = LiveEvaluator(config.settings), LiveRests(config.settings)
+    heard: list[tuple[int, JointStateSample | ImuSample]] = [
+        *zip(joints.times, joints.samples, strict=False),
+        *(zip(imu.times, imu.samples, strict=False) if imu else ()),
+    ]
+    due = 0
+    for now, sample in sorted(heard, key=lambda one: one[0]):
+        if isinstance(sample, JointStateSample):
+            evaluator.joint_state(now, now, *JOINT_FIELDS(sample))
+        else:
+            evaluator.imu(now, now, *IMU_FIELDS(sample))
+        margins = evaluator.margins
+        if margins is not None and now >= due:
+            due = now + LOOK
+            rests.see(now, margins.q, *evaluator.measured, margins.gravity, margins.torque)
+    if not due:
+        return
+    for joint in understand(config.settings, (), rests.rests()).joints:
+        if joint.opposed or joint.meaning not in {TORQUE, NONE, UNKNOWN}:
+            yield Finding(WARN, f'effort of {joint.joint}', joint.sentence, joint.do)
 
 
 def _topic(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:

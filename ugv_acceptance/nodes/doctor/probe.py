@@ -12,7 +12,7 @@ from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointStateSample
+from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointStateSample, Kind
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.nodes.bag_player import message_type
 from ugv_acceptance.nodes.executor import RANGE, ros, spin
@@ -58,7 +58,10 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The ROS environment, and the messages received on both inputs in `seconds`."""
+    """The ROS environment, and the messages received on both inputs in `seconds`.
+
+    An input that the configuration does not use is None.
+    """
 
     distribution: str
     middleware: str
@@ -66,8 +69,8 @@ class Surroundings:
     discovery: str
     monitors: list[str]
     seconds: float
-    joint_states: Heard
-    imu: Heard
+    joint_states: Heard | None
+    imu: Heard | None
 
 
 def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
@@ -75,20 +78,24 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
     discovery = os.environ.get(RANGE, 'SUBNET')
     with ros(args) as stop:
         node = Node('doctor')
-        joints = _subscribe(node, topics.joint_states, Decoder(JOINT_STATE))
-        imu = _subscribe(node, topics.imu, Decoder(IMU))
+        kinds: dict[str, Kind[Any]] = {'joint_states': JOINT_STATE, 'imu': IMU}
+        inputs = {
+            name: _subscribe(node, topics.used[name], Decoder(kind))
+            for name, kind in kinds.items()
+            if name in topics.used
+        }
         began = time.monotonic()
 
         def found_all() -> bool:
-            all_there = all(node.count_publishers(heard.topic) for heard in (joints, imu))
+            all_there = all(node.count_publishers(heard.topic) for heard in inputs.values())
             return all_there or time.monotonic() > began + DISCOVERY
 
         spin(node, stop, found_all)
         end = time.monotonic() + seconds
         spin(node, stop, lambda: time.monotonic() >= end)
         stop.leave()
-        for heard, topic in ((joints, topics.joint_states), (imu, topics.imu)):
-            _look(node, heard, topic)
+        for name, heard in inputs.items():
+            _look(node, heard, topics.used[name])
         found = Surroundings(
             _distribution(),
             get_rmw_implementation_identifier(),
@@ -96,8 +103,8 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             discovery,
             [name for name in node.get_node_names() if name == 'acceptance_monitor'],
             seconds,
-            joints,
-            imu,
+            inputs.get('joint_states'),
+            inputs.get('imu'),
         )
         node.destroy_node()
         return found

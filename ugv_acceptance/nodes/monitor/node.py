@@ -22,7 +22,9 @@ from std_srvs.srv import Trigger
 
 from ugv_acceptance import AcceptanceError, BadConfig, BadSample
 from ugv_acceptance.config import Config, load
+from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.alerts.alarms import Change
+from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.diagnostics import (
     Status,
@@ -71,6 +73,7 @@ class Monitor(LifecycleNode):
         self.session: Session | None = None
         self.problem = ''
         self._settings: Settings | None = None
+        self._sources: tuple[Source, ...] = ()
         self.tunables: tuple[TunableParameter, ...] = ()
         self._inputs: Inputs | None = None
         self._margins: MarginOutput | None = None
@@ -134,7 +137,7 @@ class Monitor(LifecycleNode):
     def _configure(self) -> None:
         urdf = self._value('urdf')
         self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
-        defaults = self.config.settings
+        defaults, self._sources = self.config.settings, sources_from(self.config)
         tunables = knobs_of(defaults)
         for tunable in tunables:
             if not self.has_parameter(tunable.name):
@@ -164,6 +167,7 @@ class Monitor(LifecycleNode):
             self._on_change,
             lambda text: self.get_logger().warning(text, throttle_duration_sec=5.0),
             stamps=StampShift(bool(self._value('use_sim_time'))),
+            sources=self._sources,
         )
 
     def _deactivate(self) -> None:

@@ -84,16 +84,14 @@ def all_reset(session: Session) -> list[Change]:
 
 def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
     """Return a black box for the inputs of a session; without a folder it does nothing."""
-    names = {
-        'joint_states': (topics.joint_states, 'sensor_msgs/msg/JointState'),
-        'imu': (topics.imu, 'sensor_msgs/msg/Imu'),
-        'payload': (topics.payload, 'geometry_msgs/msg/InertiaStamped'),
-    }
     channels = {
         name: Channel(
-            node.resolve_topic_name(topic.name), kind, topic.reliability, lasting=name == 'payload'
+            node.resolve_topic_name(topic.name),
+            topic.type,
+            topic.reliability,
+            lasting=name == 'payload',
         )
-        for name, (topic, kind) in names.items()
+        for name, topic in topics.used.items()
     }
     alerts = node.resolve_topic_name('~/alerts')
     channels['alerts'] = Channel(alerts, 'diagnostic_msgs/msg/DiagnosticArray', 'reliable')

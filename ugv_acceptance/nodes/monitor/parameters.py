@@ -22,7 +22,7 @@ from ugv_acceptance.evaluation.permitted_limits import (
     refused,
     torque_name,
 )
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import LEVEL, Settings
 from ugv_acceptance.model.robot import Payload
 
 ATTITUDES = ('auto', 'orientation', 'accelerometer')
@@ -151,7 +151,10 @@ def _with_payload(settings: Settings, mass: float, cog: Sequence[float]) -> Sett
 
 
 def _with_attitude(settings: Settings, value: str) -> Settings:
-    if value not in ATTITUDES:
+    level = LEVEL in (value, settings.imu.attitude)  # what a file says of inputs stays
+    if value not in ATTITUDES or level:
+        if value == settings.imu.attitude:
+            return settings
         raise BadConfig(f'imu.attitude: expected one of {", ".join(ATTITUDES)}, got {value!r}')
     return replace(settings, imu=replace(settings.imu, attitude=value))
 

@@ -1,6 +1,5 @@
 """The monitor's subscriptions: passes serialised messages to the session; watches publishers."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from inspect import Parameter, Signature
 from typing import Any
@@ -16,7 +15,6 @@ from rclpy.timer import Timer
 from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.config import Topic, Topics
-from ugv_acceptance.evaluation.effort.plateaus import opposed_joints
 from ugv_acceptance.monitoring.publisher_identity import Publisher, Voices
 from ugv_acceptance.monitoring.session import Session
 
@@ -32,8 +30,6 @@ _DURABILITY = {
 _UNKNOWN = 'NODE_NAME_UNKNOWN'
 # After a publisher came or went: seconds between checks, their number, ns to wait for a name.
 _SOON, _LOOKS, _NAMED = 0.1, 10, 1_000_000_000
-# Checks in a row, one a second, that must find an effort opposed: an arm may be held a moment.
-_OPPOSED = 5
 
 
 def qos_of(topic: Topic, depth: int) -> QoSProfile:
@@ -57,15 +53,15 @@ class Inputs:
         self._allowed: frozenset[str] = frozenset()
         self._looks = 0
         self._unnamed: dict[str, int] = {}
-        self._opposed = Counter[str]()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._soon: Timer = node.create_timer(_SOON, self._look, clock=steady)
         self.publishers: dict[str, list[str]] = {}
-        rows = (
-            ('joint_states', JointState, topics.joint_states, session.take_joint_state),
-            ('imu', Imu, topics.imu, session.take_imu),
-            ('payload', InertiaStamped, topics.payload, session.take_payload),
-        )
+        every: dict[str, tuple[Any, Callable[[bytes], None]]] = {
+            'joint_states': (JointState, session.take_joint_state),
+            'imu': (Imu, session.take_imu),
+            'payload': (InertiaStamped, session.take_payload),
+        }
+        rows = [(name, topic, *every[name]) for name, topic in topics.used.items()]
         self.voices = {name: Voices() for name, _, _, _ in rows}
         self.subscriptions: dict[str, Subscription] = {
             name: node.create_subscription(
@@ -76,7 +72,7 @@ class Inputs:
                 event_callbacks=self._events(name),
                 raw=True,
             )
-            for name, kind, topic, take in rows
+            for name, topic, kind, take in rows
         }
         self._malformed = dict.fromkeys(self.subscriptions, 0)
 
@@ -127,7 +123,6 @@ class Inputs:
                 faults.clear(now, 'MONITOR_FAULT', name)
             self._malformed[name] = count.malformed
         self._look_at_the_clock(now)
-        self._look_at_efforts(now)
 
     def _see_publishers(self, now: int) -> None:
         for name, subscription in self.subscriptions.items():
@@ -166,17 +161,6 @@ class Inputs:
             self._session.faults.set(now, 'NO_CLOCK', 'clock', 1.0)
         else:
             self._session.faults.clear(now, 'NO_CLOCK', 'clock')
-
-    def _look_at_efforts(self, now: int) -> None:
-        """Report joints whose effort had the opposite sign at every look of the last seconds."""
-        margins, evaluator = self._session.evaluator.margins, self._session.evaluator
-        if margins is None:
-            return
-        found = opposed_joints(evaluator.settings, margins.torque, *evaluator.measured)
-        for name in evaluator.settings.robot.joint_names:
-            self._opposed[name] = self._opposed[name] + 1 if name in found else 0
-            told = [name] if self._opposed[name] >= _OPPOSED else []
-            self._tell(now, 'EFFORT_SIGN', name, told, 1.0)
 
     def destroy(self) -> None:
         """Unsubscribe from all inputs."""

@@ -1,0 +1,95 @@
+"""What a configuration leaves out of every verdict: joints without limits, absent inputs."""
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+
+import numpy as np
+
+from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
+from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.statics import static_torque
+
+# Random postures, each with gravity along three axes, in which a joint may carry torque.
+POSTURES = 40
+# A joint carries torque from this share on of the largest found, and this much (N m; N).
+SHARE, LEAST = 0.01, 0.01
+# From this size on (N m; N) no decimals are written.
+TENS = 10.0
+# Half the travel (m) of a slide without limits.
+HALF_SLIDE = 0.5
+# A robot with more joints is not searched: compiling its formulas would take too long.
+MOST_JOINTS = 40
+
+
+def absent_imu(settings: Settings, topic: str | None) -> Statement:
+    """Return the objection to a recording without an IMU where the margins need one."""
+    if topic is not None or not settings.hears_imu:
+        return Statement()
+    reason = (
+        'the recording has no IMU topic (sensor_msgs/msg/Imu): record the IMU; or, for a robot '
+        'without one that stands level, set topics.imu: null and imu.attitude: level'
+    )
+    return Statement(objections=(Objection('unseen_stretches', INCONCLUSIVE, reason),))
+
+
+def kept_words(settings: Settings) -> str:
+    """Return what it means that no limit was passed: all margins, or those that are measured."""
+    if not settings.hears_imu:
+        return 'all torque margins kept, tip-over not checked'
+    if not settings.hears_joints:
+        return 'all tip-over margins kept, no torque checked'
+    return 'all margins kept'
+
+
+def not_judged(settings: Settings) -> Iterator[NotChecked]:
+    """Yield what no recording of this robot can tell by its configuration."""
+    yield from not_judged_joints(settings)
+    if not settings.hears_imu:
+        yield NotChecked('tip-over', 'no IMU: the base was declared level')
+    if not settings.hears_joints:
+        yield NotChecked('torques', 'no joint states: the robot has no measured joints')
+
+
+def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
+    """Yield the joints that carry torque (force where prismatic) and have no limit."""
+    robot, limits = settings.robot, settings.limits.torque
+    names = [n for n, limit in zip(robot.joint_names, limits, strict=True) if math.isinf(limit)]
+    if not names:
+        return
+    heavy = carried(robot) if len(robot.joint_names) <= MOST_JOINTS else {}
+    known = [(name, heavy.get(name, math.inf)) for name in names]
+    found = [_with_size(robot, name, size) for name, size in known if size > 0.0]
+    if found:
+        why = 'no limit in the configuration, so it is not judged'
+        yield NotChecked(f'torque of {", ".join(found)}', why)
+
+
+def _with_size(robot: Robot, name: str, size: float) -> str:
+    unit = robot.joint(name).units.effort
+    digits = 1 if size < TENS else 0
+    return f'{name} (up to {size:.{digits}f} {unit})' if math.isfinite(size) else name
+
+
+@lru_cache(maxsize=16)
+def carried(robot: Robot) -> dict[str, float]:
+    """Return the largest torque (N m; N) that weight was found to put on each measured joint.
+
+    With the payload, in random postures and any attitude; 0 for a joint that carries none, such as
+    a wheel.
+    """
+    names, random = robot.joint_names, np.random.default_rng(0)
+    travel = [robot.joint(name).travel(HALF_SLIDE) for name in names]
+    q = np.array([random.uniform(*ends, POSTURES) for ends in travel]).T
+    axes = robot.gravity * np.eye(3)
+    torque = np.array([static_torque(robot, q, tuple(axis), robot.payload) for axis in axes])
+    # The three axes are parts of one gravity, which may point along all of them together.
+    most = np.sqrt((torque**2).sum(axis=0)).max(axis=0)
+    slides = np.array([robot.joint(name).slides for name in names])
+    result = {}
+    for name, size, kind in zip(names, most.tolist(), slides.tolist(), strict=True):
+        largest = most[slides == kind].max()
+        result[name] = size if size >= max(SHARE * largest, LEAST) else 0.0
+    return result

@@ -1,0 +1,144 @@
+"""Measured saturation, and differences from the model larger than the margin left, by joint.
+
+What efforts mean is known only when all was read, so spells are gathered for every meaning that
+makes them count.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ugv_acceptance.evaluation.criteria.statement import Objection
+from ugv_acceptance.evaluation.effort.facts import CONSTANT, NONE, SCALED, JointMeaning
+from ugv_acceptance.evaluation.effort.lasting import Lasting, Spell
+from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.type_aliases import Floats
+
+# An effort at this share of the limit has reached it.
+REACHED = 0.999
+# A difference from the model must last this long (ns): shorter ones are of motion.
+LASTS = 500_000_000
+# Spells named as evidence.
+NAMED = 5
+_SIGNS = (1.0, -1.0)
+
+
+@dataclass(slots=True)
+class MeasuredLimits:
+    """Gathers when each joint's effort reached its limit, or left the model by its margin.
+
+    Differences are gathered for both signs of the effort. For an effort in another unit the
+    largest of each stretch is kept with its static torque, in `_largest`.
+    """
+
+    settings: Settings
+    _over: list[Lasting] = field(init=False)
+    _apart: dict[float, list[Lasting]] = field(init=False)
+    _most: Floats = field(init=False)
+    _limit: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._limit = np.array(self.settings.limits.torque)
+        n, delay = len(self._limit), int(self.settings.delays.torque_on * 1e9)
+        self._over = [Lasting(delay) for _ in range(n)]
+        self._apart = {sign: [Lasting(LASTS) for _ in range(n)] for sign in _SIGNS}
+        self._most = np.zeros(n)
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the margins of the next part of the recording; unknown ones and efforts are none."""
+        if not len(rows.time):
+            return
+        effort, torque = rows.effort, rows.torque
+        with np.errstate(invalid='ignore'):
+            size, left = np.abs(effort), self._limit - np.abs(torque)
+            standing = rows.known & ~(rows.angle.min(axis=1) <= 0.0)
+            self._feed(self._over, rows, size >= REACHED * self._limit, size)
+            for sign, spells in self._apart.items():
+                apart = np.abs(sign * effort - torque)
+                bad = (apart > left) & (left > 0.0) & np.isfinite(left) & standing[:, None]
+                self._feed(spells, rows, bad, apart)
+            # Twice in a row, so that one wild number is none.
+            twice = np.fmin(size[1:], size[:-1])
+        self._most = np.fmax(self._most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
+
+    def _feed(self, spells: list[Lasting], rows: MarginRows, bad: Floats, value: Floats) -> None:
+        for j, lasting in enumerate(spells):
+            lasting.add(rows.time, rows.until, bad[:, j], value[:, j])
+
+    def objections(self, joints: Sequence[JointMeaning], start: int) -> Iterator[Objection]:
+        """Yield what speaks against a PASS, given what the efforts mean; times since `start`."""
+        for j, joint in enumerate(joints):
+            if joint.sign is not None:
+                yield from self._saturated(j, joint, start)
+                yield from self._differing(j, joint, start)
+            elif in_another_unit(joint, joints):
+                yield from self._scaled(j, joint)
+            elif joint.meaning not in {NONE, CONSTANT}:
+                yield from self._unclear(j, joint, start)
+
+    def _saturated(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
+        spells = self._over[j].spells()
+        if spells:
+            lines = [
+                f'{_when(x, start)}: the measured torque of {joint.joint} is {x.peak:.1f} '
+                f'{joint.unit}; its limit is {self._limit[j]:.1f} {joint.unit}'
+                for x in spells[:NAMED]
+            ]
+            yield Objection('measured_effort', 'FAIL', lines[0], tuple(lines[1:]))
+
+    def _differing(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
+        spells = self._apart[joint.sign or 1.0][j].spells()
+        if spells:
+            lines = [
+                f'{_when(x, start)}: the measured torque of {joint.joint} differs from the model '
+                f'by up to {x.peak:.1f} {joint.unit}, more than the margin left'
+                for x in spells[:NAMED]
+            ]
+            yield Objection('residual', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
+
+    def _scaled(self, j: int, joint: JointMeaning) -> Iterator[Objection]:
+        """Object to an effort in another unit that is beyond the limit whatever its scale is."""
+        ratio, limit = joint.ratio, float(self._limit[j])
+        if ratio is None or not np.isfinite(limit):
+            return
+        scale = max(abs(ratio.low), abs(ratio.high))
+        if self._most[j] >= limit * scale:
+            yield Objection(
+                'measured_effort',
+                'INCONCLUSIVE',
+                f'the effort of {joint.joint} reaches {self._most[j]:.3g}, which at '
+                f'{ratio.text} of its torque is beyond its limit of {limit:.1f} {joint.unit}',
+            )
+
+    def _unclear(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
+        spells = self._over[j].spells()
+        why = joint.why
+        if joint.meaning == SCALED:
+            why = f'that it is {joint.ratio.text if joint.ratio else "a part"} of its torque is '
+            why += 'not sure: no other joint has such a unit'
+        if spells:
+            lines = [
+                f'{_when(x, start)}: the effort of {joint.joint} is {x.peak:.4g}, beyond its limit '
+                f'of {self._limit[j]:.1f} {joint.unit}, and {why}'
+                for x in spells[:NAMED]
+            ]
+            yield Objection('measured_effort', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
+
+
+def in_another_unit(joint: JointMeaning, joints: Sequence[JointMeaning]) -> bool:
+    """Return whether the efforts of a joint and of another one have one other unit.
+
+    One alone may be a fault.
+    """
+    mine = joint.ratio if joint.meaning == SCALED else None
+    ratios = [x.ratio for x in joints if x is not joint and x.meaning == SCALED]
+    return any(
+        mine is not None and r is not None and r.low <= mine.high and mine.low <= r.high
+        for r in ratios
+    )
+
+
+def _when(spell: Spell, start: int) -> str:
+    return f'{(spell.start - start) / 1e9:.2f} to {(spell.end - start) / 1e9:.2f} s'

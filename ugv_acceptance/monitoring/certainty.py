@@ -1,0 +1,105 @@
+"""Margins of a running robot that are kept by less than they are known: their uncertainty.
+
+The bound costs some milliseconds, so it is computed twice a second, and only anew when posture,
+attitude or load have changed.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ugv_acceptance.evaluation.criteria.criteria import RSS
+from ugv_acceptance.evaluation.criteria.uncertainty import Source, combined, effects_of
+from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.type_aliases import Floats
+
+CODE = 'MARGIN_UNCERTAIN'
+# Time (ns) between looks, and the looks in a row that find the same before it is told.
+EVERY, LOOKS = 500_000_000, 2
+# Factor by which a margin must exceed its bound before it counts as certain again.
+CERTAIN = 1.25
+# How far joints (rad, m) and gravity (m/s2) may move until the bound is computed again.
+MOVED, TURNED = 0.02, 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """A margin that is OK by less than its uncertainty: joint or side, and a sentence."""
+
+    subject: str
+    sentence: str
+
+
+@dataclass(slots=True)
+class Certainty:
+    """Compares margins with the bounds that follow from the `sources` of uncertainty.
+
+    `due` (ns) is when the next look is to be taken.
+    """
+
+    settings: Settings
+    sources: tuple[Source, ...]
+    due: int = 0
+    told: dict[str, Doubt] = field(default_factory=dict)
+    _seen: dict[str, int] = field(default_factory=dict)
+    _at: tuple[tuple[float, ...], tuple[float, ...], Payload] | None = None
+    _bounds: tuple[Floats, Floats] = field(init=False)
+
+    def look(self, now: int, margins: Margins | None, payload: Payload) -> None:
+        """Judge the margins at `now` (ns), None if unknown; `told` are then those in doubt."""
+        self.due = now + EVERY
+        if margins is None or not self.sources:
+            self.told, self._seen = {}, {}
+            return
+        self._compute(margins, payload)
+        seen, told = {}, {}
+        for subject, left, bound, sentence in self._margins(margins):
+            factor = CERTAIN if subject in self.told else 1.0
+            if not 0.0 < left < bound * factor:
+                continue
+            seen[subject] = self._seen.get(subject, 0) + 1
+            if seen[subject] >= LOOKS:
+                told[subject] = Doubt(subject, sentence)
+        self.told, self._seen = told, seen
+
+    def _margins(self, margins: Margins) -> Iterator[tuple[str, float, float, str]]:
+        """Yield every judged margin: subject, what is left to its limit, its bound, a sentence."""
+        limits, robot = self.settings.limits, self.settings.robot
+        torque, angle = self._bounds
+        rows = zip(robot.joint_names, limits.torque, margins.torque, torque.tolist(), strict=True)
+        for name, limit, tau, bound in rows:
+            if math.isfinite(limit):
+                unit = robot.joint(name).units.effort
+                left = limits.torque_error * limit - abs(tau)
+                words = f'{name} has {left:.1f} {unit} left to its limit'
+                yield name, left, bound, f'{words}, known to +/- {bound:.1f} {unit}'
+        for side, tilt, bound in zip(SIDES, margins.stability.angle, angle.tolist(), strict=True):
+            left = float(tilt) - limits.tip_error
+            if math.isfinite(left):
+                degrees, size, least = np.degrees((float(tilt), bound, limits.tip_error)).tolist()
+                words = f'{degrees:.1f} degrees of tilt left to the {side} (limit: {least:.1f})'
+                yield side, left, bound, f'{words}, known to +/- {size:.1f} degrees'
+
+    def _compute(self, margins: Margins, payload: Payload) -> None:
+        """Compute the bounds of torques (j,) and angles (4,) again if the robot has moved."""
+        if self._at is not None and not self._moved(self._at, margins, payload):
+            return
+        self._at = margins.q, margins.gravity, payload
+        found = effects_of(self.settings, self.sources, *self._at)
+        torque = found.torque + self.settings.limits.torque_error * found.limit
+        self._bounds = combined(torque, RSS), combined(found.angle, RSS)
+
+    def _moved(
+        self,
+        at: tuple[tuple[float, ...], tuple[float, ...], Payload],
+        margins: Margins,
+        payload: Payload,
+    ) -> bool:
+        q, gravity, load = at
+        steps = np.abs(np.subtract(margins.q, q)), np.abs(np.subtract(margins.gravity, gravity))
+        return bool((steps[0] > MOVED).any() or (steps[1] > TURNED).any() or load != payload)
