@@ -172,8 +172,8 @@ class LiveEvaluator:
     ) -> Margins | None:
         """Take an Imu message (axes of the sensor `frame`); return as `joint_state` does.
 
-        It is ignored where the base was declared level. A covariance_0 of -1 says that the
-        orientation, or the rate, was not measured (REP-145).
+        A covariance_0 of -1 says that the orientation, or the rate, was not measured (REP-145). The
+        message is ignored where the base was declared level.
         """
         if self._level:
             return self.margins
@@ -187,7 +187,8 @@ class LiveEvaluator:
         self._gravity = gravity
         margins = self._evaluate(now, stamp)
         angles: Any = margins.stability.angle if margins else None
-        rate = NO_RATE if omega_covariance_0 == -1.0 else WITNESSED
+        unknown = omega_covariance_0 == -1.0 or not self._imu.motion.gyro_trusted
+        rate = NO_RATE if unknown else WITNESSED
         if covariance_0 == -1.0 and rate:
             rate = UNWITNESSED
         self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)

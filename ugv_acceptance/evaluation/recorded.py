@@ -154,7 +154,8 @@ class RecordedEvaluator:
 
         It is when an input becomes stale, unless the next batch brings a message before.
         """
-        imu = self._imu.columns(batch.imu if self.settings.hears_imu else ())
+        felt = batch.imu if self.settings.hears_imu else ()
+        imu = self._imu.columns(felt)
         if self.settings.hears_joints:
             joints = self._joints.merge_columns(batch.joints)
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
@@ -176,7 +177,6 @@ class RecordedEvaluator:
         rows = self._margins(newest, load)
         lost = self._lost(rows)
         self._watch_pairs(rows, lost)
-        felt = batch.imu if self.settings.hears_imu else ()
         chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
         self._carry = _Newest(

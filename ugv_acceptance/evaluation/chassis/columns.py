@@ -105,7 +105,7 @@ class ChassisColumns:
             time, stamp, vectors, measured, alone = _in_order(columns, motion.settings.imu)
             gravity = rows.pairs.imu.gravity[1:].T
             raw = self.raw.take(time, stamp, vectors, gravity)
-            gyro = measured & _turned(motion, vectors[:3])
+            gyro = measured & _turned(motion, vectors[:3]) & rows.pairs.imu.gyro_trusted[1:]
             which = np.flatnonzero(np.diff(rows.pairs.of_imu, prepend=0) > 0)
             front, left, rear, right = rows.angle.T
             least = np.minimum(np.minimum(front, left), np.minimum(rear, right))[which]
@@ -287,7 +287,8 @@ def _episodes(of: Episodes, look: _Look, values: list[Floats], denied: Mask) -> 
             continue
         of.step(elapsed, float(part.step[k]) * 1e-9, effective[k].tolist(), against[k].tolist())
         believed[k], values[3][k] = True, of.turn
-        denied[k] |= of.contradicted(frequency[k].tolist())
+        contradicted = of.contradicted(frequency[k].tolist())
+        denied[k] |= contradicted
     if len(part.at) and part.segment[-1] != segment:
         of.begin()
     return believed

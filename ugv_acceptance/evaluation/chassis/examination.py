@@ -86,7 +86,8 @@ class ChassisExamination:
             low, high = np.fmin.reduce(q, axis=0), np.fmax.reduce(q, axis=0)
             self._low = low if self._low is None else np.fmin(low, self._low)
             self._high = high if self._high is None else np.fmax(high, self._high)
-        self._seconds += _seconds_of(found)
+        seconds = _seconds_of(found)
+        self._seconds += seconds
         alive = rows.known[found.rows]
         if not alive.any():
             return
