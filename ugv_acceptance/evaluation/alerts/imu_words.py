@@ -1,4 +1,4 @@
-"""What the numbers of kinds of the IMU's checks mean, and the unit an acceleration seems to have."""
+"""What kinds of faults of an IMU mean in words, and the unit an acceleration seems to have."""
 
 import math
 

@@ -79,7 +79,7 @@ class ImuGrid:
 
     g: float
     first: int = 0
-    rows: list[Row] | Floats = field(default_factory=lambda: [[0.0] * 33 + [1.0, 0.0]])
+    rows: list[Row] | Floats = field(default_factory=lambda: list[Row](([0.0] * 33 + [1.0, 0.0],)))
     _edges: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)] * 3)
 
     @property
