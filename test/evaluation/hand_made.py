@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Rule
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet, Criterion, Demand, Window
+from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds
-from ugv_acceptance.evaluation.criteria.verdict import Findings
 from ugv_acceptance.evaluation.inputs.imu import ImuRows
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs

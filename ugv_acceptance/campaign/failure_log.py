@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import read_document
-from ugv_acceptance.evaluation.alerts.messages import FailureSource
+from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 
 UNKNOWN = 'unknown'
 TERMINAL, NON_TERMINAL = 'terminal', 'non-terminal'

@@ -15,7 +15,8 @@ from ugv_acceptance.campaign.failure_log import (
     UNKNOWN,
     Entry,
 )
-from ugv_acceptance.evaluation.alerts.messages import ALERTS, FailureSource
+from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
+from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.type_aliases import Json
 
 # Levels at which an alert counts as a failure; a warning does not.

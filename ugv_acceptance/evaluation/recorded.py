@@ -4,7 +4,7 @@ By the same rules as live.py: a recording gives the margins and alerts that the 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from ugv_acceptance.evaluation.inputs.payload import (
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
+from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
@@ -162,15 +163,15 @@ class RecordedEvaluator:
             self._watch_joints(joints, joint_limits)
             until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
-            joints = _without_joints(imu)
+            joints = without_joints(imu)
             until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
         feed(self.watch.imu.invalid, imu.time, imu.unusable)
         self._take_payloads(batch.payload)
         newest = _Newest(
-            _lead(self._carry.joints, joints),
+            preceded(self._carry.joints, joints),
             np.concatenate((self._carry.joints_until, until)),
-            _lead(self._carry.imu, imu),
+            preceded(self._carry.imu, imu),
             np.concatenate((self._carry.imu_until, imu.time + imu_limits)),
         )
         load = self._payload.at(newest.joints.time)
@@ -180,7 +181,10 @@ class RecordedEvaluator:
         chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
-            _last(newest.joints), newest.joints_until[-1:], _last(newest.imu), newest.imu_until[-1:]
+            newest_row(newest.joints),
+            newest.joints_until[-1:],
+            newest_row(newest.imu),
+            newest.imu_until[-1:],
         )
         return rows
 
@@ -388,19 +392,3 @@ def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floa
 def _known(number: Floats | float, whole: NDArray[np.bool_]) -> Floats | float:
     """Return a number of the payload with 0 where it is not known, so that it can be computed."""
     return number if isinstance(number, float) else np.where(whole, number, 0.0)
-
-
-def _without_joints(imu: ImuRows) -> JointRows:
-    """Return the joint states of a robot without measured joints, one row an IMU message."""
-    none, no = np.empty((len(imu.time), 0)), np.zeros(len(imu.time), np.bool_)
-    return JointRows(imu.time, imu.stamp, none, none, none, imu.time, no)
-
-
-def _lead(before: Any, rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows
-    """Return `rows` preceded by the newest row of the batch before."""
-    names = [f.name for f in fields(rows)]
-    return type(rows)(*(np.concatenate((getattr(before, n), getattr(rows, n))) for n in names))
-
-
-def _last(rows: Any) -> Any:  # noqa: ANN401 - JointRows or ImuRows
-    return type(rows)(*(getattr(rows, f.name)[-1:] for f in fields(rows)))

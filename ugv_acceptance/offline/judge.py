@@ -15,12 +15,13 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
     default_criteria,
 )
+from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
 from ugv_acceptance.evaluation.criteria.statement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
-from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
 from ugv_acceptance.evaluation.holding_back import HeldMargins

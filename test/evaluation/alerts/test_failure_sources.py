@@ -2,12 +2,11 @@
 
 import pytest
 
+from ugv_acceptance.evaluation.alerts.failure_source import HUMAN, FailureSource
 from ugv_acceptance.evaluation.alerts.messages import (
     ALERTS,
-    HUMAN,
     LIVE,
     RECORDED,
-    FailureSource,
     suspect_of,
 )
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN

@@ -16,7 +16,8 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     MapDemand,
     Value,
 )
-from ugv_acceptance.evaluation.criteria.verdict import judge_criteria, short_of_data
+from ugv_acceptance.evaluation.criteria.findings import short_of_data
+from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 
 TOLD = settings()
 S = 1_000_000_000

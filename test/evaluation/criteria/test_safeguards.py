@@ -17,9 +17,10 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
     Window,
 )
+from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS, with_objection
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
-from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.model.robot import Payload
 
 TOLD = settings()

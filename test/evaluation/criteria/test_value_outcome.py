@@ -9,8 +9,9 @@ from evaluation.hand_made import alert, findings, made, seconds
 from evaluation.streams import settings
 
 from ugv_acceptance.evaluation.criteria.criteria import ANY, Value
+from ugv_acceptance.evaluation.criteria.findings import Outcome
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
-from ugv_acceptance.evaluation.criteria.verdict import Outcome, judge_value
+from ugv_acceptance.evaluation.criteria.verdict import judge_value
 from ugv_acceptance.evaluation.settings import Limits
 
 TOLD = settings(limits=Limits((45.0, math.inf)))

@@ -32,9 +32,10 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Window,
     default_criteria,
 )
+from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source
-from ugv_acceptance.evaluation.criteria.verdict import Findings, judge_criteria
+from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 

@@ -9,6 +9,7 @@ from robots import LIFT, box, paper_arm, random_robot, tracked
 
 from ugv_acceptance.config import load
 from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.evaluation.effort.arm import Arm
 from ugv_acceptance.evaluation.effort.facts import (
     CONSTANT,
     NONE,
@@ -18,7 +19,6 @@ from ugv_acceptance.evaluation.effort.facts import (
     TORQUE,
     WITHOUT,
 )
-from ugv_acceptance.evaluation.effort.meaning import Arm
 from ugv_acceptance.evaluation.effort.model_errors import (
     Sizes,
     levers,

@@ -2,38 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 
+from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
-
-
-class FailureSource(Enum):
-    """A leaf of the taxonomy of failures (Carlson and Murphy); the value is the text people see."""
-
-    EFFECTOR = 'effector'
-    SENSOR = 'sensor'
-    CONTROL_SYSTEM = 'control system'
-    POWER = 'power'
-    COMMUNICATIONS = 'communications'
-    DESIGN = 'design'
-    INTERACTION = 'interaction'
-
-    @property
-    def physical(self) -> bool:
-        """Whether a part of the robot failed; else a human did."""
-        return self not in HUMAN
-
-    @property
-    def path(self) -> str:
-        """The path from the root of the taxonomy, such as "physical / effector"."""
-        return f'{"physical" if self.physical else "human"} / {self.value}'
-
-
-HUMAN = frozenset({FailureSource.DESIGN, FailureSource.INTERACTION})
 
 
 @dataclass(frozen=True, slots=True)

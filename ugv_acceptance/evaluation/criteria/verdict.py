@@ -5,11 +5,8 @@ than the bound of its uncertainty.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
-from ugv_acceptance.evaluation.alerts.messages import describe, level_words
-from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
@@ -23,8 +20,13 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     MapDemand,
     Value,
 )
+from ugv_acceptance.evaluation.criteria.findings import (
+    Findings,
+    Outcome,
+    alert_words,
+    short_of_data,
+)
 from ugv_acceptance.evaluation.criteria.measurement import (
-    CriteriaMeasurement,
     KnownTime,
     MapMeasure,
     ValueMeasure,
@@ -45,76 +47,10 @@ from ugv_acceptance.evaluation.criteria.safeguards import (
     safeguards_result,
     waived_words,
 )
-from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
-from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, moment_json
-from ugv_acceptance.evaluation.holding_back import Span, drawn_in_doubt
+from ugv_acceptance.evaluation.criteria.statement import NotChecked
+from ugv_acceptance.evaluation.criteria.uncertainty import moment_json
 from ugv_acceptance.evaluation.permitted_limits import relaxed_words
-from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Json
-
-
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """What verdicts are made from: measurements, alerts, numbers about the data, uncertainty.
-
-    `data` is the part of the result that `quantities.DATA` reads, `statements` are those of the
-    examinations of the run. Alerts of the robot that rest on margins of the `doubtful` spans (ns)
-    decide nothing.
-    """
-
-    measurement: CriteriaMeasurement
-    alerts: Sequence[Alert]
-    data: Json
-    bounds: Bounds
-    statements: Sequence[Statement] = ()
-    doubtful: Sequence[Span] = ()
-
-    @property
-    def settings(self) -> Settings:
-        """Settings of the evaluation."""
-        return self.measurement.settings
-
-    def seconds(self, time: int) -> float:
-        """Return a log time (ns) as seconds since the start of the recording."""
-        return (time - self.measurement.start) / 1e9
-
-    def in_doubt(self, alert: Alert) -> bool:
-        """Return whether an alert of the robot rests on margins that are contradicted."""
-        return alert.rule.code in FAILURES and drawn_in_doubt(alert, self.doubtful)
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """The verdict on one criterion with its reason, and the numbers and sentences behind it."""
-
-    verdict: str
-    reason: str
-    measured: Json
-    evidence: tuple[str, ...] = ()
-
-
-def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> str | None:
-    """Return the reason if too little of a criterion's window was evaluated; None if enough was."""
-    measurement = findings.measurement
-    start, end = measurement.span_of(criterion.window)
-    share, needed = evaluated / (end - start) if end > start else 0.0, measurement.criteria.coverage
-    outside = start >= measurement.end
-    if share >= needed and end > start and not outside:
-        return None
-    what = 'the recording'
-    if outside and criterion.window is not None:
-        return f'{criterion.name}: its window begins at {criterion.window[0]:g} s, after the end'
-    if criterion.window is not None:
-        what = f'{criterion.window[0]:g} to {criterion.window[1]:g} s'
-    return f'only {share:.1%} of {what} could be evaluated ({needed:.0%} needed)'
-
-
-def alert_words(alert: Alert, findings: Findings) -> str:
-    """Return an alert as a sentence with level, code, begin and end."""
-    end = 'the end' if alert.end is None else f'{findings.seconds(alert.end):.2f} s'
-    name = f'{level_words(alert.rule.level)} {alert.rule.code}'
-    start = f'{findings.seconds(alert.start):.2f} s'
-    return f'{name} from {start} to {end}: {describe(alert, findings.settings)}'
 
 
 def judge_value(criterion: Criterion, findings: Findings) -> Outcome:

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.effort.arm import Arm
 from ugv_acceptance.evaluation.effort.evidence import OFFSET
-from ugv_acceptance.evaluation.effort.meaning import Arm
 from ugv_acceptance.type_aliases import Floats
 
 # Uncertainty of a scale of 1; friction as a share of the joint's largest torque: assumed, least and

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.effort.arm import Arm
 from ugv_acceptance.evaluation.effort.evidence import (
     KINDS,
     OTHER_UNIT,
@@ -18,7 +19,6 @@ from ugv_acceptance.evaluation.effort.evidence import (
     SCALES,
     STEP,
     Evidence,
-    Joint,
     evidence_of,
     log_sum,
 )
@@ -43,9 +43,9 @@ NAMES = (TORQUE, OTHER_SIGN, SCALED, WITHOUT, UNKNOWN)
 # declared; the least at which a meaning is named, of a joint whose torque varies and of another.
 BEFORE = np.log((0.48, 0.12, 0.22, 0.16, 0.02))
 WHOLE_ARM, AS_DECLARED, NAMED, SURE = 0.6, 0.5, 0.95, 0.99
-# Numbers of loads tried. Efforts below this are zero (denormal numbers too), and closer than the
-# share EQUAL of the largest they are one value.
-LOADS, ZERO, EQUAL = 49, 1e-12, 1e-6
+# Efforts below this are zero (denormal numbers too), and closer than the share EQUAL of the largest
+# they are one value.
+ZERO, EQUAL = 1e-12, 1e-6
 # Shares of the joint's largest static torque: what must vary to tell a scale, be there to tell
 # anything, vary among efforts that are cut off, and among equal ones; share and number of postures
 # that are cut off.
@@ -57,47 +57,6 @@ EXPLAINED, CUTS = 0.05, 3
 USUAL, FITS, VAGUE = 1, 4.0, 0.5
 # Log-probability of one more change of the load.
 CHANGE = -3.0
-
-
-@dataclass(frozen=True, slots=True)
-class Arm:
-    """Rest postures in order of time: `effort`, `torque`, `lever` (P, j), `declared` kg (P,).
-
-    `errors` (s, P, j) are the model's, `sizes` (j,) the joints' largest torques, `most` (kg) the
-    largest load. N m, N where prismatic; NaN: no effort.
-    """
-
-    effort: Floats
-    torque: Floats
-    lever: Floats
-    declared: Floats
-    errors: Floats
-    sizes: Floats
-    most: float
-
-    def joint(self, j: int, rows: NDArray[np.bool_]) -> Joint:
-        """Return one joint in the given postures (P,)."""
-        return Joint(
-            self.effort[rows, j], self.torque[rows, j], self.lever[rows, j], self.declared[rows],
-            self.errors[:, rows, j], float(self.sizes[j]),
-        )  # fmt: skip
-
-    def rows(self, rows: Sequence[int]) -> 'Arm':
-        """Return the given postures."""
-        at = list(rows)
-        return Arm(
-            self.effort[at], self.torque[at], self.lever[at], self.declared[at],
-            self.errors[:, at], self.sizes, self.most,
-        )  # fmt: skip
-
-    def loads(self) -> Floats:
-        """Return the loads (kg) beyond the declared one that are tried; 0 is one of them."""
-        if not self.lever.any():
-            return np.zeros(1)
-        least, most = -float(self.declared.max(initial=0.0)), max(self.most, 1e-3)
-        steps = round(-least / (most - least) * LOADS) if least < 0.0 else 0
-        less = np.linspace(least, 0.0, steps, endpoint=False)
-        return np.concatenate((less, np.linspace(0.0, most, LOADS - steps)))
 
 
 # A joint whose largest static torque (N m; N) is below this carries nothing.

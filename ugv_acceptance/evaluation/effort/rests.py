@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
-from ugv_acceptance.evaluation.effort.meaning import Arm
+from ugv_acceptance.evaluation.effort.arm import Arm
 from ugv_acceptance.evaluation.effort.model_errors import (
     Sizes,
     levers,

@@ -206,8 +206,7 @@ class JointMerger:
             time, stamp, place = time[order], stamp[order], place[order]
             tables, named, of = tables[:, :, order], named[:, order], of[order]
             positions = {x: positions[x][place[of == k]] for x, k in numbers.items()}
-        if n and self.began == NEVER:
-            self.began = int(time[0])
+        self.began = int(time[0]) if n and self.began == NEVER else self.began
         rows_of = {x: np.flatnonzero(of == k) for x, k in numbers.items()}
         repeats = self._repeat_rows(time, stamp, rows_of, positions)
         raw = tables[0].copy()

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ugv_acceptance.evaluation.alerts.messages import HUMAN, FailureSource
+from ugv_acceptance.evaluation.alerts.failure_source import HUMAN, FailureSource
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.paper.arm_figures import (
     disagreement,
