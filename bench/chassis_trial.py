@@ -52,6 +52,8 @@ KINDS = ('brake', 'turn', 'swing', 'rattle')
 LIFTED, GROUNDED = 0.02, 0.002
 # Static margin (rad) in which trials begin: nothing tips a robot that is far from it.
 NEAREST, FURTHEST = math.radians(5.0), math.radians(28.0)
+# Longest time (ns) without margins that a verdict allows, and that of the start.
+LONGEST = 500_000_000
 CODES = ('TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')
 START = 1_700_000_000_000_000_000
 
@@ -321,7 +323,10 @@ def halved(batch: Batch) -> Batch:
 
 
 def judged(settings: Settings, load: float, batch: Batch) -> tuple[Statement, list[Alert], float]:
-    """Return the statement of the examination, the alerts, and the least static margin (rad)."""
+    """Return the statement of the examination, the alerts, and the least static margin (rad).
+
+    The margin is NaN if over half a second of it is not known.
+    """
     robot = replace(settings.robot, payload=Payload(load))
     evaluator = RecordedEvaluator(replace(settings, robot=robot))
     start = int(batch.imu[0].log_time[0])
@@ -332,6 +337,9 @@ def judged(settings: Settings, load: float, batch: Batch) -> tuple[Statement, li
     examination = ChassisExamination()
     examination.add(rows)
     least = float(np.nanmin(rows.angle)) if rows.known.any() else math.nan
+    unseen = float((rows.until - rows.time)[~rows.known & (rows.time > start + LONGEST)].sum())
+    if unseen > LONGEST:
+        least = math.nan  # an unseen stretch: never a PASS
     return examination.statement(start, end), evaluator.watch.log, least
 
 
@@ -374,7 +382,8 @@ def _said(statement: Statement, alerts: Sequence[Alert], least: float) -> Said:
     said = 'FAIL' if 'FAIL' in kinds else 'INCONCLUSIVE' if kinds else 'PASS'
     mine = [a for a in alerts if a.rule.code in CODES]
     danger = [a for a in mine if a.rule.level == ERROR]
-    return Said('FAIL' if least <= 0.0 else said, said, _first(danger), _first(mine))
+    unseen = 'INCONCLUSIVE' if math.isnan(least) else said
+    return Said('FAIL' if least <= 0.0 else unseen, said, _first(danger), _first(mine))
 
 
 def _first(alerts: Sequence[Alert]) -> float:
