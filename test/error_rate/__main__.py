@@ -2,7 +2,7 @@
 
 Runs are made by kinds.yaml, half faulted and half good, and judged; every result is a line of
 out/error_rate/results.jsonl. A run that is broken off goes on where it was. `--short` makes one run
-of each kind. The exit code is 1 where a goal was missed.
+of each kind. The exit code is 1 where any verdict was wrong.
 """
 
 import argparse
@@ -19,8 +19,8 @@ from rich.console import Console  # noqa: E402
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn  # noqa: E402
 
 RESULTS = ROOT / 'out' / 'error_rate' / 'results.jsonl'
-# Exit codes: a goal was missed; the file of results is of something else.
-MISSED, OTHER = 1, 2
+# Exit codes: a verdict was wrong; the file of results is of something else; Ctrl-C.
+MISSED, OTHER, STOPPED = 1, 2, 130
 
 
 def main() -> None:
@@ -48,6 +48,9 @@ def main() -> None:
     except measure.OtherResultsError as error:
         console.print(str(error), markup=False)
         raise SystemExit(OTHER) from None
+    except KeyboardInterrupt:
+        console.print(f'stopped; the same command goes on: {out}', markup=False)
+        raise SystemExit(STOPPED) from None
     for text in measure.table(lines):
         console.print(text, markup=False)
     if asked.write:
