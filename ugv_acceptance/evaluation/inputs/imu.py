@@ -37,6 +37,8 @@ Mask = NDArray[np.bool_]
 NORM_SLACK = 0.01
 # Share of g by which the accelerometer may differ from g and still give the direction of gravity.
 GRAVITY_SLACK = 0.15
+# A stretch at rest (ns) in which the accelerometer can be verified.
+RESTED = 500_000_000
 # A specific force below this share of g means a fall, or is not a specific force.
 FALL = 0.5
 # How the orientation of a message was treated; 'told_nothing': invalid, or only a default.
@@ -79,8 +81,10 @@ class AttitudeSignals:
 class ImuSeen:
     """What the messages of a recording showed: how many of them, and of those how many at rest.
 
-    `rested`: the acceleration could be held against gravity. `no_rate` and `no_force` declare the
-    rate or the acceleration as not measured (covariance -1), `turned` have a rate other than 0.
+    `rested`: in stretches at rest of RESTED and more, in which the acceleration could be held
+    against gravity; a robot that shakes is at rest by chance now and then. `no_rate` and `no_force`
+    declare the rate or the acceleration as not measured (covariance -1), `turned` have a rate other
+    than 0.
     """
 
     messages: int = 0
@@ -264,7 +268,8 @@ class ImuTracker:
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
-        self.seen.rested += int(rest.sum())
+        rested = _rested(time, rest)
+        self.seen.rested += rested
         apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
@@ -338,6 +343,14 @@ def spans(signal: Signal, before: Alert | None, seen: int) -> Iterator[tuple[flo
             continue
         if (alert.rule.code, alert.rule.subject) == (rule.code, rule.subject):
             yield alert.start, math.inf if alert.end is None else alert.end
+
+
+def _rested(time: Times, rest: Mask) -> int:
+    """Return the number of messages (n,) in stretches at rest that last for RESTED."""
+    ends = np.flatnonzero(np.diff(np.concatenate(([False], rest, [False]))))
+    begin, end = ends[::2], ends[1::2]
+    long = time[end - 1] - time[begin] >= RESTED
+    return int((end - begin)[long].sum())
 
 
 def _foreign(frame: str, expected: str) -> float:
