@@ -83,22 +83,24 @@ CASES = {
     ),
     'wrong frame': Case('IMU_FRAME', imu=replace(GOOD_IMU, frame='other_imu')),
     'quaternion zero, acceleration in g': Case(
-        'INPUT_INVALID', imu=_imu((0.0,) * 4, (0.0, 0.0, 1.0))
+        'IMU_NO_GRAVITY', imu=_imu((0.0,) * 4, (0.0, 0.0, 1.0))
     ),
     'acceleration in g': Case('IMU_GRAVITY', imu=_imu(LEAN, (0.0, 0.0, 1.0)), early=True),
     'gravity removed': Case('IMU_GRAVITY', imu=_imu(LEAN, (0.01, 0.0, 0.02)), early=True),
-    'specific force in g': Case('INPUT_INVALID', imu=_imu(LEAN, (0.0, 0.0, 1.0)), told=FORCED),
+    'specific force in g': Case('IMU_NO_GRAVITY', imu=_imu(LEAN, (0.0, 0.0, 1.0)), told=FORCED),
     'specific force without gravity': Case(
-        'INPUT_INVALID', imu=_imu(LEAN, (0.01, 0.0, 0.02)), told=FORCED
+        'IMU_NO_GRAVITY', imu=_imu(LEAN, (0.01, 0.0, 0.02)), told=FORCED
     ),
     'raw counts': Case('INPUT_INVALID', imu=_imu(LEAN, (0.0, 0.0, 16384.0))),
     'acceleration NaN': Case('INPUT_INVALID', imu=_imu(LEAN, (NAN,) * 3)),
     'degrees of an endless joint that moves': Case(
         'POSITION_LEAP', early=True, moving=57.3, told=endless(TOLD)
     ),
-    'IMU upside down': Case('TIP_OVER', imu=_imu(tilted(3.0), upright(tilted(3.0))), known=True),
+    'IMU upside down': Case(
+        'IMU_MOUNTING', imu=_imu(tilted(3.0), upright(tilted(3.0))), early=True
+    ),
     'IMU quarter turned': Case(
-        'TIP_OVER', imu=_imu(tilted(1.57), upright(tilted(1.57))), known=True
+        'IMU_MOUNTING', imu=_imu(tilted(1.57), upright(tilted(1.57))), early=True
     ),
 }
 
