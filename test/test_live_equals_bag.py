@@ -68,7 +68,8 @@ def imu_message(t: float, stamp: int, rng: np.random.Generator) -> bytes:
     roll = math.radians(20) * math.sin(math.pi * t / SECONDS) + rng.normal(0, 1e-5)
     orientation = (math.sin(roll / 2), 0.0, 0.0, math.cos(roll / 2))
     force = (0.0, 9.81 * math.sin(roll), 9.81 * math.cos(roll))
-    return imu_cdr(stamp, 'imu_link', orientation, (0.2, 0.0, 0.0), force)
+    turning = math.radians(20) * math.pi / SECONDS * math.cos(math.pi * t / SECONDS)
+    return imu_cdr(stamp, 'imu_link', orientation, (turning, 0.0, 0.0), force)
 
 
 @dataclass
