@@ -103,6 +103,12 @@ class Ratio:
         """The ratio with its interval, as text."""
         return f'{self.value:.3g} ({self.low:.3g} to {self.high:.3g})'
 
+    @property
+    def spread(self) -> float:
+        """How many times apart the ends of the interval are; infinite if it holds 0."""
+        least, most = sorted((abs(self.low), abs(self.high)))
+        return most / least if self.low * self.high > 0.0 else float('inf')
+
 
 @dataclass(frozen=True, slots=True)
 class JointMeaning:

@@ -27,6 +27,9 @@ SPACING = 100_000_000
 # An effort at this share of the joint's limit or above is clipped: it says nothing about the load.
 CLIPPED = 0.99
 
+# A unit is that of a scaled effort if the ends of its ratio are at most this many times apart.
+SURE_UNIT = 3.0
+
 
 @dataclass(slots=True)
 class ModelCheck:
@@ -66,7 +69,9 @@ class ModelCheck:
         objections = (*self._limits.objections(found.joints, start), *loads)
         result = {'model_check': self.result(found, start)}
         # An encoder is called frozen because the effort changed: not by an effort in another unit.
-        no_torque = {x.joint for x in found.joints if in_another_unit(x, found.joints)}
+        # But an effort that hardly follows the torque may look like one because the encoder is.
+        other_unit = [x for x in found.joints if in_another_unit(x, found.joints)]
+        no_torque = [x.joint for x in other_unit if x.ratio and x.ratio.spread <= SURE_UNIT]
         unfounded = frozenset(('ENCODER_FROZEN', name) for name in no_torque)
         return Statement(result, objections, tuple(_not_checked(found)), unfounded)
 
