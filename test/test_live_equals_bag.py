@@ -56,7 +56,8 @@ def joint_message(t: float, stamp: int, rng: np.random.Generator) -> bytes:
     arm = 1.8 - 1.8 * reach + rng.normal(0, 1e-4)
     names = ['turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint']
     q = [rng.normal(0, 1e-4), arm, -2.2 + 2.2 * reach, rng.normal(0, 1e-4)]
-    if int(t * 100) % 7 == 0:  # a driver that reports the flipper on its own
+    # A driver that reports the flipper on its own, and begins to do so late.
+    if t < 0.8 or int(t * 100) % 7 == 0:
         names, q = names[:3], q[:3]
     if int(t * 100) % 90 == 45:
         q[1] = math.nan
