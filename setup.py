@@ -125,7 +125,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={
         NAME: ['py.typed'],
-        f'{NAME}.report': ['templates/*'],
+        f'{NAME}.report': ['templates/*', 'error_rate.json'],
         f'{NAME}.plan': ['templates/*'],
         f'{NAME}.console': ['static/*'],
         f'{NAME}.nodes': ['loopback.xml'],

@@ -6,6 +6,7 @@ of each kind. The exit code is 1 where any verdict was wrong.
 """
 
 import argparse
+import json
 import sys
 import tempfile
 from pathlib import Path
@@ -17,6 +18,8 @@ from error_rate.plan import Plan, short_of  # noqa: E402
 from made.subjects import ROBOTS  # noqa: E402
 from rich.console import Console  # noqa: E402
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn  # noqa: E402
+
+from ugv_acceptance.report.error_rate import FILE  # noqa: E402
 
 RESULTS = ROOT / 'out' / 'error_rate' / 'results.jsonl'
 # Exit codes: a verdict was wrong; the file of results is of something else; Ctrl-C.
@@ -32,7 +35,7 @@ def main() -> None:
     parser.add_argument('--out', type=Path, default=RESULTS, help='file of results (JSON lines)')
     parser.add_argument('--workers', type=int, default=2, help='processes')
     parser.add_argument(
-        '--write', action='store_true', help='put the table into docs/error_rate.md'
+        '--write', action='store_true', help='put the table into docs and the report'
     )
     parser.add_argument('--show', type=int, default=20, help='wrong verdicts that are listed')
     asked = parser.parse_args()
@@ -57,6 +60,8 @@ def main() -> None:
         page = ROOT / 'docs' / 'error_rate.md'
         text = measure.published(page.read_text(encoding='utf-8'), lines)
         page.write_text(text, encoding='utf-8')
+        told = json.dumps(measure.published_rates(lines), indent=2)
+        (ROOT / 'ugv_acceptance' / 'report' / FILE).write_text(told + '\n', encoding='utf-8')
     bad = [line for line in lines if line['wrong']]
     for line in bad[: asked.show]:
         console.print(

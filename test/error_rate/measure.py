@@ -215,8 +215,36 @@ def published(page: str, lines: Sequence[dict[str, Any]]) -> str:
     return before + MARK_BEGIN + text + MARK_END + after
 
 
-def summary(lines: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the rates that the goals are about, each with its exact upper 95 % bound."""
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Of `runs` runs, `wrong` did what they must not."""
+
+    what: str
+    did: str
+    runs: int
+    wrong: int
+
+    @property
+    def line(self) -> str:
+        """The rate with its exact upper bound, as a line of a list."""
+        bound = f'upper 95 % bound {upper(self.wrong, self.runs):.2%}'
+        return f'- {self.runs} {self.what}: {self.wrong} {self.did} ({bound})'
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The rate for JSON."""
+        most = upper(self.wrong, self.runs)
+        return {
+            'what': self.what,
+            'did': self.did,
+            'runs': self.runs,
+            'wrong': self.wrong,
+            'most': most,
+        }
+
+
+def rates(lines: Sequence[dict[str, Any]]) -> list[Rate]:
+    """Return the rates that the goals are about."""
     plan = _plan()
     may_pass = {n for n, k in plan.kinds.items() if PASS in k.expected.verdicts}
     may_fail = {n for n, k in plan.kinds.items() if FAIL in k.expected.verdicts}
@@ -230,8 +258,19 @@ def summary(lines: Sequence[dict[str, Any]]) -> list[str]:
         own = [x for x in lines if x['kind'] not in left_out and half in (None, x['half'])]
         bad = sum(bool(x['wrong']) if not fault else x['wrong'] == fault for x in own)
         if own:
-            rate = f'{bad} {did} (upper 95 % bound {upper(bad, len(own)):.2%})'
-            found.append(f'- {len(own)} {what}: {rate}')
+            found.append(Rate(what, did, len(own), bad))
+    return found
+
+
+def published_rates(lines: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the rates as the report prints them, with what they were measured on."""
+    kinds = len({line['kind'] for line in lines})
+    return {**head(), 'kinds': kinds, 'rates': [rate.json for rate in rates(lines)]}
+
+
+def summary(lines: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the rates that the goals are about as lines, and what the runs were of."""
+    found = [rate.line for rate in rates(lines)]
     broke = sum(x['wrong'] == 'broke off' for x in lines)
     robots = sorted({x.get('robot', '') for x in lines} - {''})
     return [*found, f'- broke off: {broke}', f'- robots: {", ".join(robots)}']

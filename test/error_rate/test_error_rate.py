@@ -1,6 +1,7 @@
 """The error rate in its short form, and that its measurement counts what it should."""
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from made.truth import torques
 from robots import tracked
 
 from ugv_acceptance.config import load
+from ugv_acceptance.report.error_rate import FILE, error_rate_line
 
 PLAN = Plan()
 
@@ -121,3 +123,20 @@ def test_robots_of_others_take_part_where_they_are_here() -> None:
     assert PACKBOT in subjects()
     assert ('husky' in subjects()) is ROBOTS.is_dir()
     assert ('tracked' in subjects()) is not ROBOTS.is_dir()
+
+
+def test_the_report_prints_the_rates_that_were_measured() -> None:
+    """Every rate with its counts and bound; and says so where none was measured."""
+    lines = [
+        {'kind': kind.name, 'half': kind.half, 'wrong': '', 'verdict': 'PASS', 'number': k}
+        for k, kind in enumerate(Plan().kinds.values())
+    ]
+    told = measure.published_rates(lines)
+    assert told['kinds'] == len(lines)
+    assert [x['wrong'] for x in told['rates']] == [0, 0, 0]
+    n = told['rates'][0]['runs']
+    assert told['rates'][0]['most'] == pytest.approx(1.0 - 0.05 ** (1.0 / n))
+    line = error_rate_line()
+    measured = (files('ugv_acceptance.report') / FILE).is_file()
+    assert ('runs that must not pass' in line) == measured
+    assert line.startswith('Error rate of verdicts')

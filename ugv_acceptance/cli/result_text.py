@@ -72,12 +72,12 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     paths = result['bag']['path']
     heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
     console.print(heading, soft_wrap=True)
-    for line in (origin_line(result), assumed_line(result)):
-        console.print(f'    {escape(line)}', soft_wrap=True)
     for reason in result['reasons'][:5]:
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
+    for line in (origin_line(result), assumed_line(result)):
+        console.print(f'    {escape(line)}', soft_wrap=True)
     unchecked = not_checked_lines(result)
     if unchecked:
         console.print('    [bold]NOT CHECKED:[/]')

@@ -11,6 +11,7 @@ from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.report.error_rate import error_rate_line
 from ugv_acceptance.report.format import (
     assumed_line,
     bound_text,
@@ -95,6 +96,7 @@ def acceptance_page(
         marks=MARKS,
         doubts=doubts_of(result),
         unchecked=not_checked_lines(result),
+        error_rate=error_rate_line(),
         closing=CLOSING[result['verdict']],
         first_lines=[origin_line(result), assumed_line(result)],
         identity=[(words, _entered(result, key)) for key, words in parts.items()],
