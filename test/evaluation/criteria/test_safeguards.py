@@ -18,7 +18,12 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Window,
 )
 from ugv_acceptance.evaluation.criteria.findings import Findings
-from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS, with_objection
+from ugv_acceptance.evaluation.criteria.safeguards import (
+    SAFEGUARDS,
+    Safeguarded,
+    safeguards_result,
+    with_objection,
+)
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.model.robot import Payload
@@ -241,3 +246,15 @@ def test_default_criteria_have_nothing_to_tell_of_themselves() -> None:
     found.measurement.criteria = CriteriaSet('defaults', 1, (), '')
     told = _unchecked(found, TOLD, None)
     assert not [what for what in told if 'criterion' in what or 'tilt' in what]
+
+
+def test_a_safeguard_without_its_input_is_not_called_checked() -> None:
+    """Without an IMU nobody knows if the robot tipped; without limits no torque is judged."""
+    _, found = findings(TOLD, NOTHING, (QUIET,), data=GOOD)
+    level = replace(TOLD, imu=replace(TOLD.imu, attitude='level'))
+    unlimited = replace(level, limits=replace(TOLD.limits, torque=(float('inf'),) * 2))
+    without = {'tipping', 'chassis_acceleration', 'imu', 'torque_limit'}
+    for told, names in ((TOLD, set()), (unlimited, without)):
+        held = Safeguarded((), ())
+        result = safeguards_result(held, found.measurement.criteria, told)
+        assert {one['name'] for one in result if not one['checked']} == names

@@ -7,6 +7,7 @@ stretches that nobody saw must not pass because nobody asked. Whoever means it w
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
@@ -47,6 +48,8 @@ _SAID_BY = {
     'torque': 'torque_limit',
     'torque_margin': 'torque_limit',
 }
+# Safeguards that need an IMU.
+_OF_TILT = ('tipping', 'chassis_acceleration', 'imu')
 # Stretches named in the reason.
 _MOST_NAMED = 3
 
@@ -134,8 +137,10 @@ def reasons_of(found: Safeguarded, verdict: str, failed: Sequence[Value]) -> lis
     return [o.reason for o in found.objections if o.verdict == verdict and o.safeguard not in said]
 
 
-def safeguards_result(found: Safeguarded, criteria: CriteriaSet) -> list[Json]:
+def safeguards_result(found: Safeguarded, criteria: CriteriaSet, settings: Settings) -> list[Json]:
     """Return the outcome of every safeguard for JSON: the worst of its objections."""
+    judged = any(isfinite(limit) for limit in settings.limits.torque)
+    checked = {'torque_limit': judged, **dict.fromkeys(_OF_TILT, settings.hears_imu)}
     reasons = dict(criteria.waive)
     every = [*found.objections, *(objection for objection, _ in found.waived)]
     result: list[Json] = []
@@ -151,6 +156,7 @@ def safeguards_result(found: Safeguarded, criteria: CriteriaSet) -> list[Json]:
                 'reasons': [o.reason for o in of],
                 'evidence': [line for o in of for line in o.evidence],
                 'waived': reasons.get(name),
+                'checked': checked.get(name, True),
             }
         )
     return result

@@ -184,7 +184,7 @@ def judge_criteria(findings: Findings) -> Json:
             'coverage': criteria.coverage,
             'results': [_json(c, outcome, findings) for c, outcome in outcomes],
         },
-        'safeguards': safeguards_result(held, criteria),
+        'safeguards': safeguards_result(held, criteria, findings.settings),
         'not_checked': [not_checked_json(one) for one in _not_checked(findings)],
     }
 
