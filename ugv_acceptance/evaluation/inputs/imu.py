@@ -18,6 +18,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, 
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
 from ugv_acceptance.evaluation.inputs.imu_rest import RestChecks
+from ugv_acceptance.evaluation.inputs.imu_seen import ImuSeen, rested_messages
 from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
@@ -37,8 +38,6 @@ Mask = NDArray[np.bool_]
 NORM_SLACK = 0.01
 # Share of g by which the accelerometer may differ from g and still give the direction of gravity.
 GRAVITY_SLACK = 0.15
-# A stretch at rest (ns) in which the accelerometer can be verified.
-RESTED = 500_000_000
 # A specific force below this share of g means a fall, or is not a specific force.
 FALL = 0.5
 # How the orientation of a message was treated; 'told_nothing': invalid, or only a default.
@@ -75,32 +74,6 @@ class AttitudeSignals:
     disagreement: Signal
     nothing: Signal
     motion: MotionSignals
-
-
-@dataclass(slots=True)
-class ImuSeen:
-    """What the messages of a recording showed: how many of them, and of those how many at rest.
-
-    `rested`: in stretches at rest of RESTED and more, in which the acceleration could be held
-    against gravity; a robot that shakes is at rest by chance now and then. `no_rate` and `no_force`
-    declare the rate or the acceleration as not measured (covariance -1), `turned` have a rate other
-    than 0.
-    """
-
-    messages: int = 0
-    rested: int = 0
-    no_rate: int = 0
-    no_force: int = 0
-    turned: int = 0
-
-    def take(self, columns: Sequence[ImuColumns]) -> None:
-        """Take messages."""
-        for s in columns:
-            self.messages += len(s.log_time)
-            self.no_rate += int((s.angular_velocity_covariance_0 == -1.0).sum())
-            self.no_force += int((s.linear_acceleration_covariance_0 == -1.0).sum())
-            turned = int(s.angular_velocity.any(axis=1).sum())
-            self.turned += turned
 
 
 @dataclass(slots=True)
@@ -268,7 +241,7 @@ class ImuTracker:
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
-        rested = _rested(time, rest)
+        rested = rested_messages(time, rest)
         self.seen.rested += rested
         apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
@@ -343,14 +316,6 @@ def spans(signal: Signal, before: Alert | None, seen: int) -> Iterator[tuple[flo
             continue
         if (alert.rule.code, alert.rule.subject) == (rule.code, rule.subject):
             yield alert.start, math.inf if alert.end is None else alert.end
-
-
-def _rested(time: Times, rest: Mask) -> int:
-    """Return the number of messages (n,) in stretches at rest that last for RESTED."""
-    ends = np.flatnonzero(np.diff(np.concatenate(([False], rest, [False]))))
-    begin, end = ends[::2], ends[1::2]
-    long = time[end - 1] - time[begin] >= RESTED
-    return int((end - begin)[long].sum())
 
 
 def _foreign(frame: str, expected: str) -> float:
