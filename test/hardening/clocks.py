@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from evaluation.streams import MS, STILL, T0, Carry, Imu, Message, S, give, run_of, settings
+from evaluation.streams import MS, STILL, T0, Carry, Imu, Joints, Message, S, give, run_of, settings
 from hardening.outcome import Outcome
 
 from ugv_acceptance.evaluation.live import LiveEvaluator
@@ -31,13 +31,20 @@ def wrong(message: Message, clock: Callable[[int], int]) -> Message:
     return replace(message, stamp=clock(t))
 
 
+def _trembling(message: Message) -> Message:
+    """Return a joint state as an encoder tells it: a repeated one would be no new message."""
+    if not isinstance(message, Joints):
+        return message
+    return replace(message, position=(0.1 + 1e-6 * (message.time // MS % 97), 0.0))
+
+
 def trial(name: str) -> tuple[float, float, bool]:
     """Return seconds to the CLOCK alert, from the last message to STALE, and margins throughout."""
     evaluator = LiveEvaluator(settings())
     evaluator.start(T0)
     known = True
     for message in run_of(END / S, 50.0, 100.0, imu=Imu(0, omega=STILL)):
-        margins = give(evaluator, wrong(message, CLOCKS[name]))
+        margins = give(evaluator, wrong(_trembling(message), CLOCKS[name]))
         known = known and (margins is not None or message.time < T0 + S)
     for k in range(200):
         evaluator.tick(T0 + END + k * 10 * MS)
