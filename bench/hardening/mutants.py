@@ -71,7 +71,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'there are no rows',
     ('evaluation/inputs/joints.py', 'JointMerger.layout',
      '64 -> 65'): "a cache's size changes no value",
-    ('evaluation/inputs/joints.py', '', '1 -> 2'): 'no time is below 0',
+    ('evaluation/inputs/joint_rows.py', '', '1 -> 2'): 'no time is below 0',
     ('evaluation/advice/search.py', 'joint_words',
      'amount * joint.axis[2] -> amount / joint.axis[2]'): 'only the sign counts',
     ('evaluation/recorded.py', 'RecordedEvaluator._table', '0.0 -> 1.0'):
@@ -80,10 +80,10 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'whether the row before the first is usable is not read',
     ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', '0 -> 1'): 'the same',
     ('evaluation/recorded.py', '', '1 -> 2'): 'no row and no time is below 0',
-    ('evaluation/recorded.py', 'RecordedEvaluator._watch_pairs',
+    ('evaluation/recorded.py', 'RecordedEvaluator._watch_stand',
      'self.watch.slide.on < np.inf -> self.watch.slide.on <= np.inf'):
         'nothing slides where friction is not known, a call is saved',
-    ('evaluation/recorded.py', 'RecordedEvaluator._watch_inputs',
+    ('evaluation/recorded.py', 'RecordedEvaluator._watch_joints',
      'signal.on < np.inf -> signal.on <= np.inf'):
         'no rate reaches an infinite limit, a call is saved',
     ('evaluation/live.py', 'LiveEvaluator._watch',
@@ -110,8 +110,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'where there is no limit a warning begins at infinity',
     ('evaluation/effort/plateaus.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
         'only efforts above ten are held to the largest of the run',
-    ('evaluation/effort/model_check.py', '_sign', 'scale.value[0] > 0.0 -> scale.value[0] >= 0.0'):
-        'a scale of zero is unknown before',
     ('evaluation/advice/search.py', '_loads',
      'cases[0].payload.mass <= 0.0 -> cases[0].payload.mass < 0.0'):
         'an empty hand gains nothing by being emptied',

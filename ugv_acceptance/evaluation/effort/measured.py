@@ -31,13 +31,14 @@ class MeasuredLimits:
     """Gathers when each joint's effort reached its limit, or left the model by its margin.
 
     Differences are gathered for both signs of the effort. For an effort in another unit the
-    largest of each stretch is kept with its static torque, in `_largest`.
+    largest of each stretch is kept with its static torque, in `_largest`. `most` (j,) is the
+    largest effort that two messages in a row had.
     """
 
     settings: Settings
     _over: list[Lasting] = field(init=False)
     _apart: dict[float, list[Lasting]] = field(init=False)
-    _most: Floats = field(init=False)
+    most: Floats = field(init=False)
     _limit: Floats = field(init=False)
 
     def __post_init__(self) -> None:
@@ -45,7 +46,7 @@ class MeasuredLimits:
         n, delay = len(self._limit), int(self.settings.delays.torque_on * 1e9)
         self._over = [Lasting(delay) for _ in range(n)]
         self._apart = {sign: [Lasting(LASTS) for _ in range(n)] for sign in _SIGNS}
-        self._most = np.zeros(n)
+        self.most = np.zeros(n)
 
     def add(self, rows: MarginRows) -> None:
         """Take the margins of the next part of the recording; unknown ones and efforts are none."""
@@ -62,7 +63,7 @@ class MeasuredLimits:
                 self._feed(spells, rows, bad, apart)
             # Twice in a row, so that one wild number is none.
             twice = np.fmin(size[1:], size[:-1])
-        self._most = np.fmax(self._most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
+        self.most = np.fmax(self.most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
 
     def _feed(
         self,
@@ -111,11 +112,11 @@ class MeasuredLimits:
         if ratio is None or not np.isfinite(limit):
             return
         scale = max(abs(ratio.low), abs(ratio.high))
-        if self._most[j] >= limit * scale:
+        if self.most[j] >= limit * scale:
             yield Objection(
                 'measured_effort',
                 'INCONCLUSIVE',
-                f'the effort of {joint.joint} reaches {self._most[j]:.3g}, which at '
+                f'the effort of {joint.joint} reaches {self.most[j]:.3g}, which at '
                 f'{ratio.text} of its torque is beyond its limit of {limit:.1f} {joint.unit}',
             )
 

@@ -6,15 +6,16 @@ differences from the model larger than the margin that was left.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.downsampling import Sampler
-from ugv_acceptance.evaluation.effort.facts import SCALED, WITHOUT
+from ugv_acceptance.evaluation.effort.facts import NONE, SCALED, UNKNOWN, WITHOUT, JointMeaning
 from ugv_acceptance.evaluation.effort.joint_check import REST, JointSamples, check_joint, counts
+from ugv_acceptance.evaluation.effort.meaning import ZERO
 from ugv_acceptance.evaluation.effort.measured import MeasuredLimits, in_another_unit
 from ugv_acceptance.evaluation.effort.rests import find_rests, reaches
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
@@ -59,7 +60,15 @@ class ModelCheck:
         """Return what the efforts so far mean and say."""
         time, samples = self._samples.samples(len(self.settings.joints))
         rests = find_rests(time, samples, reaches(self.settings))
-        return understand(self.settings, self.sources, rests)
+        found = understand(self.settings, self.sources, rests)
+        return replace(found, joints=tuple(map(self._seen_at_all, found.joints, self._limits.most)))
+
+    @staticmethod
+    def _seen_at_all(joint: JointMeaning, most: float) -> JointMeaning:
+        """Return what an effort means; one that is 0 at rest alone is not one that is always 0."""
+        if joint.meaning != NONE or most < ZERO:
+            return joint
+        return replace(joint, meaning=UNKNOWN, below='')
 
     def statement(self, start: int, end: int) -> Statement:
         """Return what the efforts say of the recording from `start` to `end` (ns)."""
