@@ -75,7 +75,7 @@ FAULTED = [
     Row('4 encoder stuck', 'encoder_stuck', {'noise_mrad': 0, 'share': FOUR_KG}),
     Row('4 encoder stuck, noise', 'encoder_stuck', {'noise_mrad': 0.2, 'share': FOUR_KG}),
     Row('4 six kg, one told', 'payload_heavier', {'share': SIX_KG, 'told_share': ONE_KG}),
-    *_each('5 fast', 'fast_swing', 'velocity', ['told', 'zero', 'none'], effort='none', hz=1.2),
+    *_each('5 fast', 'fast_swing', 'velocity', ['told', 'zero', 'none'], effort='none', hz=1.8),
     Row('6 told late', 'payload_told_late', {'share': FOUR_KG}),
     Row('6 told after 20 ms', 'payload_first', {'after_s': 0.02}),
     *_each('7 limits wide', 'limits_wide', 'goes', ['tip', 'overload']),

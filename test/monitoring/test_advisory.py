@@ -169,8 +169,12 @@ def test_a_load_that_is_felt_is_not_forgotten_in_motion_but_once_it_is_declared(
     session.feel()
     assert session.advisory.estimate is not None
     session.evaluator.payload = Payload(6.0)
-    give(session, q, 0.0, effort)
-    wait_until(lambda: session.advisory.estimate is None, session.feel)
+
+    def goes_on() -> None:
+        give(session, q, 0.0, effort)
+        session.feel()
+
+    wait_until(lambda: session.advisory.estimate is None, goes_on)
 
 
 @pytest.mark.parametrize('scale', [0.0, math.nan, 1.0 / 12.0, 12.0])

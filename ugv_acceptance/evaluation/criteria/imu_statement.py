@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isfinite
 
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
@@ -40,8 +41,8 @@ def _result(tracker: ImuTracker, tally: Tally) -> dict[str, object]:
         f'{rows // 10} s': {
             'windows': found.judged,
             'contradicting': found.wrong,
-            'worst_mps2': found.worst if found.judged else None,
-            'threshold_mps2': found.limit if found.judged else None,
+            'worst_mps2': _number(found.worst) if found.judged else None,
+            'threshold_mps2': _number(found.limit) if found.judged else None,
         }
         for rows, found in tally.gravity.items()
     }
@@ -60,6 +61,11 @@ def _result(tracker: ImuTracker, tally: Tally) -> dict[str, object]:
         'frozen': {'changes': tracker.motion.frozen.varied},
         'at_rest': {'messages': tracker.seen.rested},
     }
+
+
+def _number(value: float) -> float | None:
+    """Return a number for JSON, which knows none that is infinite."""
+    return value if isfinite(value) else None
 
 
 def _gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotChecked]:
