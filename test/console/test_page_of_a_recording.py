@@ -209,7 +209,7 @@ def test_names_are_shown_as_text(page: Page, repository: Path, tmp_path: Path) -
         f'"{HOSTILE}":\n    topic_name: {HOSTILE}', f'"{HOSTILE}":\n    topic_name: elbow_joint'
     )
     # A name with a dot would be one of a part of the robot.
-    yaml = re.sub(r'^ *elbow_joint\.offset.*\n', '', yaml, flags=re.MULTILINE)
+    yaml = re.sub(r'^ *elbow_joint\.(offset|limit).*\n', '', yaml, flags=re.MULTILINE)
     (tmp_path / 'robot.yaml').write_text(yaml)
     bag = str(repository / 'bags' / 'packbot_fail')
     with console(bag, '--config', str(tmp_path / 'robot.yaml')) as (url, _):

@@ -57,6 +57,9 @@ LONG_AGO = -(10**18)
 NO_STAMP = 2**62
 # What a check reaches back beyond its window (ns): windows end only at hops.
 SLACK = HOP_TIME
+# So many hops in a row without a turn, in which acceleration and orientation agree, and an earlier
+# contradiction of the rates is over: the robot may have been set up anew.
+CALM = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +115,8 @@ class MotionChecks:
     _varies: bool = True
     _frames: list[int] = field(default_factory=list)
     _before: list[float] = field(default_factory=lambda: [math.nan] * 3)
+    _agrees: bool = False
+    _calm: int = 0
 
     def __post_init__(self) -> None:
         self.frozen = FrozenCheck(self.faults.frozen)
@@ -258,7 +263,10 @@ class MotionChecks:
                 tally.rates(rates)
         self._tell(of.unit, now, self._twice(0, unit))
         self._tell(of.rates, now, self._twice(1, rates.gyro))
-        self._tell(of.rotation, now, self._twice(2, rates.orientation))
+        turn = self._twice(2, rates.orientation)
+        calm = math.isnan(turn) and self._agrees
+        self._calm = self._calm + 1 if calm else 0
+        self._tell(of.rotation, now, 0.0 if self._calm >= CALM else turn)
         self._tell(of.sources, now, source)
         if row >= PLACING and (self.mounting.kind != 0.0 or not of.mounting.quiet):
             self._tell(of.mounting, now, self.mounting.judge(grid, row), now - self._began)
@@ -285,6 +293,7 @@ class MotionChecks:
                 reach = rows * GRID + SLACK
             angle = found.angle if not angle > found.angle else angle
         self._tell(self.faults.contradiction, now, angle, reach)
+        self._agrees = angle == 0.0
         return unit
 
     def _sources(self, row: int, now: int, recent: Callable[[], Floats]) -> float:
