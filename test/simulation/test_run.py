@@ -1,6 +1,8 @@
 """Simulated runs: messages agree with the robot's motion, and a seed gives the same bits."""
 
+import math
 from dataclasses import fields, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -250,3 +252,19 @@ def test_rates_that_do_not_fit_are_refused(
     """The joints' rate divides the IMU's, and the IMU's period is a multiple of the time step."""
     with pytest.raises(BadConfig, match='expected'):
         run(robot, still(joint_rate=joint_rate, imu_rate=imu_rate), seed=0)
+
+
+def test_the_gyro_feels_ground_that_tilts() -> None:
+    """The rate is that of the orientation's own change, by another library's rotations."""
+    simulation = Simulation(load().settings.robot)
+    simulation.apply(Command(0.0, slope=(math.radians(20.0), 0.7), slope_rate=0.4))
+    turned, felt, step = [], [], 0.01
+    for _ in range(60):
+        orientation, rate, _ = simulation.imu()
+        turned.append(Rotation.from_quat(orientation))
+        felt.append(rate)
+        simulation.advance(step)
+    steps = [(a.inv() * b).as_rotvec() / step for a, b in pairwise(turned)]
+    middle = (np.array(felt[:-1]) + np.array(felt[1:])) / 2.0
+    assert np.abs(np.array(steps)).max() > 0.3
+    assert np.abs(np.array(steps) - middle).max() < 0.02

@@ -132,7 +132,7 @@ MONITOR = 'acceptance_monitor'
 # Seconds between checks of the watchdog; checks without a message after which the monitor is dead,
 # and after which recorded data is flushed. Checks are counted, not seconds: while this process
 # itself is stopped, it cannot receive, and that is not the monitor's fault.
-LOOK, SILENT, FLUSH = 0.1, 10, 5
+LOOK, SILENT, FLUSH = 0.1, 15, 5
 # A longer pause (s) between joint states does not count in `fed`.
 GAP = 0.1
 

@@ -35,6 +35,8 @@ BUILD = Build(
 # Steps between two looks at commands and targets.
 STEPS = 2
 SENSORS = ('orientation', 'gyro', 'accelerometer')
+# Time (s) over which the turn of tilting ground is taken.
+INSTANT = 1e-4
 # Time (s) to come to rest before the run begins.
 SETTLE = 1.0
 # Load (kg) that is added at a time: each takes MuJoCo as long as some steps.
@@ -213,19 +215,32 @@ class Simulation:
         The force is the mean over the last `advance`: a real IMU filters vibration likewise.
         """
         orientation, gyro, _ = self._sensors
-        tilt, heading = self.slope()
-        s = math.sin(tilt / 2.0)
-        ground = np.array(
-            [math.cos(tilt / 2.0), -s * math.sin(heading), s * math.cos(heading), 0.0]
-        )
+        ground = _ground(*self._slope_at(self.time))
         world = np.empty(4)
         mujoco.mju_mulQuat(world, ground, orientation)
-        return world[[1, 2, 3, 0]], gyro.copy(), self._felt.copy()
+        return world[[1, 2, 3, 0]], gyro + self._turn_of_ground(ground), self._felt.copy()
+
+    def _turn_of_ground(self, ground: Floats) -> Floats:
+        """Return what the gyro feels of ground that tilts (3,) rad/s, in the sensor's axes."""
+        if all(move.at(self.time)[1] == 0.0 for move in self._slope):
+            return np.zeros(3)
+        back, turned, rate = np.empty(4), np.empty(4), np.empty(3)
+        mujoco.mju_negQuat(back, ground)
+        mujoco.mju_mulQuat(turned, back, _ground(*self._slope_at(self.time + INSTANT)))
+        mujoco.mju_negQuat(back, self._sensors[0])
+        mujoco.mju_rotVecQuat(rate, 2.0 * turned[1:] / INSTANT, back)
+        return rate
 
     def base(self) -> tuple[Floats, Floats]:
         """Return position (3,) m of `base_link` on the ground, and its z axis there (3,)."""
         root = self.vehicle.root
         return self.data.xpos[root].copy(), self.data.xmat[root].reshape(3, 3)[:, 2].copy()
+
+
+def _ground(tilt: float, heading: float) -> Floats:
+    """Return how sloping ground is turned against level ground, as a quaternion w x y z (4,)."""
+    s = math.sin(tilt / 2.0)
+    return np.array([math.cos(tilt / 2.0), -s * math.sin(heading), s * math.cos(heading), 0.0])
 
 
 def _parts(tilt: float, heading: float) -> tuple[float, float]:
