@@ -32,10 +32,12 @@ endif
 PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
-# Files of tests that `make colcon` leaves to `make pytest`.
-ONCE := $(foreach name,angles cluster console_inputs kills levels operator outputs page_of_ plain_english recipe relaxed \
-    restarted run_verb soak termination,'--ignore-glob=*test_$(name)*') \
-    $(foreach folder,bench error_rate hardening simulation,'--ignore-glob=*test/$(folder)/*')
+# Files and folders of tests that `make colcon` leaves to `make pytest`: what depends on the versions of Python and
+# NumPy is in the others, and in the nodes.
+ONCE := $(foreach name,angles kills levels operator page_of_ plain_english recipe relaxed restarted run_verb soak termination, \
+    '--ignore-glob=*test_$(name)*') \
+    $(foreach folder,bench campaign cases cli console error_rate hardening plan report run simulation studies, \
+    '--ignore-glob=*test/$(folder)/*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:

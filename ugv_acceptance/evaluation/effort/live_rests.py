@@ -24,6 +24,8 @@ from ugv_acceptance.type_aliases import Floats
 KEPT, FIRST, AGAIN = 40, 3, 10
 # A static torque that changes by this share of the largest in one posture is another load declared.
 DECLARED = 0.03
+# Share of the largest effort of all joints by which noise may change the effort of any.
+NOISE_SHARE = 0.05
 # A load that differs by less than this (kg) counts as the declared one.
 DIFFERS = 0.5
 
@@ -110,6 +112,8 @@ class LiveRests:
         told = [np.nan_to_num(one.effort) for one in self._rests]
         most = np.abs(np.array(told)).max(axis=0, initial=0.0)
         allowed = np.maximum(MOST_SHARE * most, LEVEL_SHARE * np.abs(np.nan_to_num(rest.effort)))
+        # Where a joint is hardly loaded its effort is noise, as large as on the others.
+        allowed = np.maximum(allowed, NOISE_SHARE * most.max(initial=0.0))
         if (np.isfinite(effort) != np.isfinite(rest.effort)).any():
             return False
         if (np.abs(np.nan_to_num(effort - rest.effort)) > np.maximum(allowed, 1e-9)).any():
