@@ -15,6 +15,7 @@ from evaluation.streams import (
     S,
     live,
     recorded,
+    run_of,
     settings,
     split,
     tilted,
@@ -179,3 +180,16 @@ def test_limits_that_are_not_known_are_not_judged() -> None:
     rows = [m for t in grid(2.0) for m in message(t, 1.0 - 0.4 * t, 1e9)]
     _, evaluator = recorded(settings(limits=limits), [rows], rows[-1].time)
     assert not [a for a in evaluator.watch.log if a.rule.code in CODES[1:]]
+
+
+def test_a_load_that_is_declared_freezes_no_encoder() -> None:
+    """The static torque changes by it; what is measured, and the posture, do not."""
+    told = settings()
+    torque = 22.0
+    rest = Joints(0, effort=(-torque / 1000.0, 0.0))
+    messages = [*run_of(6.0, joints=rest), Carry(T0 + 3 * S, mass=6.0)]
+    messages.sort(key=lambda m: m.time)
+    _, log = live(told, messages, T0 + 6 * S, range(T0, T0 + 6 * S, 50 * MS))
+    _, evaluator = recorded(told, split(messages, range(0, 900, 31)), T0 + 6 * S)
+    for alerts in (log, evaluator.watch.log):
+        assert 'ENCODER_FROZEN' not in {a.rule.code for a in alerts}

@@ -86,7 +86,7 @@ class Prediction:
     def __post_init__(self) -> None:
         n = len(self.torque)
         self._looks = np.empty((0, len(SIDES) + 3 * n))
-        self._since = np.full((2, 2 * n), np.nan)
+        self._since = np.full((3, 2 * n), np.nan)
 
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
@@ -143,27 +143,33 @@ class Prediction:
     def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
         """Return how much effort (n, j) in N m (N) changed while each joint's position did not.
 
-        The change of the static torque is taken off; 0 until a position stood for STUCK looks, to
-        the last bit or but for noise; what changed in noise counts less. `_since` holds looks
-        and effort less torque at the last change of each position, for either kind.
+        The change of the static torque is taken off, also that of a load that is declared while the
+        effort stays; 0 until a position stood for STUCK looks, to the last bit or but for noise;
+        what changed in noise counts less. `_since` holds looks, effort less torque, and effort at
+        the last change of each position, for either kind.
         """
         n = q.shape[1]
-        change = self._changed(old, np.hstack((effort - tau, effort - tau)), _moved(q))
+        open_ = np.stack((np.hstack((effort - tau,) * 2), np.hstack((effort,) * 2)))
+        change = self._changed(old, open_, _moved(q))
         found: Floats = np.maximum(change[:, :n], change[:, n:] * (CHANGED / LEAPT))
         return found
 
     def _changed(self, old: int, open_: Floats, moved: NDArray[np.bool_]) -> Floats:
-        """Return how much `open_` (n, m) changed since each column last `moved` (n, m)."""
+        """Return the least that both of `open_` (2, n, m) changed since each `moved` (n, m)."""
         rows = np.arange(len(moved))[:, None]
         if old:
             moved[:old] = False
         before = ~np.logical_or.accumulate(moved)
         at = np.maximum.accumulate(np.where(moved, rows, 0))
-        looks, then = self._since
+        looks, *then = self._since
         looks = np.where(before, looks + rows - old + 1, rows - at)
-        then = np.where(before, then, np.take_along_axis(open_, at, 0))
-        self._since = np.array([looks[-1], then[-1]])
-        return np.where(looks >= STUCK, np.abs(open_ - then), 0.0)
+        held = [
+            np.where(before, known, np.take_along_axis(values, at, 0))
+            for known, values in zip(then, open_, strict=True)
+        ]
+        self._since = np.array([looks[-1], *(one[-1] for one in held)])
+        least: Floats = np.abs(open_ - np.array(held)).min(axis=0)
+        return np.where(looks >= STUCK, least, 0.0)
 
 
 def _moved(q: Floats) -> NDArray[np.bool_]:
