@@ -95,7 +95,7 @@ class ModelCheck:
             told: Json = {
                 'meaning': joint.meaning,
                 'unit': joint.unit,
-                'probability': joint.probability,
+                'probability': _digits(joint.probability),
                 'sentence': joint.sentence,
                 'do': joint.do,
                 'ratio': _ratio(found, j),
@@ -132,11 +132,20 @@ class ModelCheck:
         return {'share': float(slow.mean()), 'joints': names.tolist()}
 
 
+def _digits(value: float) -> float:
+    """Return a number with nine digits: the last ones of an inverse differ from run to run."""
+    return float(f'{value:.9g}')
+
+
 def _ratio(found: Understanding, j: int) -> Json | None:
     ratio = found.joints[j].ratio
     if ratio is None:
         return None
-    return {'value': ratio.value, 'low': ratio.low, 'high': ratio.high}
+    return {
+        'value': _digits(ratio.value),
+        'low': _digits(ratio.low),
+        'high': _digits(ratio.high),
+    }
 
 
 def _load_json(found: Understanding, k: int, start: int) -> Json:
@@ -146,11 +155,11 @@ def _load_json(found: Understanding, k: int, start: int) -> Json:
         'start_s': (begin - start) / 1e9,
         'end_s': (end - start) / 1e9,
         'mass_kg': {
-            'value': load.mass,
-            'low': load.mass - load.half,
-            'high': load.mass + load.half,
+            'value': _digits(load.mass),
+            'low': _digits(load.mass - load.half),
+            'high': _digits(load.mass + load.half),
         },
-        'declared_kg': load.declared,
+        'declared_kg': _digits(load.declared),
         'differs': load.differs,
     }
 
@@ -161,7 +170,7 @@ def _contact_json(found: Understanding, k: int, start: int) -> Json:
         'start_s': (int(found.rests.start[contact.row]) - start) / 1e9,
         'end_s': (int(found.rests.end[contact.row]) - start) / 1e9,
         'joint': found.joints[contact.joint].joint,
-        'extra': contact.extra,
+        'extra': _digits(contact.extra),
         'unit': found.joints[contact.joint].unit,
     }
 
