@@ -98,8 +98,7 @@ def judge(
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
     }
     statements = [e.statement(*span) for e in reading.examinations]
-    absent = absent_imu(settings, topics.imu)
-    statements.append(absent)
+    statements.append(absent_imu(settings, topics.imu))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
@@ -110,9 +109,6 @@ def judge(
         entry['doubtful'] = findings.in_doubt(alert)
     margin_bounds(data, limits, findings.bounds)
     result = {'version': RESULT_VERSION, **judge_criteria(findings), **_limits(settings), **data}
-    # The cause goes before what follows from it.
-    causes = [objection.reason for objection in absent.objections]
-    result['reasons'].sort(key=lambda reason: reason not in causes)
     return result, Judgement(settings, topics, evaluator, batches.facts, asked)
 
 
