@@ -4,7 +4,7 @@ What efforts mean is known only when all was read, so spells are gathered for ev
 makes them count.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -87,24 +87,23 @@ class MeasuredLimits:
                 yield from self._unclear(j, joint, start)
 
     def _saturated(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
-        spells = self._over[j].spells()
-        if spells:
-            lines = [
-                f'{_when(x, start)}: the measured torque of {joint.joint} is {x.peak:.1f} '
-                f'{joint.unit}; its limit is {self._limit[j]:.1f} {joint.unit}'
-                for x in spells[:NAMED]
-            ]
-            yield Objection('measured_effort', 'FAIL', lines[0], tuple(lines[1:]))
+        def words(x: Spell) -> str:
+            return (
+                f'the measured torque of {joint.joint} is {x.peak:.1f} {joint.unit}; its limit is '
+                f'{self._limit[j]:.1f} {joint.unit}'
+            )
+
+        return _told('measured_effort', 'FAIL', self._over[j].spells(), start, words)
 
     def _differing(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
+        def words(x: Spell) -> str:
+            return (
+                f'the measured torque of {joint.joint} differs from the model by up to '
+                f'{x.peak:.1f} {joint.unit}, more than the margin left'
+            )
+
         spells = self._apart[joint.sign or 1.0][j].spells()
-        if spells:
-            lines = [
-                f'{_when(x, start)}: the measured torque of {joint.joint} differs from the model '
-                f'by up to {x.peak:.1f} {joint.unit}, more than the margin left'
-                for x in spells[:NAMED]
-            ]
-            yield Objection('residual', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
+        return _told('residual', 'INCONCLUSIVE', spells, start, words)
 
     def _scaled(self, j: int, joint: JointMeaning) -> Iterator[Objection]:
         """Object to an effort in another unit that is beyond the limit whatever its scale is."""
@@ -121,18 +120,31 @@ class MeasuredLimits:
             )
 
     def _unclear(self, j: int, joint: JointMeaning, start: int) -> Iterator[Objection]:
-        spells = self._over[j].spells()
         why = joint.why
         if joint.meaning == SCALED:
             why = f'that it is {joint.ratio.text if joint.ratio else "a part"} of its torque is '
             why += 'not sure: no other joint has such a unit'
-        if spells:
-            lines = [
-                f'{_when(x, start)}: the effort of {joint.joint} is {x.peak:.4g}, beyond its limit '
-                f'of {self._limit[j]:.1f} {joint.unit}, and {why}'
-                for x in spells[:NAMED]
-            ]
-            yield Objection('measured_effort', 'INCONCLUSIVE', lines[0], tuple(lines[1:]))
+
+        def words(x: Spell) -> str:
+            return (
+                f'the effort of {joint.joint} is {x.peak:.4g}, beyond its limit of '
+                f'{self._limit[j]:.1f} {joint.unit}, and {why}'
+            )
+
+        return _told('measured_effort', 'INCONCLUSIVE', self._over[j].spells(), start, words)
+
+
+def _told(
+    safeguard: str,
+    verdict: str,
+    spells: Sequence[Spell],
+    start: int,
+    words: Callable[[Spell], str],
+) -> Iterator[Objection]:
+    """Yield the objection that spells make, if there are any: the first one, others as evidence."""
+    lines = [f'{_when(x, start)}: {words(x)}' for x in spells[:NAMED]]
+    if lines:
+        yield Objection(safeguard, verdict, lines[0], tuple(lines[1:]))
 
 
 def in_another_unit(joint: JointMeaning, joints: Sequence[JointMeaning]) -> bool:
