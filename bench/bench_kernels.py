@@ -20,7 +20,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.stability import margins, stability_of, stances_of
+from ugv_acceptance.model.stability import many_stances, many_standing, margins, stability_of
 from ugv_acceptance.model.statics import torque_of
 from ugv_acceptance.studies.planar import PAPER, planar_dynamics
 
@@ -89,8 +89,10 @@ def all_margins(robot: Robot, q: np.ndarray, g: np.ndarray, workers: int) -> np.
     def margins(*columns: Any) -> list[Any]:  # noqa: ANN401 - floats or arrays
         posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
         table = np.empty((13, len(columns[0])))
-        for rows, stance in stances_of(mechanics, posture, len(columns[0])):
-            gx, gy, gz = (x[rows] for x in columns[n:])
+        gravity, count = columns[n:], len(columns[0])
+        stances = many_stances(mechanics, posture, count)
+        for rows, stance in many_standing(stances, count, np.arange(count), gravity):
+            gx, gy, gz = (x[rows] for x in gravity)
             found = stability_of(stance, (gx, gy, gz))
             values = (*found.angle, *found.moment, *found.energy, found.zmp)
             for line, value in zip(table, values, strict=True):

@@ -101,7 +101,7 @@ def random_robot(rng: np.random.Generator, feet: int, *, moving: int = 0) -> Rob
             Link(f'link{k}', float(rng.uniform(0.5, 4.0)), _point(rng, 0.3, -0.3, 0.3), inertia)
         )
     contacts = [Contact(f'foot{k}', 'base_link', _point(rng, 0.4, 0.0, 0.0)) for k in range(feet)]
-    contacts.append(Contact('high', 'base_link', (0.6, 0.6, 0.1)))
+    contacts.append(Contact('high', 'base_link', (0.6, 0.6, 0.5)))
     for k in range(moving):
         link = f'link{int(rng.integers(len(joints)))}'
         contacts.append(Contact(f'moving{k}', link, _point(rng, 0.4, -0.4, 0.4)))

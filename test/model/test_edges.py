@@ -10,7 +10,7 @@ from robots import tracked
 from ugv_acceptance.model.edges import SIDES, corners_of, edges_of, side_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Link, Robot, Vector
-from ugv_acceptance.model.stability import RAISED, stability_of, stance_of
+from ugv_acceptance.model.stability import RAISED, stability_of, stances_of, standing
 
 FRONT, LEFT, REAR, RIGHT = range(4)
 NORMALS = [
@@ -81,15 +81,17 @@ def test_margins_of_a_raised_robot_are_those_of_its_slanted_edges(seed: int) -> 
     points = [(x, y, z - float(rng.uniform(0.0, 0.05))) for x, y, z in SLANTED]
     robot = slanted(points)
     mechanics = mechanics_of(robot)
-    stance = stance_of(mechanics, posture_of(mechanics, [], 0.0, (0.0, 0.0, 0.0)))
-    assert stance.state == RAISED
     gravity = np.array((*rng.uniform(-4.0, 4.0, 2), -9.0))
     gx, gy, gz = gravity.tolist()
+    stances = stances_of(mechanics, posture_of(mechanics, [], 0.0, (0.0, 0.0, 0.0)))
+    stance = standing(stances, (gx, gy, gz))
+    assert stance.state == RAISED
+    assert stance.footing is not None
     found = stability_of(stance, (gx, gy, gz))
     cog = np.array(robot.links[0].cog)
     margin = {name: np.full(4, np.inf) for name in ('angle', 'moment', 'energy')}
     distances = []
-    cycle = (*stance.support.polygon, stance.support.polygon[0])
+    cycle = (*stance.footing.polygon, stance.footing.polygon[0])
     for (i, j), side in zip(pairwise(cycle), stance.sides, strict=True):
         start, edge = np.array(points[i]), np.subtract(points[j], points[i])
         along = edge / np.linalg.norm(edge)

@@ -25,7 +25,7 @@ from ugv_acceptance.model.stability import (
     margins,
     stability,
     stability_of,
-    stance_of,
+    stances_of,
 )
 from ugv_acceptance.model.statics import (
     gripper_point,
@@ -34,7 +34,6 @@ from ugv_acceptance.model.statics import (
     static_torque,
     utilisation,
 )
-from ugv_acceptance.model.support import support_of
 from ugv_acceptance.type_aliases import Floats
 
 FEET: list[Vector] = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
@@ -59,7 +58,7 @@ def test_nothing_presses_on_the_ground_below_one_metre_per_second_squared(
     """1 m/s2 is enough; a floor that stands upright carries nothing. Floats and arrays alike."""
     robot = stool(FEET)
     load = robot.payload
-    stance = stance_of(
+    (stance,) = stances_of(
         mechanics_of(robot), posture_of(mechanics_of(robot), [], load.mass, load.cog)
     )
     assert stability_of(stance, gravity).state == state
@@ -67,20 +66,14 @@ def test_nothing_presses_on_the_ground_below_one_metre_per_second_squared(
 
 
 @pytest.mark.parametrize(
-    ('height', 'standing', 'raised'),
-    [(0.125, 5, False), (0.126, 4, False), (-0.125, 5, False), (-0.126, 5, True)],
+    ('height', 'raised'), [(0.125, False), (0.126, False), (-0.125, False), (-0.126, True)]
 )
-def test_a_point_stands_within_the_tolerance_itself(
+def test_a_point_may_be_as_low_as_the_tolerance(
     height: float,
-    standing: int,
     raised: bool,  # noqa: FBT001
 ) -> None:
-    """An eighth of a metre either way stands; lower, the robot stands on that point."""
+    """An eighth of a metre either way is level; lower, the robot is raised on that point."""
     robot = stool([*FEET, (0.0, 0.5, height)])
-    points = [contact.position for contact in robot.contacts]
-    found = support_of(robot, points, (0.0, 0.1, 0.3))
-    assert found.raised == raised
-    assert found.standing == standing
     whole = stability(robot, np.empty((2, 0)), DOWN)
     assert np.all(np.asarray(whole.state) == (RAISED if raised else STANDING))
 

@@ -1,26 +1,18 @@
 """Convex hulls of a few points: one sample against many, and against geometry, to the digit."""
 
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from ugv_acceptance.model.hull import (
     THIN,
-    WIDE,
     Cycle,
     Point,
-    carries,
-    drawn_in,
-    heights_above,
     hull,
     hulls,
     pairs,
     sample,
-    triple_under,
-    triples,
-    triples_under,
 )
 from ugv_acceptance.type_aliases import Floats
 
@@ -149,163 +141,8 @@ def test_every_sample_has_the_hull_it_has_alone(seed: int) -> None:
             assert set(points) == set(expected)
 
 
-def under(points: list[Point], place: Point) -> tuple[int, int, int] | None:
-    """Return the triple under a place, found alone and, the same, among many."""
-    one = triple_under(points, place)
-    number = triples_under(columns([points] * 2), tuple(np.array([x, x]) for x in place), 2)
-    assert number.tolist() == [-1 if one is None else triples(len(points)).index(one)] * 2
-    return one
-
-
-# Weights of the three corners: inside, on edges and corners, beyond each edge and each corner.
-INSIDE = [(0.2, 0.3, 0.5), (0.5, 0.5, 0.0), (0.5, 0.0, 0.5), (0.0, 0.5, 0.5), (1.0, 0.0, 0.0),
-          (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]  # fmt: skip
-OUTSIDE = [(-0.25, 0.5, 0.75), (0.5, -0.25, 0.75), (0.5, 0.75, -0.25), (2.0, -0.5, -0.5),
-           (-0.5, 2.0, -0.5), (-0.5, -0.5, 2.0)]  # fmt: skip
-
-
-@pytest.mark.parametrize('order', list(permutations(range(3))))
-@pytest.mark.parametrize('weights', [*INSIDE, *OUTSIDE])
-@pytest.mark.parametrize('size', [0.5, 4.0])
-def test_a_triple_carries_what_lies_above_it(
-    order: tuple[int, ...], weights: tuple[float, ...], size: float
-) -> None:
-    """A triple of points carries a load above its inside, its edges and its corners."""
-    corners = size * np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
-    x, y = np.array(weights) @ corners
-    points: list[Point] = [(*corners[k].tolist(), 0.1 * k) for k in order]
-    assert under(points, (x, y, 3.0)) == ((0, 1, 2) if weights in INSIDE else None)
-
-
-@pytest.mark.parametrize('order', list(permutations(range(3))))
-@pytest.mark.parametrize('weights', [*INSIDE, *OUTSIDE])
-def test_a_triple_tried_on_many_carries_the_same(
-    order: tuple[int, ...], weights: tuple[float, ...]
-) -> None:
-    """For many samples a triple carries the same loads as for one, edges and corners included."""
-    corners = np.array([(0.25, 0.5), (1.25, 0.0), (0.5, 1.5)])
-    x, y = (float(value) for value in np.array(weights) @ corners)
-    points: list[Point] = [(9.0, 9.0, 9.0), *((*corners[k].tolist(), 0.1) for k in order)]
-    assert bool(carries(points, (x, y), (1, 2, 3))) == (weights in INSIDE)
-    many = carries(columns([points] * 2), (np.array((x, x)), np.array((y, y))), (1, 2, 3))
-    assert many.tolist() == [weights in INSIDE] * 2
-
-
-@pytest.mark.parametrize(('area', 'found'), [(2.0, True), (1.0, False), (0.5, False)])
-def test_a_narrow_triple_is_not_tried_on_many(
-    area: float,
-    found: bool,  # noqa: FBT001
-) -> None:
-    """A triple of at most 1 cm2 is not tried on many samples at once."""
-    points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, area * WIDE**2, 0.0)]
-    for triple in ((0, 1, 2), (0, 2, 1)):
-        assert bool(carries(points, (0.0, 0.0), triple)) == found
-
-
 def test_a_sample_of_arrays_is_its_floats() -> None:
     """One sample taken from arrays is the same nested floats; a float belongs to every sample."""
     found = sample(((np.array((1.0, 2.0)), 3.0), (np.array((4.0, 5.0)),)), 1)
     assert found == ((2.0, 3.0), (5.0,))
     assert all(type(x) is float for part in found for x in part)
-
-
-@pytest.mark.parametrize(
-    ('area', 'found'), [(THIN**2, None), (2.0 * THIN**2, (0, 1, 2)), (0.5 * THIN**2, None)]
-)
-def test_a_triple_in_one_line_carries_nothing(area: float, found: Cycle | None) -> None:
-    """A triple of at most a square micrometre carries nothing."""
-    points: list[Point] = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.5, area, 0.0)]
-    assert under(points, (0.0, 0.0, 1.0)) == found
-
-
-def lowest(points: Floats, x: float, y: float) -> float | None:
-    """Return the height of the lower hull at a place: the least mean height of weights there."""
-    count = len(points)
-    equal = np.vstack((points[:, :2].T, np.ones(count)))
-    found = linprog(points[:, 2], A_eq=equal, b_eq=(x, y, 1.0), bounds=[(0.0, None)] * count)
-    return None if found.fun is None else float(found.fun)
-
-
-@pytest.mark.parametrize('seed', range(30))
-def test_the_triple_under_a_place_is_on_the_lower_hull(seed: int) -> None:
-    """Its height there is the least a linear program finds; none where there is no such weight."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(-0.7, 0.7, (6, 3)) + np.array((0.5, -0.3, -0.4))
-    place = rng.uniform(-0.7, 0.7, 2) + np.array((0.5, -0.3))
-    given: list[Point] = [(x, y, z) for x, y, z in points.tolist()]
-    found = under(given, (*place.tolist(), 0.0))
-    expected = lowest(points, *place.tolist())
-    assert (found is None) == (expected is None)
-    if found is not None and expected is not None:
-        ground = [*given, (*place.tolist(), expected)]
-        assert heights_above(ground, *found)[-1] == pytest.approx(0.0, abs=1e-8)
-
-
-def test_of_triples_equally_low_the_first_is_taken() -> None:
-    """Live and in a recording alike: four points of one plane, seen from where two cross."""
-    assert under(SQUARE, (0.5, 0.5, 1.0)) == (0, 1, 2)
-    assert under(SQUARE, (0.75, 0.25, 1.0)) == (0, 1, 2)
-    assert under(SQUARE, (0.25, 0.75, 1.0)) == (0, 1, 3)
-    assert under(SQUARE, (0.4, 0.8, 1.0)) == (0, 2, 3)
-
-
-def test_each_sample_has_a_triple_of_its_own() -> None:
-    """Places all about, with some points that move and some that do not."""
-    rng = np.random.default_rng(3)
-    base = [(x, y, 0.0) for x, y in rng.uniform(-0.5, 0.5, (4, 2)).tolist()]
-    moving = rng.uniform(-0.6, 0.6, (2, 3, 80))
-    place = rng.uniform(-0.6, 0.6, (3, 80))
-    found = triples_under([*base, *moving], place, 80)
-    for k in range(80):
-        x, y, z = place[:, k].tolist()
-        tips = [(a, b, c) for a, b, c in moving[:, :, k].tolist()]
-        expected = triple_under([*base, *tips], (x, y, z))
-        assert found[k] == (-1 if expected is None else triples(6).index(expected))
-    assert len(set(found.tolist())) > 5
-
-
-@pytest.mark.parametrize('first', range(5))
-@pytest.mark.parametrize('shift', [(0.0, 0.0), (3.0, -2.0)])
-def test_a_place_outside_is_drawn_towards_the_middle(
-    first: int, shift: tuple[float, float]
-) -> None:
-    """To the hull's edge or corner, and a billionth of the way inside, whatever the order."""
-    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.5, 0.0), (1.0, 1.0), (-1.0, 1.0)]) + shift
-    points: list[Point] = [(x, y, 0.0) for x, y in np.roll(corners, first, axis=0).tolist()]
-    middle = corners.mean(axis=0)
-    edge = [(0.5 * (a + b), a, b) for a, b in zip(corners, np.roll(corners, 1, 0), strict=True)]
-    for target in (*corners, *(at for at, _, _ in edge)):
-        for beyond in (1.001, 1.5, 8.0):
-            x, y = (middle + beyond * (target - middle)).tolist()
-            found = np.array(drawn_in(points, (x, y, 0.3)))
-            np.testing.assert_allclose(found, target, atol=1e-8)
-            assert np.linalg.norm(found - middle) < np.linalg.norm(target - middle)
-            assert under(points, (*found.tolist(), 0.3)) is not None
-
-
-def test_many_places_are_drawn_each_its_own_way() -> None:
-    """Over a square about the origin: to x = 1 and to y = -1."""
-    points: list[Point] = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
-    x, y = drawn_in(points, (np.array((3.0, 0.5)), np.array((0.5, -2.0)), 0.0))
-    np.testing.assert_allclose(x, (1.0, 0.25), atol=1e-8)
-    np.testing.assert_allclose(y, (0.5 / 3.0, -1.0), atol=1e-8)
-
-
-@pytest.mark.parametrize('order', list(permutations(range(3))))
-def test_heights_are_above_the_plane_of_the_three(order: tuple[int, int, int]) -> None:
-    """Along z, over z = 0.7 x - 0.4 y + 0.3, wherever the three stand."""
-    rng = np.random.default_rng(5)
-    place = rng.uniform(-2.0, 2.0, (6, 2))
-    up = np.array((0.0, 0.0, 0.0, 0.4, -0.2, 1.5))
-    height = 0.7 * place[:, 0] - 0.4 * place[:, 1] + 0.3 + up
-    points = [(x, y, z) for (x, y), z in zip(place.tolist(), height.tolist(), strict=True)]
-    assert heights_above(points, *order) == pytest.approx(up.tolist(), abs=1e-12)
-    moved = columns([points] * 2)
-    for found, expected in zip(heights_above(moved, *order), up, strict=True):
-        np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_triples_are_all_and_each_once() -> None:
-    """All triples of points are listed once, in order of their numbers."""
-    assert triples(4) == ((0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3))
-    assert len(set(triples(7))) == len(list(combinations(range(7), 3)))

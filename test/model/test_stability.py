@@ -21,11 +21,13 @@ from ugv_acceptance.model.stability import (
     STANDING,
     UNKNOWN,
     Stability,
+    many_stances,
+    many_standing,
     margins,
     stability,
     stability_of,
-    stance_of,
     stances_of,
+    standing,
     take_stance,
     tip_angles_of,
 )
@@ -58,7 +60,7 @@ def one(robot: Robot, q: list[float], gravity: Vector) -> Stability:
     """Return the margins of one sample by the functions of floats."""
     mechanics, load = mechanics_of(robot), robot.payload
     posture = posture_of(mechanics, q, load.mass, load.cog)
-    return stability_of(stance_of(mechanics, posture), gravity)
+    return stability_of(standing(stances_of(mechanics, posture), gravity), gravity)
 
 
 def least(values: tuple[Number, ...]) -> Floats:
@@ -261,7 +263,8 @@ def test_tip_angles_alone_are_those_among_all_margins() -> None:
     mechanics, load = mechanics_of(robot), robot.payload
     for k in range(len(q)):
         x, y, z = gravity[k].tolist()
-        stance = stance_of(mechanics, posture_of(mechanics, q[k].tolist(), load.mass, load.cog))
+        posture = posture_of(mechanics, q[k].tolist(), load.mass, load.cog)
+        stance = standing(stances_of(mechanics, posture), (x, y, z))
         everything = stability_of(stance, (x, y, z))
         angle, state = tip_angles_of(stance, (x, y, z))
         np.testing.assert_array_equal(np.array(angle), np.array(everything.angle))
@@ -274,13 +277,18 @@ def test_a_stance_may_be_taken_apart_and_held() -> None:
     mechanics, load = mechanics_of(robot), robot.payload
     posture = posture_of(mechanics, list(q.T), load.mass, load.cog)
     expected = np.array(stability(robot, q[:, np.newaxis], gravity[5]).angle)[:, :, 0]
-    for rows, stance in stances_of(mechanics, posture, len(q)):
-        numbers = np.arange(len(q))[rows]
-        again = np.repeat(np.arange(len(numbers)), 2)
-        g = np.broadcast_to(gravity[5], (len(again), 3)).T
-        found = stability_of(take_stance(stance, again), (g[0], g[1], g[2]))
-        table = np.array([np.broadcast_to(x, len(again)) for x in found.angle])
-        np.testing.assert_allclose(table, expected[:, numbers[again]], atol=1e-12)
+    again = np.repeat(np.arange(len(q)), 2)
+    g = np.broadcast_to(gravity[5], (len(again), 3)).T
+    stances, seen = many_stances(mechanics, posture, len(q)), 0
+    for rows, stance in many_standing(stances, len(q), again, (g[0], g[1], g[2])):
+        numbers = np.arange(len(again))[rows]
+        seen += len(numbers)
+        found = stability_of(stance, tuple(x[numbers] for x in g))
+        table = np.array([np.broadcast_to(x, len(numbers)) for x in found.angle])
+        np.testing.assert_allclose(table, expected[:, again[numbers]], atol=1e-12)
+        taken = stability_of(take_stance(stance, np.array([0, 0])), tuple(g[:, :2]))
+        assert np.allclose(np.broadcast_to(taken.angle[0], 2), table[0, 0], equal_nan=True)
+    assert seen == len(again)
 
 
 def test_a_raised_robot_has_its_margins_about_the_lower_face() -> None:
@@ -304,7 +312,7 @@ def test_a_raised_robot_has_its_margins_about_the_lower_face() -> None:
         (SQUARE, STANDING),
         ([], NO_CONTACT),
         (SQUARE[:2], NO_CONTACT),
-        ([*SQUARE[:2], (0.0, 0.0, 0.1)], NO_CONTACT),
+        ([*SQUARE[:2], (0.0, 0.0, 0.1)], STANDING),
         ([(0.1 * k, 0.1 * k, 0.0) for k in range(3)], DEGENERATE),
         ([(0.1 * k, 0.1 * k, 0.0) for k in range(4)], DEGENERATE),
         ([(0.1 * k, 0.1 * k, -0.1) for k in range(4)], DEGENERATE),
@@ -375,7 +383,7 @@ def test_a_robot_that_has_no_polygon_has_none_upside_down(
 ) -> None:
     """Its contact is told whatever the attitude; that nothing presses it down is told first."""
     expected = one(stool(points), [], DOWN).state if state is None else state
-    stance = stance_of(
+    (stance,) = stances_of(
         mechanics_of(stool(points)), posture_of(mechanics_of(stool(points)), [], 0.0, ORIGIN)
     )
     for found in (

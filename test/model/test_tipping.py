@@ -9,7 +9,7 @@ import pytest
 from ugv_acceptance.model.edges import corners_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Robot
-from ugv_acceptance.model.stability import SIDES, stance_of
+from ugv_acceptance.model.stability import SIDES, stances_of
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
 
 MASS, HEIGHT, HALF, WIDE, INERTIA = 20.0, 0.3, 0.25, 0.2, (1.0, 1.5, 2.0)
@@ -37,8 +37,10 @@ def margins(
 ) -> tuple[tuple[float, ...], ...]:
     """Return the four results for the box, nose down by `pitch` (rad); `push` is what it feels."""
     mechanics = mechanics_of(box())
-    stance = stance_of(mechanics, posture_of(mechanics, (0.0,), 0.0, (0.0, 0.0, 0.0)))
-    kernel = tipping_of(mechanics, corners_of(mechanics, stance.support.polygon), stance.sides, IMU)
+    (stance,) = stances_of(mechanics, posture_of(mechanics, (0.0,), 0.0, (0.0, 0.0, 0.0)))
+    assert stance.footing is not None
+    corners = corners_of(mechanics, stance.footing.polygon)
+    kernel = tipping_of(mechanics, corners, stance.sides, IMU, rocks=False)
     inertia = inertia_of(mechanics).one(0.0, 0.0, 0.0, 0.0, 0.0)
     gravity = np.array([G * math.sin(pitch), 0.0, -G * math.cos(pitch)])
     felt = (*gravity, *(np.array(push) - gravity), *omega, *alpha)

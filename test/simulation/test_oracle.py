@@ -12,7 +12,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Link, Payload, Robot
 from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.support import support_of
+from ugv_acceptance.model.support import footings_of
 from ugv_acceptance.simulation.oracle import BUILD, Truth, attitude, rigid, settled, tip_truth, turn
 from ugv_acceptance.simulation.tip_cases import (
     Judged,
@@ -165,7 +165,7 @@ def _weakest_edge(
     posture = posture_of(mechanics_of(robot), [], robot.payload.mass, robot.payload.cog)
     cog = np.array(posture.cog)
     points = [np.array(p) for p in posture.contacts]
-    polygon = support_of(robot, posture.contacts, posture.cog).polygon  # type: ignore[arg-type]
+    polygon = footings_of(mechanics_of(robot), posture.contacts)[0].polygon  # type: ignore[arg-type]
 
     def along(edge: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         unit: np.ndarray = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])

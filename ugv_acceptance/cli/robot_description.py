@@ -20,7 +20,8 @@ from ugv_acceptance.model.stability import (
     STATES,
     Stance,
     stability_of,
-    stance_of,
+    stances_of,
+    standing,
 )
 from ugv_acceptance.model.statics import payload_capacity, torque_of
 from ugv_acceptance.report.format import number_text
@@ -43,7 +44,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     load = payload_from(robot, payload)
     mechanics = mechanics_of(robot)
     found = posture_of(mechanics, q, load.mass, load.cog)
-    stance = stance_of(mechanics, found)
+    stance = standing(stances_of(mechanics, found), gravity)
     return {
         'version': VERSION,
         'robot': {'name': config.name, 'serial': config.serial},
@@ -187,7 +188,7 @@ def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
             'name': contact.name,
             'link': contact.link,
             'position_m': list(point),
-            'corner': k in stance.support.polygon,
+            'corner': stance.footing is not None and k in stance.footing.polygon,
         }
         for k, (contact, point) in enumerate(zip(robot.contacts, found.contacts, strict=True))
     ]
@@ -195,11 +196,11 @@ def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
 
 def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]) -> Values:
     """Return the support polygon (names, counter-clockwise from above) and the margins."""
-    margins = stability_of(stance, gravity)
+    margins, footing = stability_of(stance, gravity), stance.footing
     # Upside down it does not stand on these points, so their edges say nothing.
     stands = margins.state in (STANDING, RAISED)
     return {
-        'support_polygon': [robot.contacts[k].name for k in stance.support.polygon],
+        'support_polygon': [robot.contacts[k].name for k in footing.polygon] if footing else [],
         'state': STATES[int(margins.state)],
         'sides': {
             side: {

@@ -33,7 +33,8 @@ from ugv_acceptance.model.stability import (
     Stability,
     Stance,
     stability_of,
-    stance_of,
+    stances_of,
+    standing,
 )
 from ugv_acceptance.model.statics import torque_of
 
@@ -75,7 +76,7 @@ class LiveEvaluator:
     _chassis: ChassisMotion = field(init=False)
     _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
-    _stance: Stance | None = None
+    _stances: tuple[Stance, ...] = ()
     _gravity: Vector = NOWHERE
     _began: int | None = None
     _known_until: int | None = None
@@ -146,18 +147,18 @@ class LiveEvaluator:
         if known:
             self._stand()
         else:
-            self._posture = self._stance = None
+            self._posture, self._stances = None, ()
         return self._evaluate(now, stamp)
 
     def _stand(self) -> None:
         """Take the newest joint positions, which are known, with the newest payload."""
         load = self.payload
         if not self.load_known:
-            self._posture = self._stance = None
+            self._posture, self._stances = None, ()
             return
         self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
-        self._stance = stance_of(self._mechanics, self._posture)
-        self._chassis.stands = self._stance, tuple(self._joints.q), load
+        self._stances = stances_of(self._mechanics, self._posture)
+        self._chassis.stands = self._stances, tuple(self._joints.q), load
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -306,14 +307,16 @@ class LiveEvaluator:
 
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
         posture, gravity, until = self._posture, self._gravity, self._alive_until()
-        unknown = posture is None or self._stance is None or gravity[0] != gravity[0]
+        unknown = posture is None or gravity[0] != gravity[0]
         if unknown or now > until or (self._known_until is not None and now > self._known_until):
             self._lose(now)
-        if posture is None or self._stance is None or unknown or now > until:
+        if posture is None or unknown or now > until:
             return None
         self._known_until = until
         torque: Any = torque_of(posture, gravity)
-        stability = NOT_KNOWN if self._level else stability_of(self._stance, gravity)
+        stability = NOT_KNOWN
+        if not self._level:
+            stability = stability_of(standing(self._stances, gravity), gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)

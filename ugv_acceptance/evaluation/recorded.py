@@ -30,7 +30,7 @@ from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.row_selection import ALL, Rows, pick
 from ugv_acceptance.model.sliding import slides_first
@@ -38,9 +38,9 @@ from ugv_acceptance.model.stability import (
     NO_CONTACT,
     UNKNOWN,
     Stance,
+    many_stances,
+    many_standing,
     stability_of,
-    stances_of,
-    take_stance,
     tip_angles_of,
 )
 from ugv_acceptance.type_aliases import Floats, Times
@@ -308,29 +308,14 @@ class RecordedEvaluator:
                 line[rows] = _product(torque_gradient, j, gravity)
         if not self.settings.hears_imu:
             return table, state
-        for some, stance in self._stances(posture, len(q), j):
+        stances = many_stances(self._mechanics, posture, len(q))
+        for some, stance in many_standing(stances, len(q), j, gravity):
             found = self._stability(stance, pick(gravity, some))
             place = some if isinstance(rows, slice) else rows[some]
             for line, value in zip(table[n:], found, strict=False):
                 line[place] = value
             state[place] = found[-1]
         return table, state
-
-    def _stances(
-        self, posture: Posture, count: int, j: NDArray[np.intp]
-    ) -> Iterator[tuple[Rows, Stance]]:
-        """Yield each stance of `count` joint rows with its messages, whose joint rows are `j`."""
-        place = np.empty(count, np.intp)
-        for of, stance in stances_of(self._mechanics, posture, count):
-            if of is ALL:
-                yield ALL, take_stance(stance, j)
-                return
-            place.fill(NEVER)
-            place[of] = np.arange(len(place[of]))
-            at = place[j]
-            some = np.flatnonzero(at >= 0)
-            if len(some):
-                yield some, take_stance(stance, at[some])
 
     def _stability(self, stance: Stance, gravity: Any) -> tuple[Any, ...]:  # noqa: ANN401 - arrays
         if not self.detail:

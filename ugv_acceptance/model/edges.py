@@ -2,7 +2,8 @@
 
 Force-angle after Papadopoulos and Rey (2000): with gravity alone the angle is the tilt that is left
 about the edge. Energy margin after Messuri and Klein (1985), for a robot that rotates about the
-edge's line. The formulas are compiled for each polygon; edges between two points of the base are
+edge's line. Each is that of a robot turned towards the edge by the rocking of its footing
+(support.py). The formulas are compiled for each polygon; edges between two points of the base are
 constants of the compiled code.
 """
 
@@ -19,10 +20,12 @@ from ugv_acceptance.model.expressions import (
     Vec,
     atan2,
     copysign,
+    cos,
     cross,
     dot,
     minimum,
     scale,
+    sin,
     sqrt,
     subtract,
 )
@@ -58,20 +61,25 @@ class Corners:
 class Edges:
     """Compiled tip-over margins of one polygon, given on which side of the robot each edge lies.
 
-    Both kernels take the terms of a stance (see Corners), then mass (kg) and gravity (3).
+    Both kernels take the terms of a stance (see Corners), then mass (kg) and gravity (3), and where
+    the footing `rocks` its rocking (rad).
     `angles` returns the tip angle (rad) to each of SIDES; `margins` returns these angles, then the
     moments (N m), the energies (J), and the ZMP distance (m). Infinite on a side without an edge.
     """
 
     angles: Kernel
     margins: Kernel
+    rocks: bool
 
 
 @lru_cache(maxsize=256)
-def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
-    """Return the Corners of a polygon: which of them move, and the outward normals of its edges."""
+def corners_of(mechanics: Mechanics, polygon: Cycle, *, free: bool = False) -> Corners:
+    """Return the Corners of a polygon: which of them move, and the outward normals of its edges.
+
+    With `free` all of them do, for a robot whose contact points are not just where they should be.
+    """
     contacts, frames = mechanics.robot.contacts, mechanics.tree.frames
-    moving = tuple(k for k in polygon if frames[contacts[k].link][0] != 0)
+    moving = tuple(k for k in polygon if free or frames[contacts[k].link][0] != 0)
 
     def formula(*terms: Scalar) -> list[Any]:
         points = corner_points(mechanics, polygon, moving, terms)
@@ -85,15 +93,18 @@ def corners_of(mechanics: Mechanics, polygon: Cycle) -> Corners:
 
 
 @lru_cache(maxsize=256)
-def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> Edges:
+def edges_of(
+    mechanics: Mechanics, corners: Corners, sides: tuple[int, ...], *, rocks: bool = False
+) -> Edges:
     """Return the compiled margins of a polygon whose edges lie on `sides` (numbers in SIDES)."""
 
     def table(inputs: Sequence[Scalar]) -> tuple[list[list[Scalar]], Scalar]:
-        *terms, mass, gx, gy, gz = inputs
+        rocking = inputs[-1] if rocks else 0.0
+        *terms, mass, gx, gy, gz = inputs[:-1] if rocks else inputs
         points = corner_points(mechanics, corners.polygon, corners.moving, terms)
         cog: Vec = (terms[0], terms[1], terms[2])
         edges = [
-            _edge_margins(points[i], points[j], cog, (gx, gy, gz))
+            _edge_margins(lever_of(points[i], points[j], cog), (gx, gy, gz), rocking)
             for i, j in pairs(corners.polygon)
         ]
         return edges, mass
@@ -108,8 +119,8 @@ def edges_of(mechanics: Mechanics, corners: Corners, sides: tuple[int, ...]) -> 
         held = [least_by_side(sides, [x * mass for x in of]) for of in (moment, energy)]
         return least_by_side(sides, angle), *held, reduce(minimum, zmp)
 
-    names = [f'x{k}' for k in range(3 + 3 * len(corners.moving) + 4)]
-    return Edges(compile_kernel(angles, names), compile_kernel(margins, names))
+    names = [f'x{k}' for k in range(3 + 3 * len(corners.moving) + 4 + rocks)]
+    return Edges(compile_kernel(angles, names), compile_kernel(margins, names), rocks)
 
 
 def least_by_side(sides: Sequence[int], values: Sequence[Scalar]) -> tuple[Scalar, ...]:
@@ -144,17 +155,23 @@ def lever_of(start: Vec, end: Vec, cog: Vec) -> tuple[Vec, Vec, Vec]:
     return along, square, cross(to_start, along)
 
 
-def _edge_margins(start: Vec, end: Vec, cog: Vec, gravity: Vec) -> list[Scalar]:
+def _edge_margins(lever: tuple[Vec, Vec, Vec], gravity: Vec, rocking: Scalar) -> list[Scalar]:
     """Return angle (rad), moment (N m/kg), energy (J/kg) and ZMP distance (m) of one edge."""
-    along, square, side = lever_of(start, end, cog)
+    along, square, side = lever
     along_l, along_b = dot(gravity, square), dot(gravity, side)
-    rise = sqrt(along_l * along_l + along_b * along_b) - along_l
+    angle = atan2(-along_b, along_l) - rocking
+    size = sqrt(along_l * along_l + along_b * along_b)
+    if rocking != 0.0:
+        s, c, held = sin(rocking), cos(rocking), along_b
+        along_l, along_b = c * along_l - s * along_b, c * along_b + s * along_l
+        along_b = -minimum(-along_b, -held)  # no more than without: upside down it turns past pi
+    rise = size - along_l
     flat = 1.0 / sqrt(along[0] * along[0] + along[1] * along[1])
     inward: Vec = (-along[1] * flat, along[0] * flat, 0.0)
     inward_l, inward_b = dot(inward, square), dot(inward, side)
     slope = along_l * inward_l + along_b * inward_b
     zmp = inward_b * slope / (along_l * inward_b - along_b * inward_l) - inward_l
-    return [atan2(-along_b, along_l), -along_b, copysign(rise, -along_b), zmp]
+    return [angle, -along_b, copysign(rise, -along_b), zmp]
 
 
 def side_of(x: Values, y: Values) -> Values:

@@ -1,20 +1,16 @@
-"""Convex hulls of a few points, in the plane and in space.
+"""Convex hulls of a few points, as seen from above.
 
 A recording has many samples but few different hulls: the hull found for one sample is tried on all
 the others, which is cheaper than computing each one's own.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache, reduce
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ugv_acceptance.model.expressions import Scalar
-from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.row_selection import ALL, Rows, Values, inner, pick
 
 Point = tuple[float, float, float]
@@ -22,12 +18,8 @@ Cycle = tuple[int, ...]
 
 # A polygon thinner than this (m) counts as a line: nothing can stand on it.
 THIN = 1e-6
-# Three points at least this far (m) from a line define the plane of their face accurately.
-WIDE = 1e-2
 # Three points count as being in one line if twice the area of their triangle is below this (m2).
 _SLACK = 1e-12
-# A place outside the hull is moved to its border, and by this share of the way further inside.
-_INWARD = 1e-9
 # Number of hulls tried on all samples; those still without one are then treated one by one.
 _TRIES = 50
 
@@ -127,105 +119,3 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
                 left = _turn(points[i], points[j], points[k])
                 good = good & ((left > _SLACK) if k in cycle else (left >= -_SLACK))
     return good
-
-
-@lru_cache(maxsize=16)
-def _turns_kernel(count: int) -> Kernel:
-    """Return a kernel of `_turn(a, b, place)` for every pair of `count` points.
-
-    Inputs: x and y of each point, then of the place.
-    """
-
-    def formula(*inputs: Scalar) -> list[Scalar]:
-        *points, place = [(inputs[2 * k], inputs[2 * k + 1]) for k in range(count + 1)]
-        return [_turn(a, b, place) for a, b in combinations(points, 2)]
-
-    return compile_kernel(formula, [f'x{k}' for k in range(2 * count + 2)])
-
-
-def _turns(points: Values, place: Values) -> dict[tuple[int, int], Values]:
-    flat = [x for point in points for x in point[:2]]
-    turns = _turns_kernel(len(points)).run(*flat, place[0], place[1])
-    return {pair: turns[k] for k, pair in enumerate(combinations(range(len(points)), 2))}
-
-
-@lru_cache(maxsize=16)
-def triples(count: int) -> tuple[tuple[int, int, int], ...]:
-    """Return all triples of `count` points, in a fixed order."""
-    return tuple(combinations(range(count), 3))
-
-
-def triple_under(points: Sequence[Point], place: Sequence[float]) -> tuple[int, int, int] | None:
-    """Return the three points whose triangle is lowest at a place (x, y); None if none covers it.
-
-    Above or below the place: only the height (m) of the triangle there counts.
-    """
-    turn, lowest, best = _turns(points, place), math.inf, None
-    for i, j, k in triples(len(points)):
-        a, b, c = turn[j, k], turn[i, k], turn[i, j]
-        if (a >= 0.0 >= b and c >= 0.0) or (a <= 0.0 <= b and c <= 0.0):
-            area = a - b + c
-            if abs(area) > THIN**2:
-                height = (a * points[i][2] - b * points[j][2] + c * points[k][2]) / area
-                if height < lowest:
-                    lowest, best = height, (i, j, k)
-    return best
-
-
-def triples_under(points: Values, place: Values, count: int) -> NDArray[np.int64]:
-    """Return `triple_under` of each sample, as a number in `triples`, shape (count,); -1: none."""
-    best, lowest = np.full(count, -1), np.full(count, np.inf)
-    turn = _turns(points, place)
-    left = {pair: np.asarray(t) >= 0.0 for pair, t in turn.items()}
-    right = {pair: np.asarray(t) <= 0.0 for pair, t in turn.items()}
-    for number, (i, j, k) in enumerate(triples(len(points))):
-        z = [points[n][2] for n in (i, j, k)]
-        inside = left[j, k] & right[i, k] & left[i, j]
-        inside = inside | (right[j, k] & left[i, k] & right[i, j])
-        rows = np.flatnonzero(np.broadcast_to(inside, count))
-        if not rows.size:
-            continue
-        turns = (turn[j, k], turn[i, k], turn[i, j])
-        (a, b, c), (p, q, r) = pick((turns, tuple(z)), rows)
-        area = a - b + c
-        with np.errstate(divide='ignore', invalid='ignore'):
-            height = np.broadcast_to((a * p - b * q + c * r) / np.asarray(area), rows.shape)
-        better = (height < lowest[rows]) & (abs(area) > THIN**2)
-        best[rows[better]] = number
-        lowest[rows[better]] = height[better]
-    return best
-
-
-def carries(points: Values, place: Values, triple: tuple[int, int, int]) -> Values:
-    """Return for which samples a triangle (not nearly a line) covers a place, seen from above."""
-    i, j, k = (points[n] for n in triple)
-    a, b, c = _turn(j, k, place), _turn(k, i, place), _turn(i, j, place)
-    sides = (a >= 0.0) & (b >= 0.0) & (c >= 0.0) | (a <= 0.0) & (b <= 0.0) & (c <= 0.0)
-    return sides & (abs(a + b + c) > WIDE**2)
-
-
-def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
-    """Return x, y (m) where the line from the points' mean to an outside place exits the hull."""
-    middle = [sum(p[k] for p in points) / len(points) for k in range(2)]
-    way = [place[k] - middle[k] for k in range(2)]
-    furthest: Any = 0.0
-    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
-        for a, b in combinations(points, 2):
-            edge, start = ([b[k] - a[k] for k in range(2)], [a[k] - middle[k] for k in range(2)])
-            across = np.float64(1.0) * (way[0] * edge[1] - way[1] * edge[0])
-            part = (start[0] * way[1] - start[1] * way[0]) / across
-            reach = (start[0] * edge[1] - start[1] * edge[0]) / across
-            hit = abs(part - 0.5) < 0.5 + _INWARD
-            furthest = np.maximum(furthest, np.where(hit, reach, 0.0))
-    x, y = (middle[k] + (1.0 - _INWARD) * furthest * way[k] for k in range(2))
-    return x, y
-
-
-def heights_above(points: Sequence[Any], i: int, j: int, k: int) -> list[Any]:
-    """Return how far (m) every point lies above the plane of points i, j and k, along base z."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = points[i], points[j], points[k]
-    nx = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
-    ny = (bz - az) * (cx - ax) - (bx - ax) * (cz - az)
-    nz = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    slope_x, slope_y = nx / nz, ny / nz
-    return [(z - az) + (x - ax) * slope_x + (y - ay) * slope_y for x, y, z in points]

@@ -95,14 +95,15 @@ def _together(parts: Sequence[_Part]) -> list[Scalar]:
 
 @lru_cache(maxsize=256)
 def tipping_of(
-    mechanics: Mechanics, corners: Corners, sides: tuple[int, ...], imu: Vector
+    mechanics: Mechanics, corners: Corners, sides: tuple[int, ...], imu: Vector, *, rocks: bool
 ) -> Kernel:
     """Return the kernel of a moving robot's margins about the edges of a polygon.
 
     The edges lie on `sides`. It takes the terms of a stance (see Corners), mass (kg), inertia (6,
     see `inertia_of`), then gravity, specific force (m/s2), rate (rad/s) and angular acceleration
     (rad/s2), three numbers each in base axes; the force is what an accelerometer at `imu` (m,
-    `base_link`) feels. It returns four numbers each, one to each of SIDES:
+    `base_link`) feels. Where the footing `rocks` its rocking (rad) comes last. It returns four
+    numbers each, one to each of SIDES:
 
     * the margin left with the energy of the turn towards the edge (rad; negative: it will tip),
     * the margin under effective gravity, felt at the edge (rad; negative: the other side lifts),
@@ -113,33 +114,39 @@ def tipping_of(
     """
 
     def formula(*inputs: Scalar) -> list[Any]:
+        inputs, rocking = (inputs[:-1], inputs[-1]) if rocks else (inputs, 0.0)
         *terms, mass = inputs[:-18]
         vectors = [(inputs[k], inputs[k + 1], inputs[k + 2]) for k in range(-12, 0, 3)]
         points = corner_points(mechanics, corners.polygon, corners.moving, terms)
         cog: Vec = (terms[0], terms[1], terms[2])
         spread = [x / mass for x in inputs[-18:-12]]
         edges = [
-            _tipping(lever_of(points[i], points[j], cog), cog, spread, vectors, imu)
+            _tipping(lever_of(points[i], points[j], cog), cog, spread, vectors, (imu, rocking))
             for i, j in pairs(corners.polygon)
         ]
         return [least_by_side(sides, [edge[k] for edge in edges]) for k in range(4)]
 
     terms = 3 + 3 * len(corners.moving)
-    return compile_kernel(formula, [f'x{k}' for k in range(terms + 1 + 6 + 12)])
+    return compile_kernel(formula, [f'x{k}' for k in range(terms + 1 + 6 + 12 + rocks)])
 
 
 def _tipping(
-    lever: tuple[Vec, Vec, Vec], cog: Vec, spread: Sequence[Scalar], felt: Sequence[Vec], imu: Vec
+    lever: tuple[Vec, Vec, Vec],
+    cog: Vec,
+    spread: Sequence[Scalar],
+    felt: Sequence[Vec],
+    sensor: tuple[Vec, Scalar],
 ) -> list[Scalar]:
     """Return the four numbers of `tipping_of` for one edge.
 
-    `spread` is the inertia by kg (m2), `felt` gravity, specific force, rate, angular acceleration.
+    `spread` is the inertia by kg (m2), `felt` gravity, specific force, rate, angular acceleration,
+    `sensor` the place of the IMU and the footing's rocking.
     """
-    gravity, force, omega, alpha = felt
+    (gravity, force, omega, alpha), (imu, rocking) = felt, sensor
     along, square, side = lever
     reach = dot(square, square)
     held, pressed = -dot(gravity, side), dot(gravity, square)
-    angle = atan2(held, pressed)
+    angle = atan2(held, pressed) - rocking
     # Only gravity square to the edge pulls about it; times r as `pressed` is.
     pull = sqrt(held * held + pressed * pressed)
     xx, yy, zz, xy, xz, yz = spread
@@ -153,5 +160,5 @@ def _tipping(
     size = minimum(copysign(1.0, left) * left, 1.0)
     margin = copysign(2.0 * atan2(sqrt(size), sqrt(1.0 - size)), left)
     at_edge = moved_specific_force(force, omega, alpha, subtract(add(cog, square), imu))
-    effective = atan2(dot(at_edge, side), -dot(at_edge, square))
+    effective = atan2(dot(at_edge, side), -dot(at_edge, square)) - rocking
     return [margin, effective, -rate, frequency]

@@ -12,7 +12,7 @@ from ugv_acceptance.model.expressions import add, cross, dot, rotate, scale, sub
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
-from ugv_acceptance.model.support import support_of
+from ugv_acceptance.model.stability import stances_of, standing
 from ugv_acceptance.model.tree import Tree, point_of, pose_of
 
 # Points of one body closer together than this (m) are drawn as one.
@@ -96,8 +96,8 @@ def skeleton_of(
     posture = posture_of(mechanics, tuple(q), payload.mass, payload.cog)
     contacts: Any = posture.contacts
     cog: Any = posture.cog
-    support = support_of(robot, contacts, cog)
-    polygon = tuple(contacts[k] for k in support.polygon)
+    footing = standing(stances_of(mechanics, posture), gravity).footing
+    polygon = tuple(contacts[k] for k in footing.polygon) if footing else ()
     ends = figure.ends.one(*q, *payload.cog)
     limbs = tuple(Limb(joint, *found) for joint, found in zip(figure.joints, ends, strict=False))
     load = ends[-1] if robot.payload_link is not None and payload.mass > 0.0 else None

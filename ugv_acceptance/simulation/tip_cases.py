@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.stability import stability
-from ugv_acceptance.model.support import support_of
+from ugv_acceptance.model.stability import stability, stances_of, standing
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
@@ -111,12 +110,12 @@ def expected_rest(robot: Robot, case: TipCase) -> Floats:
     """Return the attitude (3, 3) in which the robot stands on the level by the model."""
     load = case.payload
     posture = posture_of(mechanics_of(robot), case.q, load.mass, load.cog)
-    support = support_of(robot, posture.contacts, posture.cog)  # type: ignore[arg-type]  # floats
-    if not support.raised or not support.polygon:
+    stance = standing(stances_of(mechanics_of(robot), posture), (0.0, 0.0, -robot.gravity))
+    if stance.footing is None or not stance.footing.raised:
         return np.eye(3)
-    a, b, c = (np.array(posture.contacts[k]) for k in support.polygon[:3])
+    a, b, c = (np.array(posture.contacts[k]) for k in stance.footing.face)
     up = np.cross(b - a, c - a)
-    up /= np.linalg.norm(up)
+    up *= np.sign(up[2]) / np.linalg.norm(up)
     x = np.array([1.0, 0.0, 0.0]) - up[0] * up
     x /= np.linalg.norm(x)
     return np.array([x, np.cross(up, x), up])

@@ -15,8 +15,9 @@ from ugv_acceptance.model.expressions import Number
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.row_selection import Rows
+from ugv_acceptance.model.stability import many_stances, many_standing
 from ugv_acceptance.model.statics import LEAST_LEVER, gripper_point, static_torque
-from ugv_acceptance.model.support import pairs, supports_of
+from ugv_acceptance.model.support import pairs
 from ugv_acceptance.type_aliases import Floats
 
 # What limits the force first; NOTHING if no finite force is too large.
@@ -125,11 +126,14 @@ def _tip(robot: Robot, q: Floats, g: Floats, d: Floats, point: Floats, load: Pay
     def bound(*columns: Floats) -> tuple[Floats]:
         count = len(columns[0])
         posture = posture_of(mechanics, columns[:n], load.mass, load.cog)
-        weight = [posture.mass * x for x in columns[n : n + 3]]
+        gravity = (columns[n], columns[n + 1], columns[n + 2])
+        weight = [posture.mass * x for x in gravity]
         force, at = columns[n + 3 : n + 6], columns[n + 6 : n + 9]
         contacts = [[np.broadcast_to(x, count) for x in p] for p in posture.contacts]
         found = np.zeros(count)
-        for rows, support in supports_of(robot, posture.contacts, posture.cog, count):
+        stances = many_stances(mechanics, posture, count)
+        for rows, stance in many_standing(stances, count, np.arange(count), gravity):
+            polygon = stance.footing.polygon if stance.footing else ()
             edges = [
                 _edge_bound(
                     _rows(contacts[i], rows),
@@ -137,7 +141,7 @@ def _tip(robot: Robot, q: Floats, g: Floats, d: Floats, point: Floats, load: Pay
                     (_rows(posture.cog, rows), _rows(weight, rows)),
                     (_rows(at, rows), _rows(force, rows)),
                 )
-                for i, j in pairs(support.polygon)
+                for i, j in pairs(polygon)
             ]
             found[rows] = np.min(edges, axis=0) if edges else 0.0
         return (found,)

@@ -18,7 +18,7 @@ from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import centre_of_gravity, static_torque
-from ugv_acceptance.model.support import pairs, supports_of
+from ugv_acceptance.model.support import flat_polygon, pairs
 from ugv_acceptance.studies.bilinear import Grid, along_rows, evaluate, form_of, is_sum_form
 from ugv_acceptance.studies.windows import Mask, window_between
 from ugv_acceptance.type_aliases import Floats
@@ -173,12 +173,11 @@ def tip_forms(
     points = _fixed_contacts(robot, grid)
     if points is None or g[2] >= 0.0:
         return None
-    centre = tuple(float(x) for x in centre_of_gravity(robot, grid.q, payload))
-    ((_, support),) = supports_of(robot, points, centre, 1)
-    if support.raised or not support.polygon:
+    polygon = flat_polygon(mechanics_of(robot), [tuple(point.tolist()) for point in points])
+    if not polygon:
         return None
     sine, cosine, side = [], [], []
-    for i, j in pairs(support.polygon):
+    for i, j in pairs(polygon):
         start, along = points[i], points[j] - points[i]
         along /= np.linalg.norm(along)
         square = g - along * (along @ g)

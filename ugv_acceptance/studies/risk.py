@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.model.mechanics import Posture, mechanics_of
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.model.stability import stability_of, stances_of
+from ugv_acceptance.model.stability import many_stances, many_standing, stability_of
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.studies.risk_kernel import risk_kernel
 from ugv_acceptance.studies.spread import Spread, clopper_pearson, generators
@@ -139,7 +139,8 @@ def _triples(values: tuple[Any, ...]) -> tuple[Any, ...]:
 def _tipped(robot: Robot, posture: Posture, gravity: Columns, count: int) -> NDArray[np.bool_]:
     """Return which samples (count,) tip: no positive moment holds them, or no margin exists."""
     tipped = np.ones(count, dtype=np.bool_)
-    for rows, stance in stances_of(mechanics_of(robot), posture, count):
+    stances = many_stances(mechanics_of(robot), posture, count)
+    for rows, stance in many_standing(stances, count, np.arange(count), gravity):
         gx, gy, gz = (g[rows] for g in gravity)
         found = stability_of(stance, (gx, gy, gz))
         least = found.moment[0]

@@ -27,9 +27,9 @@ from ugv_acceptance.model.expressions import (
     transpose,
 )
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import NO_INERTIA, Link, Robot
-from ugv_acceptance.model.statics import centre_of_gravity
-from ugv_acceptance.model.support import pairs, support_of
+from ugv_acceptance.model.support import flat_polygon, pairs
 from ugv_acceptance.model.tree import Pose, Tree, point_of, pose_of, tree_of
 
 AXES = ('x', 'y', 'z')
@@ -84,7 +84,7 @@ def risk_kernel(
         nonlocal edges
         values = dict(zip(names, inputs, strict=True))
         torques, stand = _outputs(robot, tree, fixed, values, judged)
-        moments = _fixed_edges(robot, fixed, stand)
+        moments = _fixed_edges(robot, stand)
         edges = len(moments)
         rest = moments or [
             stand.mass,
@@ -108,19 +108,15 @@ class _Stand:
     contacts: list[Vec]
 
 
-def _fixed_edges(robot: Robot, fixed: Sequence[float], stand: _Stand) -> list[Scalar]:
+def _fixed_edges(robot: Robot, stand: _Stand) -> list[Scalar]:
     """Return the moment (N m) about each tip edge; an empty list if the polygon can change."""
     if not stand.contacts or not all(isinstance(x, float) for p in stand.contacts for x in p):
-        return []
-    cog = centre_of_gravity(robot, fixed)
-    support = support_of(robot, stand.contacts, tuple(float(x) for x in cog))  # type: ignore[arg-type]  # all floats
-    if support.raised or not support.polygon:
         return []
     return [
         moment_about(
             stand.contacts[i], stand.contacts[j], stand.cog, scale(stand.gravity, stand.mass)
         )
-        for i, j in pairs(support.polygon)
+        for i, j in pairs(flat_polygon(mechanics_of(robot), stand.contacts))  # type: ignore[arg-type]  # floats
     ]
 
 

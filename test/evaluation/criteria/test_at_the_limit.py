@@ -16,7 +16,7 @@ from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import Limits
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.stability import stability_of, stance_of
+from ugv_acceptance.model.stability import stability_of, stances_of, standing
 from ugv_acceptance.model.statics import torque_of
 
 DOWN = (0.0, 0.0, -9.81)
@@ -26,7 +26,7 @@ def level() -> tuple[float, float]:
     """Return torque of the lift and tilt left to the front, as one sample gives them."""
     mechanics = mechanics_of(settings().robot)
     posture = posture_of(mechanics, (0.0, 0.0), 1.0, (0.1, 0.0, 0.0))
-    angle = stability_of(stance_of(mechanics, posture), DOWN).angle[0]
+    angle = stability_of(standing(stances_of(mechanics, posture), DOWN), DOWN).angle[0]
     return abs(float(torque_of(posture, DOWN)[0])), float(angle)
 
 

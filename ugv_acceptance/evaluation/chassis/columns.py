@@ -37,6 +37,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
     ChassisMotion,
     Episodes,
     no_witness,
+    run_tipping,
     stance_kernel,
     witnessed,
 )
@@ -46,7 +47,7 @@ from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.model.mechanics import posture_of
 from ugv_acceptance.model.row_selection import pick
-from ugv_acceptance.model.stability import STANDING, stances_of
+from ugv_acceptance.model.stability import STANDING, many_stances, many_standing
 from ugv_acceptance.model.tipping import inertia_of
 from ugv_acceptance.type_aliases import Floats, Times
 
@@ -315,11 +316,13 @@ def _margins(
     inertia = inertia_of(motion.mechanics).run(*q, mass, *cog)
     gravity, push, rate, lagging = part.gravity, part.y[:3], part.y[3:6], part.y[6:9]
     felt = np.concatenate((gravity, push - gravity, rate, (rate - lagging) / PUSH))[:, at]
-    for of, stance in stances_of(motion.mechanics, posture, len(at)):
+    count = len(at)
+    stances = many_stances(motion.mechanics, posture, count)
+    for of, stance in many_standing(stances, count, np.arange(count), tuple(gravity[:, at])):
         if stance.edges is None:
             continue
         kernel = stance_kernel(motion.mechanics, stance, motion.settings.imu.position)
-        found = kernel.run(*stance.terms, stance.mass, *pick((*inertia, *felt), of))
+        found = run_tipping(kernel, stance, pick(tuple(inertia), of), pick(tuple(felt), of))
         for k, values in enumerate(found):
             for side, value in enumerate(values):
                 table[k, at[of], side] = value

@@ -17,7 +17,7 @@ from ugv_acceptance.model.edges import SIDES, corners_of
 from ugv_acceptance.model.kernels import Kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import IDENTITY, Payload, Vector
-from ugv_acceptance.model.stability import Stance
+from ugv_acceptance.model.stability import Stance, standing
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
 from ugv_acceptance.model.tree import point_of, pose_of
 
@@ -133,8 +133,8 @@ class Episodes:
         return [past * past * wn2 > 1.0 and turn < NONE for past, turn, wn2 in found]
 
 
-# What a posture determines: stance, joint positions (rad, m), payload.
-Standing = tuple[Stance, tuple[float, ...], Payload]
+# What a posture determines: ways to stand, joint positions (rad, m), payload.
+Pose = tuple[tuple[Stance, ...], tuple[float, ...], Payload]
 
 
 @dataclass(slots=True)
@@ -151,10 +151,10 @@ class ChassisMotion:
     filter: ChassisFilter = field(init=False)
     mechanics: Mechanics = field(init=False)
     episodes: Episodes = field(default_factory=Episodes)
-    stands: Standing | None = None
+    stands: Pose | None = None
     busy: bool = False
     turned: bool = False
-    _inertia: tuple[Standing | None, Four] = (None, ())
+    _inertia: tuple[Pose | None, Four] = (None, ())
 
     def __post_init__(self) -> None:
         imu, robot = self.settings.imu, self.settings.robot
@@ -188,7 +188,7 @@ class ChassisMotion:
         stands = self.stands
         if stands is None or angles is None or not rate or not self.turned:
             return
-        least, stance = min(angles), stands[0]
+        least, stance = min(angles), standing(stands[0], gravity)
         if stance.edges is None or not least > 0.0:  # past tipping at rest: TIP_OVER says it all
             return
         square, up, off = found
@@ -246,7 +246,8 @@ class ChassisMotion:
         """Return the four results of model/tipping.py for the newest message and stance."""
         if self.stands is None:
             return (UNKNOWN4,) * 4
-        stance, q, load = self.stands
+        stances, q, load = self.stands
+        stance = standing(stances, gravity)
         if self._inertia[0] is not self.stands:
             self._inertia = self.stands, inertia_of(self.mechanics).one(*q, load.mass, *load.cog)
         kernel = stance_kernel(self.mechanics, stance, self.settings.imu.position)
@@ -254,13 +255,13 @@ class ChassisMotion:
         gx, gy, gz = gravity
         alpha = ((px - qx) / PUSH, (py - qy) / PUSH, (pz - qz) / PUSH)
         felt = (*gravity, vx - gx, vy - gy, vz - gz, px, py, pz, *alpha)
-        return kernel.one(*stance.terms, stance.mass, *self._inertia[1], *felt)
+        return run_tipping(kernel, stance, self._inertia[1], felt)
 
     def moving(self, gravity: Vector, angles: Four) -> Four | None:
         """Return the tilt left (rad) to each side with the energy of the turn; None: no gyro."""
         if not (self.turned and self.filter.blocks.fast):
             return None
-        if self.stands is None or self.stands[0].edges is None:
+        if self.stands is None or self.stands[0][0].edges is None:
             return None
         return tuple(map(min, self.margins(gravity)[0], angles))
 
@@ -305,4 +306,15 @@ def no_witness(imu: ImuInput) -> bool:
 
 def stance_kernel(mechanics: Mechanics, stance: Stance, imu: Vector) -> Kernel:
     """Return the kernel of model/tipping.py for the edges of a stance (which has some)."""
-    return tipping_of(mechanics, corners_of(mechanics, stance.support.polygon), stance.sides, imu)
+    footing, edges = stance.footing, stance.edges
+    assert footing is not None and edges is not None  # noqa: S101, PT018 - for the type checker
+    corners = corners_of(mechanics, footing.polygon)
+    return tipping_of(mechanics, corners, stance.sides, imu, rocks=edges.rocks)
+
+
+def run_tipping(
+    kernel: Kernel, stance: Stance, inertia: Sequence[Any], felt: Sequence[Any]
+) -> tuple[Any, ...]:
+    """Return what the kernel of a stance says: floats or arrays. `felt` is what comes last."""
+    rocking = (stance.rocking,) if stance.edges and stance.edges.rocks else ()
+    return kernel.run(*stance.terms, stance.mass, *inertia, *felt, *rocking)

@@ -1,8 +1,8 @@
 """Uncertainty of worst margins, from the stated +/- of the numbers they are computed from.
 
 First order: each number is changed by its +/- to both sides while the support polygon stays the
-same; half the difference of the margins is that number's effect. Effects are combined as a root sum
-of squares (independent numbers) or as a sum (worst case).
+same, but not its rocking; half the difference of the margins is that number's effect. Effects are
+combined as a root sum of squares (independent numbers) or as a sum (worst case).
 """
 
 import math
@@ -16,15 +16,21 @@ from ugv_acceptance.evaluation.criteria.criteria import IGNORED, RSS, WORST_CASE
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, Moment, ValueMeasure
 from ugv_acceptance.evaluation.criteria.quantities import shown
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.edges import corners_of, edges_of
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vector
-from ugv_acceptance.model.stability import SIDES, stance_of, tip_angles_of
+from ugv_acceptance.model.stability import SIDES, stances_of, standing, tip_angles_of
 from ugv_acceptance.model.statics import torque_of
+from ugv_acceptance.model.support import footings_of
 from ugv_acceptance.type_aliases import Floats
 
 Gravity = tuple[float, float, float]
 # Subjects of a source besides links and joints: all contact points, the payload, the IMU.
 CONTACTS, PAYLOAD, IMU = 'contacts', 'payload', 'imu'
+# Heights of contacts are those of each alone: together they lower the robot and rock nothing.
+HEIGHT = 2
+# Kinds of numbers that change which points carry: to both sides they may lower a margin.
+FOOTING = frozenset({'place', 'offset'})
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +38,8 @@ class Source:
     """A source of uncertainty: +/- `value` (SI) on the number `what` of `subject`.
 
     `name` is its name in the configuration. `what` is mass, cog, place (of a joint or contacts),
-    offset, limit, roll or pitch (of the IMU); `axis` is 0, 1 or 2 if it is a vector.
+    offset, limit, roll or pitch (of the IMU); `axis` is 0, 1 or 2 if it is a vector. `only` is the
+    contact it is about; '': all together.
     """
 
     name: str
@@ -40,6 +47,7 @@ class Source:
     what: str
     value: float
     axis: int = 0
+    only: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +94,32 @@ def effects_of(
         if source.what == 'limit':
             limit[k, robot.joint_names.index(source.subject)] = source.value
             continue
-        high, low = (_moved(point, source, sign * source.value) for sign in (1.0, -1.0))
-        with np.errstate(invalid='ignore'):
-            table[k] = 0.5 * (margins(high) - margins(low))
-        position[k] = 0.5 * (np.array(high.q) - np.array(low.q))
+        some = [_effect(margins, point, one) for one in _alone(point, source)]
+        table[k] = some[0] if len(some) == 1 else combined(np.array(some), RSS)
+        if source.what == 'offset':
+            position[k, robot.joint_names.index(source.subject)] = source.value
         tilt[k] = source.value if source.subject == IMU else 0.0
     return Effects(tuple(sources), table[:, :n], table[:, n:], position, limit, tilt)
+
+
+def _alone(point: _Point, source: Source) -> list[Source]:
+    """Return what varies on its own: each contact's height, else the source itself."""
+    if source.subject != CONTACTS or source.axis != HEIGHT:
+        return [source]
+    return [replace(source, only=contact.name) for contact in point.robot.contacts]
+
+
+def _effect(margins: Callable[[_Point], Floats], point: _Point, source: Source) -> Floats:
+    """Return half the difference that +/- of a source makes, or the fall where both lower it."""
+    high, low = (margins(_moved(point, source, s * source.value)) for s in (1.0, -1.0))
+    with np.errstate(invalid='ignore'):
+        half = 0.5 * (high - low)
+        if source.what not in FOOTING:
+            return half
+        nominal = margins(point)
+        both = np.minimum(nominal - high, nominal - low) > 0.0
+        found: Floats = np.where(both, nominal - np.minimum(high, low), half)
+    return found
 
 
 def torque_effects(
@@ -125,29 +153,32 @@ def combined(effects: Floats, method: str) -> Floats:
 
 
 def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
-    """Return a function of torques and tip angles (j + 4,) near a point, on its support polygon."""
+    """Return a function of torques and tip angles (j + 4,) near a point, on its footing."""
     mechanics = mechanics_of(point.robot)
     nominal: Any = _posture(point)
-    stance = stance_of(mechanics, nominal)
-    contacts, frames = point.robot.contacts, mechanics.tree.frames
-    polygon = stance.support.polygon if stance.edges else ()
-    moving = [k for k in polygon if frames[contacts[k].link][0] != 0]
-    on_base = next((k for k in polygon if k not in moving), None)
+    stance = standing(stances_of(mechanics, nominal), point.gravity)
+    footing = stance.footing
+    none = [math.nan] * len(SIDES)
+    if footing is None:
+        return lambda at: np.array([*torque_of(_posture(at), at.gravity), *none], np.float64)
+    # The compiled margins have the base's corners as constants; these here are free to move.
+    corners = corners_of(mechanics, footing.polygon, free=True)
+    edges = edges_of(mechanics, corners, stance.sides, rocks=True)
 
     def margins(at: _Point) -> Floats:
         posture: Any = _posture(at)
-        torque = torque_of(posture, at.gravity)
-        if stance.edges is None:
-            return np.array([*torque, *(math.nan for _ in SIDES)])
-        # The kernel has the base's corners as constants: shift everything else the other way.
-        shift = np.zeros(3)
-        if on_base is not None:
-            shift = np.array(posture.contacts[on_base]) - np.array(nominal.contacts[on_base])
-        points = [posture.cog, *(posture.contacts[k] for k in moving)]
-        terms = tuple(float(x) for p in points for x in np.array(p) - shift)
-        near = replace(stance, terms=terms, mass=posture.mass)
-        angle, _ = tip_angles_of(near, at.gravity)
-        return np.array([*torque, *angle], dtype=np.float64)
+        terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]
+        near = footings_of(mechanics, posture.contacts)
+        rocking = [f.rocking for f in near if f.polygon == footing.polygon] or [footing.rocking]
+        moved = replace(
+            stance,
+            footing=replace(footing, rocking=rocking[0]),
+            terms=tuple(map(float, terms)),
+            mass=posture.mass,
+            edges=edges,
+        )
+        angle, _ = tip_angles_of(moved, at.gravity)
+        return np.array([*torque_of(posture, at.gravity), *angle], dtype=np.float64)
 
     return margins
 
@@ -199,6 +230,8 @@ def _joint(joint: Joint, source: Source, by: float) -> Joint:
 
 
 def _contact(contact: Contact, source: Source, by: float) -> Contact:
+    if source.only not in {'', contact.name}:
+        return contact
     return replace(contact, position=_added(contact.position, source.axis, by))
 
 
