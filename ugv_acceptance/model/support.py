@@ -11,7 +11,6 @@ A polygon is a cycle of contact numbers, counter-clockwise as seen from above.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, reduce
 from itertools import chain, combinations
 from typing import Any
@@ -20,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.model.expressions import (
-    Number,
     Scalar,
     Vec,
     copysign,
@@ -30,11 +28,24 @@ from ugv_acceptance.model.expressions import (
     sqrt,
     subtract,
 )
+from ugv_acceptance.model.feet import (
+    LEVEL,
+    MOST,
+    ROCKING,
+    Feet,
+    Footing,
+    charged,
+    drops_of,
+    feet_of,
+    height_over,
+    largest,
+    leaning,
+    radius_of,
+)
 from ugv_acceptance.model.hull import THIN, Cycle, Point, hull, hulls, pairs
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.row_selection import ALL, Rows, Values, groups, pick
-from ugv_acceptance.model.tree import in_body
 from ugv_acceptance.type_aliases import Floats
 
 __all__ = [
@@ -50,93 +61,6 @@ __all__ = [
     'pairs',
 ]
 
-# Rocking (rad) charged for a point that is as far from the plane as the contacts are from their
-# middle; for a point that drops by its distance from the tracks; for each radian of a face's
-# inclination beyond STEEP (rad): nothing stands on its side.
-ROCKING = 10.0
-STEEP = math.radians(30.0)
-# Beyond this rocking (rad) each radian counts as DEARER: what is so far off the ground is no foot.
-FAR = math.radians(25.0)
-DEARER = 1.6
-# As shares of the contacts' radius: the least distance from the tracks that counts for a drop, and
-# how high above the tracks' ground plane a point of the base is one of the tracks.
-NEAR = 0.25
-BAND = 0.0625
-# With as much rocking (rad) as this no margin is left: no edge is ever further than this.
-MOST = 0.5 * math.pi
-# A point this far (m) below a plane is still on it.
-_LEVEL = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Footing:
-    """Contact points that can carry a robot together.
-
-    `points` are those on or near the plane of `face` (three of them), `polygon` is the cycle of
-    their hull. `rocking` (rad, a float or one a row) is what is taken from every margin until all
-    of them carry. `raised`: one of them is below the tracks' ground plane.
-    """
-
-    points: Cycle
-    face: tuple[int, int, int]
-    polygon: Cycle
-    rocking: Number
-    raised: bool
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Feet:
-    """What is known of a robot's contacts before their place is.
-
-    `tracks` are the contact numbers on the base and near the tracks' ground plane, which is at
-    `plane` (m). Of a point of `others` only what is higher than its height here counts as a drop:
-    those of the base may be uneven, those on moving links start at the plane. `lines` are the
-    edges of the tracks' polygon: a point (x, y) in m and the outward unit normal. All are empty
-    where the base has no polygon, as with legs.
-    """
-
-    tracks: Cycle
-    plane: float
-    others: tuple[tuple[int, float], ...]
-    lines: tuple[tuple[float, float, float, float], ...]
-    ground: float
-    tolerance: float
-
-
-@lru_cache(maxsize=64)
-def feet_of(mechanics: Mechanics) -> Feet:
-    """Return the Feet of a robot."""
-    robot, frames = mechanics.robot, mechanics.tree.frames
-    none = Feet((), robot.ground, (), (), robot.ground, robot.contact_tolerance)
-    base = {
-        k: _plain(in_body(mechanics.tree, contact.link, contact.position)[1])
-        for k, contact in enumerate(robot.contacts)
-        if frames[contact.link][0] == 0
-    }
-    if len(base) < 3:
-        return none
-    plane = max(robot.ground, sorted(z for _, _, z in base.values())[2])
-    band = BAND * _radius(list(base.values()))
-    tracks = tuple(k for k, (_, _, z) in base.items() if z <= plane + band)
-    polygon = hull(tuple(base[k] for k in tracks), tracks)
-    if not polygon:
-        return none
-    others = [(k, plane + band) for k in base if k not in tracks]
-    others += [(k, plane) for k in range(len(robot.contacts)) if k not in base]
-    lines = tuple(_line(base[i], base[j]) for i, j in pairs(polygon))
-    return Feet(tracks, plane, tuple(others), lines, robot.ground, robot.contact_tolerance)
-
-
-def _line(start: Point, end: Point) -> tuple[float, float, float, float]:
-    x, y = end[0] - start[0], end[1] - start[1]
-    length = math.hypot(x, y)
-    return (start[0], start[1], y / length, -x / length)
-
-
-def _plain(point: Vec) -> Point:
-    x, y, z = (float(c) for c in point)  # type: ignore[arg-type]  # numbers in, numbers out
-    return (x, y, z)
-
 
 def flat_polygon(mechanics: Mechanics, points: Sequence[Point]) -> Cycle:
     """Return the polygon of a robot that stands flat on its tracks, whatever gravity is.
@@ -149,6 +73,8 @@ def flat_polygon(mechanics: Mechanics, points: Sequence[Point]) -> Cycle:
     return footings[0].polygon
 
 
+# Prices (rad) that differ by less are the same.
+_SAME = 1e-9
 # Of one sample: a set of points as bits, its rocking (rad) and its face.
 _Found = tuple[int, float, tuple[int, int, int]]
 
@@ -158,7 +84,10 @@ def footings_of(mechanics: Mechanics, points: Sequence[Point]) -> tuple[Footing,
 
     From its contact points (m, `base_link`); () where they are fewer than three, or in one line.
     """
-    return _footings(tuple(map(tuple, points)), feet_of(mechanics))
+    feet = feet_of(mechanics)
+    if feet.alone and min([height_over(points[k], feet, z, max) for k, z in feet.others]) > 0.0:
+        return feet.alone
+    return _footings(tuple(map(tuple, points)), feet)
 
 
 @lru_cache(maxsize=1024)
@@ -166,10 +95,16 @@ def _footings(points: tuple[Point, ...], feet: Feet) -> tuple[Footing, ...]:
     if len(points) < 3:
         return ()
     found: dict[Cycle, Footing] = {}
-    sets = sorted(_sets(points, feet), key=lambda one: (one[1], one[0]))
-    for bits, rocking, face in sets:
-        if rocking >= MOST and rocking > sets[0][1]:
+    least: dict[int, tuple[float, tuple[int, int, int]]] = {}
+    for bits, rocking, face in _sets(points, feet):
+        if bits not in least or rocking < least[bits][0]:
+            least[bits] = rocking, face
+    sets = sorted((rocking, bits, face) for bits, (rocking, face) in least.items())
+    for rocking, bits, face in sets:
+        if rocking >= MOST and rocking > sets[0][0]:
             break
+        if any(bits & more == bits != more and price <= rocking + _SAME for price, more, _ in sets):
+            continue  # more points carry for no more
         near = _numbers(bits, len(points))
         polygon = hull(tuple([points[k] for k in near]), near)
         if polygon and polygon not in found:
@@ -180,67 +115,28 @@ def _footings(points: tuple[Point, ...], feet: Feet) -> tuple[Footing, ...]:
 
 def _sets(points: Sequence[Point], feet: Feet) -> Iterator[_Found]:
     """Yield the sets of points on and near each face of the lower hull of one sample."""
-    radius = max(_radius(points), THIN)
-    charge, drops = ROCKING / radius, _drops(points, feet, radius)
-    for face, others in _faces(len(points)):
-        at = [x for k in (*face, *others) for x in points[k]]
-        area, upright, *heights = _face_kernel(len(others)).one(*at)
-        if area <= THIN**2 or min(heights, default=0.0) < -_LEVEL:
+    radius = max(radius_of(points), THIN)
+    charge, drops = ROCKING / radius, drops_of(points, feet, radius)
+    planes: list[int] = []
+    for (face, others), (area, upright, *heights) in zip(
+        _faces(len(points)), _planes(points, feet), strict=True
+    ):
+        if area <= THIN**2 or min(heights, default=0.0) < -LEVEL:
             continue
-        lean = _lean(math.acos(min(upright, 1.0)))
-        price, bits, height = max([drops[k] for k in face]), _bits(face), 0.0
+        bits = _bits(face)
+        if any(bits & plane == bits for plane in planes):
+            continue  # the plane of another face: the same sets
+        lean = leaning(math.acos(min(upright, 1.0)))
+        price, height = max([drops[k] for k in face]), 0.0
         order = sorted(zip(heights, others, strict=True))
         for place in range(len(order) + 1):
             if place:
                 height, k = order[place - 1]
                 bits, price = bits | 1 << k, max(price, charge * height, drops[k])
-            if place == len(order) or order[place][0] - max(height, 0.0) >= _LEVEL:
-                yield bits, _charged(price) + lean, face
-
-
-def _lean(inclination: Values) -> Values:
-    """Return the rocking (rad) charged for a face inclined from the base by so much (rad)."""
-    if isinstance(inclination, float):
-        return ROCKING * max(inclination - STEEP, 0.0)
-    return ROCKING * np.maximum(inclination - STEEP, 0.0)
-
-
-def _radius(points: Sequence[Any]) -> Any:  # noqa: ANN401 - a float, or one a row
-    """Return the largest horizontal distance (m) of a contact from their mean."""
-    x, y = (sum(p[k] for p in points) / len(points) for k in range(2))
-    squares = [(p[0] - x) * (p[0] - x) + (p[1] - y) * (p[1] - y) for p in points]
-    return _largest(squares) ** 0.5
-
-
-def _drops(points: Sequence[Any], feet: Feet, radius: Any) -> list[Any]:  # noqa: ANN401
-    """Return what each point costs (rad) because a robot on its tracks drops onto it.
-
-    Nothing for points on the base, and without tracks. Floats, or arrays of one a row.
-    """
-    prices: list[Any] = [0.0] * len(points)
-    if not feet.others:
-        return prices
-    # Flippers below the tracks' plane raise the robot: others then reach the ground earlier.
-    raised = _largest([0.0, *(feet.ground - points[k][2] for k, _ in feet.others)])
-    for k, height in feet.others:
-        x, y, z = points[k]
-        away = [(x - ax) * nx + (y - ay) * ny for ax, ay, nx, ny in feet.lines]
-        reach = -_largest([-radius, -_largest([NEAR * radius, *away])])
-        prices[k] = ROCKING * _largest([0.0, z - (height + raised)]) / reach
-    return prices
-
-
-def _charged(price: Values) -> Values:
-    """Return the rocking (rad) charged for what costs `price` while it is near."""
-    if isinstance(price, float):
-        return max(price, FAR + DEARER * (price - FAR))
-    return np.maximum(price, FAR + DEARER * (price - FAR))
-
-
-def _largest(values: Sequence[Any]) -> Any:  # noqa: ANN401 - a float, or one a row
-    if all(isinstance(x, float) for x in values):
-        return max(values)
-    return reduce(np.maximum, values)
+            if place == len(order) or order[place][0] - max(height, 0.0) >= LEVEL:
+                if height < LEVEL:
+                    planes.append(bits)
+                yield bits, charged(price) + lean, face
 
 
 @lru_cache(maxsize=16)
@@ -250,23 +146,47 @@ def _faces(count: int) -> tuple[tuple[tuple[int, int, int], Cycle], ...]:
     return tuple((f, tuple(k for k in whole if k not in f)) for f in combinations(whole, 3))
 
 
+def _plane(points: Sequence[Vec]) -> list[Scalar]:
+    """Return what there is to know of the plane of the first three of some points.
+
+    Twice the triangle's area (m2), the cosine of its inclination, and the height (m) of each
+    further point above it, square to the plane.
+    """
+    a, *rest = points
+    from_a: list[Vec] = [subtract(p, a) for p in rest]
+    normal = cross(from_a[0], from_a[1])
+    area = sqrt(dot(normal, normal))
+    up = scale(normal, copysign(1.0, normal[2]) / (area + 1e-300))  # never divided by 0
+    return [area, up[2], *(dot(p, up) for p in from_a[2:])]
+
+
 @lru_cache(maxsize=16)
 def _face_kernel(others: int) -> Kernel:
-    """Return the kernel of the plane of three points and the heights of `others` above it.
-
-    It takes the coordinates (m) of the three and of the others, and returns twice the triangle's
-    area (m2), the cosine of the plane's inclination, and each height (m), square to the plane.
-    """
+    """Return the kernel of `_plane` of three points and `others`; inputs: their coordinates."""
 
     def formula(*inputs: Scalar) -> list[Scalar]:
-        a, *rest = [(inputs[k], inputs[k + 1], inputs[k + 2]) for k in range(0, 9 + 3 * others, 3)]
-        from_a: list[Vec] = [subtract(p, a) for p in rest]
-        normal = cross(from_a[0], from_a[1])
-        area = sqrt(dot(normal, normal))
-        up = scale(normal, copysign(1.0, normal[2]) / (area + 1e-300))  # never divided by 0
-        return [area, up[2], *(dot(p, up) for p in from_a[2:])]
+        return _plane([inputs[k : k + 3] for k in range(0, 9 + 3 * others, 3)])  # type: ignore[misc]
 
     return compile_kernel(formula, [f'x{k}' for k in range(9 + 3 * others)])
+
+
+@lru_cache(maxsize=16)
+def _planes_kernel(count: int) -> Kernel:
+    """Return the kernel of `_plane` of all `_faces` of `count` points."""
+
+    def formula(*inputs: Scalar) -> list[list[Scalar]]:
+        points: Any = [inputs[k : k + 3] for k in range(0, 3 * count, 3)]
+        return [_plane([points[k] for k in (*f, *others)]) for f, others in _faces(count)]
+
+    return compile_kernel(formula, [f'x{k}' for k in range(3 * count)])
+
+
+def _planes(points: Sequence[Point], feet: Feet) -> Sequence[Sequence[Any]]:
+    """Return `_plane` of all `_faces`; compiled where the points will be others next time."""
+    count = len(points)
+    if feet.moves:
+        return _planes_kernel(count).one(*chain.from_iterable(points))
+    return [_plane([points[k] for k in (*f, *others)]) for f, others in _faces(count)]
 
 
 def _bits(numbers: Sequence[int]) -> int:
@@ -290,6 +210,19 @@ def many_footings(
         return [(ALL, footing) for footing in _footings(points, feet)]
     if len(points) < 3:
         return []
+    if feet.alone:
+        heights = [height_over(points[k], feet, z, largest) for k, z in feet.others]
+        low = np.flatnonzero(np.broadcast_to(reduce(np.minimum, heights), count) <= 0.0)
+        if not len(low):
+            return [(ALL, feet.alone[0])]
+        if len(low) < count:
+            high = np.delete(np.arange(count), low)
+            some = _many(feet, pick(points, low), len(low))
+            return [(high, feet.alone[0]), *((low[rows], footing) for rows, footing in some)]
+    return _many(feet, points, count)
+
+
+def _many(feet: Feet, points: Sequence[Any], count: int) -> list[tuple[Rows, Footing]]:
     row, bits, rocking, face = _table(points, feet, count)
     parts = []
     for code, at, _ in groups(bits * len(_faces(len(points))) + face):
@@ -308,9 +241,9 @@ def _table(points: Sequence[Any], feet: Feet, count: int) -> tuple[NDArray[Any],
     The columns are ordered by set and row; of several faces with one set the cheapest counts.
     """
     columns: list[tuple[NDArray[Any], ...]] = []
-    radius = np.maximum(_radius(points), THIN)
+    radius = np.maximum(radius_of(points), THIN)
     charge = np.broadcast_to(ROCKING / radius, count)
-    drops = [np.broadcast_to(price, count) for price in _drops(points, feet, radius)]
+    drops = [np.broadcast_to(price, count) for price in drops_of(points, feet, radius)]
     for number, (face, others) in enumerate(_faces(len(points))):
         found = _near_face(points, (face, others), (charge, drops), count)
         columns += [(*some, np.full(len(some[0]), number)) for some in found]
@@ -323,9 +256,26 @@ def _table(points: Sequence[Any], feet: Feet, count: int) -> tuple[NDArray[Any],
     matters = np.flatnonzero(rocking <= np.maximum(least, np.nextafter(MOST, 0.0))[row])
     order = matters[np.lexsort((of[matters], rocking[matters], row[matters], bits[matters]))]
     row, bits, rocking, of = (column[order] for column in (row, bits, rocking, of))
-    first = np.ones(len(row), np.bool_)
-    first[1:] = (row[1:] != row[:-1]) | (bits[1:] != bits[:-1])
-    return row[first], bits[first], rocking[first], of[first]
+    kept = np.ones(len(row), np.bool_)
+    kept[1:] = (row[1:] != row[:-1]) | (bits[1:] != bits[:-1])
+    row, bits, rocking, of = (column[kept] for column in (row, bits, rocking, of))
+    kept = _undominated(row, bits, rocking, count)
+    return row[kept], bits[kept], rocking[kept], of[kept]
+
+
+def _undominated(
+    row: NDArray[Any], bits: NDArray[Any], rocking: Floats, count: int
+) -> NDArray[np.bool_]:
+    """Return which sets are not part of a larger one of the same row that costs no more."""
+    kept = np.ones(len(row), np.bool_)
+    places = {code: at for code, at, _ in groups(bits)}
+    for more, at in places.items():
+        price = np.full(count, np.inf)
+        price[row[at]] = rocking[at]
+        for code, some in places.items():
+            if code & more == code != more:
+                kept[some] &= price[row[some]] > rocking[some] + _SAME
+    return kept
 
 
 def _near_face(
@@ -339,11 +289,11 @@ def _near_face(
     kernel = _face_kernel(len(others))
     area, upright, *heights = kernel.run(*(x for k in (*face, *others) for x in points[k]))
     lowest = reduce(np.minimum, heights, np.inf)
-    rows = np.flatnonzero(np.broadcast_to((area > THIN**2) & (lowest >= -_LEVEL), count))
+    rows = np.flatnonzero(np.broadcast_to((area > THIN**2) & (lowest >= -LEVEL), count))
     if not len(rows):
         return []
     charge, drops = measures[0][rows], np.array(measures[1])[:, rows]
-    lean = _lean(np.arccos(np.minimum(np.broadcast_to(upright, count)[rows], 1.0)))
+    lean = leaning(np.arccos(np.minimum(np.broadcast_to(upright, count)[rows], 1.0)))
     price = drops[list(face)].max(axis=0)
     table = np.array([np.broadcast_to(h, count)[rows] for h in heights]).reshape(-1, len(rows))
     order = np.argsort(table, axis=0, kind='stable')
@@ -357,8 +307,8 @@ def _near_face(
             price = np.maximum(np.maximum(price, charge * height), drop)
         some: Rows = ALL
         if place < len(others):
-            some = np.flatnonzero(table[place] - np.maximum(height, 0.0) >= _LEVEL)
-        found.append((rows[some], bits[some], (_charged(price) + lean)[some]))
+            some = np.flatnonzero(table[place] - np.maximum(height, 0.0) >= LEVEL)
+        found.append((rows[some], bits[some], (charged(price) + lean)[some]))
     return found
 
 
