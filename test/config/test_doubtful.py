@@ -215,3 +215,18 @@ def test_beside_a_mesh_a_contact_is_not_compared_and_far_from_it_is_warned_of(
     config = config_of(tmp_path, YAML.replace('[1, 1, 0]', place), with_shape(BOX + mesh))
     assert len(of(config, 'contacts.a.position')) == warned
     assert config.not_compared == unknown
+
+
+def test_tracks_that_are_not_in_one_plane_are_named(tmp_path: Path) -> None:
+    """By how much, and what of every margin that takes; half a tenth of a millimetre is not."""
+    text = (Path('msg_configs') / 'packbot.yaml').read_text()
+    urdf = (Path('urdf') / 'packbot.urdf').resolve()
+    for height, told in ((0.0015, True), (-0.0015, True), (0.00005, False)):
+        moved = text.replace('[-0.250, 0.202, 0]', f'[-0.250, 0.202, {height}]')
+        path = tmp_path / 'packbot.yaml'
+        path.write_text(moved.replace('../urdf/packbot.urdf', str(urdf)))
+        found = [w for w in load(path).warnings if 'not in one plane' in w]
+        assert len(found) == told
+        for sentence in found:
+            assert 'rear_left' in sentence
+            assert '1.5 mm off that of three others, so 2.7 deg' in sentence

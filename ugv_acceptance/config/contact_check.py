@@ -5,11 +5,15 @@ and spheres are compared by their extent along the axes; meshes are not read.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from ugv_acceptance.model.feet import ROCKING, feet_of, radius_of
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Contact, Matrix, Robot, Vector
+from ugv_acceptance.model.support import footings_of
 from ugv_acceptance.model.tree import Pose, Tree, in_body, pose_of, tree_of
 from ugv_acceptance.type_aliases import Floats
 
@@ -17,6 +21,8 @@ from ugv_acceptance.type_aliases import Floats
 SLACK = 0.05
 # How far (m) a mesh reaches from its link's origin at most, in diagonals of all other geometry.
 AS_LARGE = 0.75
+# Unevenness (m) of the tracks from which it is told.
+FLAT = 1e-4
 # Lowest and highest corner (3,) of an extent along the axes, m.
 Box = tuple[Floats, Floats]
 
@@ -41,6 +47,42 @@ class Compared:
 
     outside: tuple[tuple[Contact, float], ...]
     unknown: tuple[Contact, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Uneven:
+    """Contacts of the base near the ground that are not in one plane.
+
+    One is `off` (m) the plane of three others; `rocking` (rad) is taken until all of them carry.
+    """
+
+    names: tuple[str, ...]
+    off: float
+    rocking: float
+
+
+def uneven_tracks(robot: Robot) -> Uneven | None:
+    """Return the contacts of the base if they are uneven by more than FLAT, else None."""
+    tree = tree_of(robot)
+    placed = [in_body(tree, contact.link, contact.position) for contact in robot.contacts]
+    on_base = [
+        contact for contact, (body, _) in zip(robot.contacts, placed, strict=True) if not body
+    ]
+    alone = replace(robot, contacts=tuple(on_base))
+    feet = feet_of(mechanics_of(alone))
+    if len(feet.tracks) < 4:
+        return None
+    tracks = tuple(on_base[k] for k in feet.tracks)
+    alone = replace(robot, contacts=tracks)
+    points: list[Any] = [in_body(tree, contact.link, contact.position)[1] for contact in tracks]
+    all_of_them = [
+        f for f in footings_of(mechanics_of(alone), points) if len(f.points) == len(tracks)
+    ]
+    if not all_of_them:
+        return None
+    rocking: Any = all_of_them[0].rocking
+    off = rocking / ROCKING * radius_of(points)
+    return Uneven(tuple(c.name for c in tracks), off, rocking) if off > FLAT else None
 
 
 def compared(robot: Robot, shapes: Sequence[Shape]) -> Compared:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import Build, assumed_numbers, checked, settings_from
-from ugv_acceptance.config.contact_check import compared
+from ugv_acceptance.config.contact_check import compared, uneven_tracks
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.strength import worst_torques
@@ -199,5 +199,13 @@ def _check_contacts(build: Build, settings: Settings) -> tuple[str, ...]:
         build.warn(
             ('contacts', contact.name, 'position'),
             f'{off:.2f} m outside of the collision geometry of the URDF: can it stand there?',
+        )
+    uneven = uneven_tracks(settings.robot)
+    if uneven is not None:
+        build.warn(
+            ('contacts',),
+            f'{", ".join(uneven.names)} are not in one plane: one is {uneven.off * 1e3:.1f} mm off'
+            f' that of three others, so {math.degrees(uneven.rocking):.1f} deg of rocking are taken'
+            ' from every margin until all of them carry',
         )
     return tuple(contact.name for contact in found.unknown)
