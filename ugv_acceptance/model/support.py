@@ -79,13 +79,20 @@ _SAME = 1e-9
 _Found = tuple[int, float, tuple[int, int, int]]
 
 
-def footings_of(mechanics: Mechanics, points: Sequence[Point]) -> tuple[Footing, ...]:
+def footings_of(
+    mechanics: Mechanics, points: Sequence[Point], *, moved: bool = False
+) -> tuple[Footing, ...]:
     """Return the footings of one sample that can matter, the least rocking first.
 
     From its contact points (m, `base_link`); () where they are fewer than three, or in one line.
+    `moved`: those of the base are not just where the robot has them.
     """
     feet = feet_of(mechanics)
-    if feet.alone and min([height_over(points[k], feet, z, max) for k, z in feet.others]) > 0.0:
+    if (
+        feet.alone
+        and not moved
+        and min([height_over(points[k], feet, z, max) for k, z in feet.others]) > 0.0
+    ):
         return feet.alone
     return _footings(tuple(map(tuple, points)), feet)
 

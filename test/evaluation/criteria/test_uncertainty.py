@@ -20,7 +20,7 @@ PAYLOAD = Payload(2.0, (0.05, 0.0, 0.0))
 SETTINGS = Settings(
     ROBOT, (JointInput('x'),) * 4, ImuInput(), Limits((math.inf, 50.0, 50.0, math.inf))
 )
-POSTURES = [(0.3, 0.5, -0.4, 2.0), (1.5, 1.0, -1.5, -0.26), (-2.0, 0.2, 0.3, 3.0)]
+POSTURES = [(0.3, 0.5, -0.4, 2.0), (1.5, 1.0, -1.5, -0.35), (-2.0, 0.2, 0.3, 3.0)]
 GRAVITY = (0.5, -1.2, -9.7)
 Gravity = tuple[float, float, float]
 
@@ -192,3 +192,23 @@ def test_an_imu_that_is_off_tilts_and_nothing_else_does(
     """An IMU's angle error moves the tilt by that angle, in every posture."""
     expected = source.value if source.subject == 'imu' else 0.0
     assert effects_of(SETTINGS, [source], q, GRAVITY, PAYLOAD).tilt[0] == expected
+
+
+def test_the_height_of_each_contact_counts_alone() -> None:
+    """A millimetre on one of four tracks' ends rocks the robot, whichever way: 10 rad a radius.
+
+    In the stowed posture, flippers high: of the four ends each takes as much, squares add up.
+    """
+    source = Source('contacts.z_m', 'contacts', 'place', 0.001, 2)
+    level = (0.0, 0.0, -9.81)
+    found = effects_of(SETTINGS, [source], (0.0, 2.6, -2.6, 0.5), level, PAYLOAD).angle[0]
+    one = 0.0
+    for sign in (1.0, -1.0):
+        first = replace(
+            ROBOT.contacts[0], position=moved(ROBOT.contacts[0].position, 2, sign * 0.001)
+        )
+        robot = replace(ROBOT, contacts=(first, *ROBOT.contacts[1:]))
+        angles = [margins(r, (0.0, 2.6, -2.6, 0.5), level, PAYLOAD).angle for r in (ROBOT, robot)]
+        one = max(one, float(angles[0].min() - angles[1].min()))
+    assert one > 0.01
+    assert float(found.min()) == pytest.approx(2.0 * one, rel=0.1)

@@ -168,7 +168,7 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
     def margins(at: _Point) -> Floats:
         posture: Any = _posture(at)
         terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]
-        near = footings_of(mechanics, posture.contacts)
+        near = footings_of(mechanics, posture.contacts, moved=True)
         rocking = [f.rocking for f in near if f.polygon == footing.polygon] or [footing.rocking]
         moved = replace(
             stance,
