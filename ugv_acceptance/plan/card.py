@@ -22,6 +22,7 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 # The order in which the card tells what alerts mean: robot, inputs, what was set.
 SHOWN = (
     'TIP_OVER',
+    'TIP_TREND',
     'TORQUE_LIMIT',
     'TIP_MOVING',
     'TIP_AHEAD',

@@ -56,6 +56,12 @@ ALERTS = {
         FailureSource.INTERACTION,
         'The robot is close to tipping over to the side named.',
     ),
+    'TIP_TREND': AlertText(
+        'the robot begins to tip: {detail}',
+        'stop, and drive back slowly; bring the arm low and to the high side',
+        FailureSource.INTERACTION,
+        'On uneven ground or stairs: the tilt left shrinks so fast that the robot may be tipping.',
+    ),
     'TIP_MOVING': AlertText(
         '{moving} to the {subject}',
         'stop smoothly; lower the arm over the tracks before you drive on',
