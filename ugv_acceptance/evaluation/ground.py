@@ -25,7 +25,7 @@ CARRIED = 'the flippers carry the body: this holds on flat ground only'
 
 @dataclass(frozen=True, slots=True)
 class GroundWindow:
-    """A kind of ground (one of KINDS) from `start` to before `end` (s since the recording began)."""
+    """A kind of ground (one of KINDS) from `start` to before `end` (s from a recording's start)."""
 
     kind: str
     start: float
@@ -60,6 +60,12 @@ class Ground:
         """Whether the ground is not flat at some time of a recording."""
         return self.rough or any(window.kind != FLAT for window in self.windows)
 
+    def rough_within(self, start: float, end: float) -> bool:
+        """Return whether the ground is not flat at some time from `start` to `end` (s)."""
+        edges = [start, *(t for w in self.windows for t in (w.start, w.end))]
+        times = np.array([t for t in edges if start <= t <= end])
+        return bool((self.numbers_at(times) != KINDS.index(FLAT)).any())
+
     def numbers_at(self, seconds: NDArray[np.float64]) -> NDArray[np.int8]:
         """Return the kind, as a number in KINDS, at times (n,) in s since the recording began."""
         found = np.full(len(seconds), KINDS.index(self.taken), np.int8)
@@ -71,6 +77,9 @@ class Ground:
     def numbers_of(self, times: Times, start: int) -> NDArray[np.int8]:
         """Return the kind, as a number in KINDS, at `times` (n,) in ns; `start` (ns) as above."""
         return self.numbers_at((times - start) / 1e9)
+
+
+NOT_ENTERED = Ground()
 
 
 def ground_words(ground: Ground) -> str:

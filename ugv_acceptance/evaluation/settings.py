@@ -6,7 +6,7 @@ YAML file and validates them; they are not validated again here.
 
 from dataclasses import dataclass
 
-from ugv_acceptance.evaluation.ground import Ground
+from ugv_acceptance.evaluation.ground import NOT_ENTERED, Ground
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
@@ -114,7 +114,7 @@ class Settings:
     delays: Delays = Delays()
     unsafe: str = ''
     payload_known: bool = False
-    ground: Ground = Ground()
+    ground: Ground = NOT_ENTERED
 
     @property
     def hears_joints(self) -> bool:

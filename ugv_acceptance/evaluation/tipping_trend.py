@@ -44,7 +44,12 @@ class Trend:
     left: Floats
 
 
-def trend_of(time: Times, angle: Floats, cautious: Floats, rule: TrendRule = TREND) -> Trend:
+def trend_of(
+    time: Times,
+    angle: Floats,
+    cautious: Floats,  # noqa: ARG001 - the rule needs the first only
+    rule: TrendRule = TREND,
+) -> Trend:
     """Return the trend at looks at `time` (n,) in ns, each from the looks up to it.
 
     `angle` (n, 4) rad are the margins on flat ground, `cautious` (n, 4) those of shortened tracks,

@@ -33,13 +33,15 @@ class TippingWatch:
     """The signals of TIP_TREND (WARN, ERROR), and the looks they are judged by.
 
     `level` is that of the newest look: OK, WARN, ERROR or NOT_KNOWN of tipping_trend.py, `cautious`
-    its least cautious margin (rad, NaN: not known); both mean nothing on flat ground.
+    its least cautious margin (rad, NaN: not known); both mean nothing on flat ground. `counted` are
+    the looks on ground that is not flat, and those of them for which the trend was known.
     """
 
     settings: Settings
     signals: tuple[Signal, Signal]
     level: int = NOT_KNOWN
     cautious: float = math.nan
+    counted: tuple[int, int] = (0, 0)
     _due: int = 0
     _waiting: deque[tuple[int, tuple[float, ...]]] = field(
         default_factory=lambda: deque(maxlen=MOST)
@@ -101,6 +103,9 @@ class TippingWatch:
             bad = found.level >= level
             values = np.where(bad, np.maximum(-left, LEAST_VALUE), -np.inf)
             feed(signal, time[old:], values[old:], lambda row: trend_words(found, row + old))
+        rough = ~np.isnan(looks[old:]).all(axis=1)
+        known = rough & (found.level[old:] != NOT_KNOWN)
+        self.counted = self.counted[0] + int(rough.sum()), self.counted[1] + int(known.sum())
         self.level = int(found.level[-1])
         self._time, self._looks = time[1 - LOOKS :], looks[1 - LOOKS :]
         if np.isnan(self._looks).all():
