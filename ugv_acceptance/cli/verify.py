@@ -156,7 +156,7 @@ def ground_of(told: Json) -> 'Ground | None':
     """Return the ground that was entered when a result was made, None if none was."""
     from ugv_acceptance.evaluation.ground import KINDS, Ground, GroundWindow
 
-    said = told.get('declared_ground')
+    said: Any = told.get('declared_ground')
     try:
         parts = [(w['kind'], float(w['start_s']), float(w['end_s'])) for w in said['windows']]
         always = said['kind']

@@ -82,11 +82,9 @@ class Ground:
 NOT_ENTERED = Ground()
 
 
-def ground_words(ground: Ground) -> str:
+def ground_words(kind: str | None) -> str:
     """Return what the ground is taken for, and whether somebody said so."""
-    said = ground.taken if ground.kind else f'{FLAT} (not entered)'
-    found = [said, *(f'{w.kind} from {w.start:g} to {w.end:g} s' for w in ground.windows)]
-    return ', '.join(found)
+    return kind or f'{FLAT} (not entered)'
 
 
 def with_ground(

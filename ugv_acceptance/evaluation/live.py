@@ -27,10 +27,12 @@ from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTim
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
+from ugv_acceptance.model.shortened_tracks import has_tracks
 from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
     NO_CONTACT,
     NOT_KNOWN,
+    RAISED,
     Stability,
     Stance,
     stability_of,
@@ -269,6 +271,12 @@ class LiveEvaluator:
         active = [alert.rule.level for alert in self.watch.active]
         known = self.margins is not None and not self.waits_for_trend
         return max([*active, OK if known else STALE])
+
+    @property
+    def carried(self) -> bool:
+        """Whether points below the tracks (flippers) carry a robot now that has tracks."""
+        raised = self.margins is not None and self.margins.stability.state == RAISED
+        return raised and has_tracks(self.settings.robot)
 
     @property
     def waits_for_trend(self) -> bool:

@@ -34,7 +34,8 @@ class TippingWatch:
 
     `level` is that of the newest look: OK, WARN, ERROR or NOT_KNOWN of tipping_trend.py, `cautious`
     its least cautious margin (rad, NaN: not known); both mean nothing on flat ground. `counted` are
-    the looks on ground that is not flat, and those of them for which the trend was known.
+    the looks on ground that is not flat, and those of them for which the trend was known; `due` is
+    when the next look is to be taken (ns).
     """
 
     settings: Settings
@@ -42,7 +43,7 @@ class TippingWatch:
     level: int = NOT_KNOWN
     cautious: float = math.nan
     counted: tuple[int, int] = (0, 0)
-    _due: int = 0
+    due: int = 0
     _waiting: deque[tuple[int, tuple[float, ...]]] = field(
         default_factory=lambda: deque(maxlen=MOST)
     )
@@ -56,6 +57,7 @@ class TippingWatch:
 
         On flat ground nothing is kept but that a look was not one of rough ground.
         """
+        self.due = now - now % SPACING + SPACING
         ground, robot = self.settings.ground, self.settings.robot
         if ground.rough:
             cautious = cautious_angles(robot, ground, q, gravity, load)
@@ -84,11 +86,11 @@ class TippingWatch:
             return
         at = np.flatnonzero(rows.known)
         cell = rows.time[at] // SPACING
-        at = at[np.diff(cell, prepend=self._due // SPACING - 1) > 0]
+        at = at[np.diff(cell, prepend=self.due // SPACING - 1) > 0]
         if not len(at):
             return
         time = rows.time[at]
-        self._due = int(time[-1] - time[-1] % SPACING + SPACING)
+        self.due = int(time[-1] - time[-1] % SPACING + SPACING)
         looks = np.hstack((rows.angle[at], rows.ground.cautious[at]))
         looks[rows.ground.kind[at] == KINDS.index(FLAT)] = np.nan
         self._judge(time, looks)
