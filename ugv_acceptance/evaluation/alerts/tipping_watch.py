@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.prediction import MOST, SPACING
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Signal, feed
@@ -23,6 +24,7 @@ from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.type_aliases import Floats, Times
 
+Mask = NDArray[np.bool_]
 # A value of a signal is minus the time left (s), at least this; less where nothing is wrong.
 LEAST_VALUE = -1e6
 NOTHING = (math.nan,) * (2 * len(SIDES))
@@ -34,7 +36,7 @@ class TippingWatch:
 
     `level` is that of the newest look: OK, WARN, ERROR or NOT_KNOWN of tipping_trend.py, `cautious`
     its least cautious margin (rad, NaN: not known); both mean nothing on flat ground. `counted` are
-    the looks on ground that is not flat, and those of them for which the trend was known; `due` is
+    the looks for which a trend could be known, and those of them for which it was; `due` is
     when the next look is to be taken (ns).
     """
 
@@ -105,13 +107,19 @@ class TippingWatch:
             bad = found.level >= level
             values = np.where(bad, np.maximum(-left, LEAST_VALUE), -np.inf)
             feed(signal, time[old:], values[old:], lambda row: trend_words(found, row + old))
-        rough = ~np.isnan(looks[old:]).all(axis=1)
-        known = rough & (found.level[old:] != NOT_KNOWN)
-        self.counted = self.counted[0] + int(rough.sum()), self.counted[1] + int(known.sum())
+        self._count(~np.isnan(looks).all(axis=1), found.level != NOT_KNOWN, old)
         self.level = int(found.level[-1])
         self._time, self._looks = time[1 - LOOKS :], looks[1 - LOOKS :]
         if np.isnan(self._looks).all():
             self._time, self._looks = self._time[:0], self._looks[:0]
+
+    def _count(self, rough: Mask, known: Mask, old: int) -> None:
+        """Count the looks from the `old`th on; where ground begins a trend cannot be known yet."""
+        at = np.arange(len(rough))
+        flat = np.maximum.accumulate(np.where(rough, -1, at))
+        due = rough & (known | (at - flat >= LOOKS))
+        found = [int(where[old:].sum()) for where in (due, due & known)]
+        self.counted = self.counted[0] + found[0], self.counted[1] + found[1]
 
 
 def trend_words(trend: Trend, row: int) -> str:

@@ -92,7 +92,8 @@ class GroundExamination:
             self._cautious.take(rows.time[some], rows.ground.cautious[some])
         held = np.where(known, rows.until - rows.time, 0)
         held[-1] = 0
-        self._held += [int(held[kind == k].sum()) for k in range(len(KINDS))]
+        by_kind = [int(held[kind == k].sum()) for k in range(len(KINDS))]
+        self._held += by_kind
         self._raised += int(held[raised].sum())
         self._not_cautious += int(held[blank].sum())
         if known[-1]:
