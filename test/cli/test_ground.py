@@ -15,6 +15,8 @@ from ugv_acceptance.cli.robot_description import describe
 from ugv_acceptance.cli.verify import again, compare, ground_of
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.evaluation.ground import STAIRS, UNEVEN, Ground, GroundWindow
+from ugv_acceptance.offline.annotation import Annotation
+from ugv_acceptance.offline.evaluate import evaluate
 
 ROOT = Path(__file__).parents[2]
 BAG = ROOT / 'bags' / 'packbot_pass'
@@ -106,3 +108,18 @@ def test_the_model_calls_the_tilt_an_upper_bound(
     said = describe(stairs, posture)
     assert said['ground']['kind'] == 'stairs'
     assert said['ground']['cautious_deg']['front'] < said['sides']['front']['tilt_left_deg']
+
+
+def test_an_annotated_recording_says_it_at_each_moment() -> None:
+    """In the window the verdicts beside a recording call the tilt left an upper bound."""
+    found = evaluate(BAG, ground=Ground(windows=(GroundWindow(STAIRS, 12.0, 20.0),)))
+    start, seen = found.recording.start_ns, {}
+    for said in Annotation(found).said():
+        if said.topic == '/acceptance_monitor/verdict':
+            seen[(said.log_time - start) / 1e9] = said.data
+    flat = [data for at, data in seen.items() if not 11.9 < at < 20.1]
+    stairs = [data for at, data in seen.items() if 12.6 < at < 20.0]
+    assert stairs
+    assert all(b'flat' in data and b'upper bound' not in data for data in flat)
+    assert all(b'stairs' in data and b'upper bound' in data for data in stairs)
+    assert not any(b'all margins kept' in data for data in stairs)

@@ -147,8 +147,7 @@ def ground_line(result: Json) -> str:
 
 def is_bound(result: Json) -> bool:
     """Return whether margins in degrees of a run are an upper bound: it was not on flat ground."""
-    seconds = result.get('ground', {}).get('seconds', {})
-    return any(held for kind, held in seconds.items() if kind != FLAT)
+    return result.get('ground', {}).get('upper_bound') is not None
 
 
 def load_text(result: Json) -> str:
