@@ -1,4 +1,4 @@
-"""The kind of ground on the surfaces of the command line: what holds is said wherever margins are."""
+"""The kind of ground on the command line: what holds is said wherever margins are shown."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,9 @@ def robot(folder: Path, kind: str) -> Path:
     """Return a PackBot's file that enters this kind of ground."""
     text = (ROOT / 'msg_configs' / 'packbot.yaml').read_text('utf-8')
     path = folder / 'robot.yaml'
-    text = text.replace('../urdf', str(ROOT / 'urdf')).replace('ground:', f'ground:\n  kind: {kind}')
+    text = text.replace('../urdf', str(ROOT / 'urdf')).replace(
+        'ground:', f'ground:\n  kind: {kind}'
+    )
     path.write_text(text, 'utf-8')
     return path
 

@@ -370,7 +370,8 @@ def ground_of(driver: Any) -> str:
     """Return what the newest verdict says of the ground; empty before the first."""
     if not driver.verdicts:
         return ''
-    return {pair.key: pair.value for pair in driver.verdicts[-1].values}.get('ground', '')
+    values = {pair.key: str(pair.value) for pair in driver.verdicts[-1].values}
+    return values.get('ground', '')
 
 
 def test_the_kind_of_ground_changes_while_it_runs(live: Live) -> None:
@@ -391,8 +392,12 @@ def test_a_runner_tells_the_kind_of_ground_of_its_step(live: Live) -> None:
     """Told by the service of the monitor's parameters; a step without one gives it back."""
     monitor, driver = live.running()
     guard = live.add(Guard(load(), lambda _: None))
-    for kind, told in (('uneven', 'uneven'), (None, '')):
+
+    def tell(kind: str | None) -> None:
         thread = threading.Thread(target=guard.commands.tell_ground, args=(kind,), daemon=True)
         thread.start()
-        live.until(lambda thread=thread: not thread.is_alive(), driver.send)
+        live.until(lambda: not thread.is_alive(), driver.send)
+
+    for kind, told in (('uneven', 'uneven'), (None, '')):
+        tell(kind)
         assert monitor.get_parameter('ground.kind').value == told

@@ -107,7 +107,8 @@ class TippingWatch:
             bad = found.level >= level
             values = np.where(bad, np.maximum(-left, LEAST_VALUE), -np.inf)
             feed(signal, time[old:], values[old:], lambda row: trend_words(found, row + old))
-        self._count(~np.isnan(looks).all(axis=1), found.level != NOT_KNOWN, old)
+        rough: Mask = ~np.isnan(looks).all(axis=1)
+        self._count(rough, found.level != NOT_KNOWN, old)
         self.level = int(found.level[-1])
         self._time, self._looks = time[1 - LOOKS :], looks[1 - LOOKS :]
         if np.isnan(self._looks).all():
