@@ -33,7 +33,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, A
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, STAIRS, UNEVEN, Ground, GroundWindow
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.permitted_limits import limits_hash
-from ugv_acceptance.evaluation.rough_ground import cautious_angles
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 
 Facts = Counter[tuple[Any, ...]]
@@ -165,13 +165,14 @@ def test_any_messages_on_stairs_are_the_same_live_and_recorded(
 def test_the_cautious_margin_is_the_same_live_and_recorded() -> None:
     """Every row on stairs has that of shortened tracks, with the load of its joint state."""
     told = on(None, (STAIRS, 1.0, 2.0))
+    short = cautious_mechanics(told.robot, told.ground.pitch)
     rows, _ = recorded(told, split(rolling(), [100]), T0 + 4 * S)
     for part in rows:
         inside = (part.time >= T0 + S) & (part.time < T0 + 2 * S)
         assert np.isnan(part.ground.cautious[~inside | ~part.known]).all()
         for k in np.flatnonzero(inside & part.known)[::20]:
-            of = told.robot, told.ground, part.q[k].tolist(), tuple(part.gravity[k].tolist())
-            found = cautious_angles(*of, told.robot.payload)
+            of = part.q[k].tolist(), tuple(part.gravity[k].tolist())
+            found = cautious_angles(short, *of, told.robot.payload)
             np.testing.assert_allclose(part.ground.cautious[k], found, rtol=1e-9)
 
 
@@ -199,12 +200,8 @@ def test_until_a_trend_is_known_there_is_no_ok() -> None:
 def test_a_payload_changes_the_cautious_margin() -> None:
     """It is computed with the load that is carried."""
     told = on(STAIRS)
-    light, heavy = (
-        cautious_angles(
-            told.robot, told.ground, (0.0, 0.0), (0.0, 0.0, -9.81),
-            replace(told.robot.payload, mass=mass),
-        )
-        for mass in (0.0, 10.0)
-    )  # fmt: skip
+    short = cautious_mechanics(told.robot, told.ground.pitch)
+    loads = (replace(told.robot.payload, mass=mass) for mass in (0.0, 10.0))
+    light, heavy = (cautious_angles(short, (0.0, 0.0), (0.0, 0.0, -9.81), x) for x in loads)
     assert heavy[0] < light[0]
     assert math.isfinite(light[0])

@@ -11,7 +11,7 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
-from ugv_acceptance.evaluation.rough_ground import cautious_angles
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import (
@@ -222,7 +222,8 @@ def _ground(
     robot, ground = config.settings.robot, config.settings.ground
     found: Values = {'kind': ground.kind, 'pitch_m': ground.pitch, 'cautious_deg': None}
     if ground.rough:
-        angles = cautious_angles(robot, ground, q, gravity, load)
+        short = cautious_mechanics(robot, ground.pitch)
+        angles = cautious_angles(short, q, gravity, load)
         pairs = zip(SIDES, angles, strict=True)
         found['cautious_deg'] = {side: _finite(math.degrees(angle)) for side, angle in pairs}
     return found

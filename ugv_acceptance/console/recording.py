@@ -21,7 +21,7 @@ from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
 from ugv_acceptance.evaluation.inputs.payload import payload_from
-from ugv_acceptance.evaluation.rough_ground import cautious_angles
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
@@ -134,8 +134,8 @@ class ShownRecording:
         cautious = math.nan
         if rough and known:
             q, gravity = _numbers(track.q[k]), _numbers(track.gravity[k])
-            of = settings.robot, ground, q
-            cautious = min(cautious_angles(*of, gravity, payload))  # type: ignore[arg-type]
+            short = cautious_mechanics(settings.robot, ground.pitch)
+            cautious = min(cautious_angles(short, q, gravity, payload))  # type: ignore[arg-type]
         return {
             'ground': ground_words(kind if entered else None) if settings.hears_imu else '',
             'rough': rough,

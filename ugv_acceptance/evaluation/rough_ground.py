@@ -1,29 +1,38 @@
 """The cautious margin on ground that is not flat: that of a robot with shortened tracks."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.ground import FLAT, KINDS, Ground
+from ugv_acceptance.evaluation.ground import FLAT, KINDS
 from ugv_acceptance.evaluation.margin_table import NO_GROUND_ROWS, GroundRows, MarginRows
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of, with_contacts
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.shortened_tracks import shortened
 from ugv_acceptance.model.stability import margins, stability_of, stance_of
 from ugv_acceptance.type_aliases import Floats
 
 
+@lru_cache(maxsize=8)
+def cautious_mechanics(robot: Robot, pitch: float) -> Mechanics:
+    """Return the mechanics of the robot with half a pitch (m) cut from each end of its tracks.
+
+    Keep them where they are needed often: to look a robot up takes long.
+    """
+    return with_contacts(mechanics_of(robot), shortened(robot, pitch / 2.0).contacts)
+
+
 def cautious_angles(
-    robot: Robot, ground: Ground, q: Sequence[float], gravity: Vector, load: Payload
+    mechanics: Mechanics, q: Sequence[float], gravity: Vector, load: Payload
 ) -> tuple[float, ...]:
-    """Return the tilt left (rad) to each of SIDES with half a pitch cut from each end.
+    """Return the tilt left (rad) to each of SIDES of a robot with shortened tracks.
 
     `q` (j) rad or m, `gravity` m/s2 in `base_link`; infinite without an edge, NaN where not known.
     """
-    mechanics = mechanics_of(shortened(robot, ground.pitch / 2.0))
     posture = posture_of(mechanics, q, load.mass, load.cog)
     angle: Any = stability_of(stance_of(mechanics, posture), gravity).angle
     return tuple(map(float, angle))

@@ -17,10 +17,11 @@ from ugv_acceptance.evaluation.alerts.prediction import MOST, SPACING
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Signal, feed
 from ugv_acceptance.evaluation.ground import FLAT, KINDS
 from ugv_acceptance.evaluation.margin_table import MarginRows
-from ugv_acceptance.evaluation.rough_ground import cautious_angles
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.tipping_trend import LOOKS, NOT_KNOWN, OK, Trend, trend_of
 from ugv_acceptance.model.edges import SIDES
+from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.type_aliases import Floats, Times
 
@@ -50,6 +51,7 @@ class TippingWatch:
         default_factory=lambda: deque(maxlen=MOST)
     )
     _time: Times = field(default_factory=lambda: np.empty(0, np.int64))
+    _short: Mechanics | None = None
     _looks: Floats = field(default_factory=lambda: np.empty((0, len(NOTHING))))
 
     def keep(
@@ -60,9 +62,10 @@ class TippingWatch:
         On flat ground nothing is kept but that a look was not one of rough ground.
         """
         self.due = now - now % SPACING + SPACING
-        ground, robot = self.settings.ground, self.settings.robot
-        if ground.rough:
-            cautious = cautious_angles(robot, ground, q, gravity, load)
+        if self.settings.ground.rough:
+            if self._short is None:
+                self._short = cautious_mechanics(self.settings.robot, self.settings.ground.pitch)
+            cautious = cautious_angles(self._short, q, gravity, load)
             self.cautious = min(cautious)
             self._waiting.append((now, (*map(float, angle), *cautious)))
         elif len(self._time) or self._waiting:
@@ -80,6 +83,8 @@ class TippingWatch:
         """Take other settings from now on; on another kind of ground the trend is not known yet."""
         if settings.ground != self.settings.ground:
             self.level, self.cautious = NOT_KNOWN, math.nan
+        if settings.ground.pitch != self.settings.ground.pitch:
+            self._short = None
         self.settings = settings
 
     def rows(self, rows: MarginRows) -> None:
