@@ -343,8 +343,8 @@ def test_on_stairs_no_margin_in_degrees_is_an_ok() -> None:
 
 
 def test_before_the_trend_is_known_there_are_no_data() -> None:
-    """For the first half second on stairs nobody knows if the robot begins to tip."""
-    watched = standing_on('stairs', 0.3)
+    """For the first moments on stairs nobody knows if the robot begins to tip."""
+    watched = standing_on('stairs', 0.16)
     status = verdict_of(watched)
     assert (status.level, watched.level, status.values['trend']) == (STALE, STALE, 'not known yet')
     assert 'whether the robot begins to tip is not known yet' in status.message

@@ -1,9 +1,11 @@
 """Whether a robot has begun to tip, by how its margin falls: the rule for ground that is not flat.
 
 Where nobody knows what touches, the margin in degrees is only an upper bound, but a robot that
-begins to turn over an edge shows it in every margin. Pure: margins and times in, levels out.
+begins to turn over an edge shows it in every margin. Pure: margins and times in, levels out; the
+numbers are those of docs/uneven_ground.md, found by bench/bench_uneven.py.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,19 +16,24 @@ from ugv_acceptance.type_aliases import Floats, Times
 
 @dataclass(frozen=True, slots=True)
 class TrendRule:
-    """Thresholds: slope over so long (s), least rate (rad/s) that counts, time left (s)."""
+    """Thresholds, in rad, rad/s and s.
 
-    over: float = 0.5
-    rate: float = 0.0873
-    warn: float = 1.0
-    error: float = 0.5
+    A margin is looked at `ahead` (s) from now at its slope over the last looks. WARN: it falls at
+    `rate` or faster and will be below `warn`, or the cautious margin is below `cautious` now.
+    ERROR: it falls at `fast` or faster and will be below `error`.
+    """
+
+    ahead: float = 1.0
+    rate: float = math.radians(2.0)
+    warn: float = math.radians(20.0)
+    cautious: float = math.radians(5.0)
+    fast: float = math.radians(5.0)
+    error: float = 0.0
 
 
 TREND = TrendRule()
-# Looks that one value needs, 50 ms apart.
-LOOKS = 11
-# A slope over more than this many times the rule's time is not known.
-LONGEST = 1.5
+# Looks, 50 ms apart, that one value needs; a slope over a longer time (s) is not known.
+LOOKS, LONGEST = 6, 0.5
 NOT_KNOWN, OK, WARN, ERROR = -1, 0, 1, 2
 
 
@@ -44,31 +51,41 @@ class Trend:
     left: Floats
 
 
-def trend_of(
-    time: Times,
-    angle: Floats,
-    cautious: Floats,  # noqa: ARG001 - the rule needs the first only
-    rule: TrendRule = TREND,
-) -> Trend:
-    """Return the trend at looks at `time` (n,) in ns, each from the looks up to it.
+def trend_of(time: Times, angle: Floats, cautious: Floats, rule: TrendRule = TREND) -> Trend:
+    """Return the trend at looks at `time` (n,) in ns, each from the LOOKS up to it.
 
     `angle` (n, 4) rad are the margins on flat ground, `cautious` (n, 4) those of shortened tracks,
-    to each of SIDES: infinite without an edge, NaN where not known.
+    to each of SIDES: infinite without an edge, NaN where not known. Of a look without a slope only
+    a cautious margin that is too small is told.
     """
-    n, back = len(time), LOOKS - 1
-    slope, left = np.full((n, 4), np.nan), np.full((n, 4), np.nan)
-    if n > back:
-        seconds = (time[back:] - time[:-back])[:, None] / 1e9
-        with np.errstate(invalid='ignore', divide='ignore'):
-            fell = np.where(np.isinf(angle[back:]), 0.0, angle[back:] - angle[:-back]) / seconds
-            fell = np.where(seconds <= LONGEST * rule.over, fell, np.nan)
-            slope[back:] = fell
-            shrinks = fell <= -rule.rate
-            left[back:] = np.where(shrinks, np.maximum(angle[back:], 0.0) / -fell, np.inf)
-            left[back:][np.isnan(fell)] = np.nan
-    known = np.isfinite(slope).all(axis=1)
-    side = np.where(np.isnan(left), np.inf, left).argmin(axis=1).astype(np.int8)
-    at = np.arange(n), side
-    soon = np.where(left[at] <= rule.error, ERROR, np.where(left[at] <= rule.warn, WARN, OK))
-    level = np.where(known, soon, NOT_KNOWN).astype(np.int8)
-    return Trend(level, side, slope[at], left[at])
+    slope = _slopes(time, angle)
+    then = angle + np.minimum(slope, 0.0) * rule.ahead
+    falls = (slope <= -rule.rate) & (then < rule.warn)
+    tips = (slope <= -rule.fast) & (then < rule.error)
+    narrow = cautious < rule.cautious
+    known = np.isfinite(slope).all(axis=1) & ~np.isnan(cautious).any(axis=1)
+    level = np.where((falls | narrow).any(axis=1), WARN, np.where(known, OK, NOT_KNOWN))
+    level[tips.any(axis=1)] = ERROR
+    worst = np.where(known[:, None], then, cautious)
+    side = np.where(np.isnan(worst), np.inf, worst).argmin(axis=1)
+    at = np.arange(len(time)), side
+    left = np.full(len(time), np.inf)
+    left[np.isnan(slope[at])] = np.nan
+    shrinks = slope[at] < 0.0
+    left[shrinks] = np.maximum(angle[at][shrinks], 0.0) / -slope[at][shrinks]
+    return Trend(level.astype(np.int8), side.astype(np.int8), slope[at], left)
+
+
+def _slopes(time: Times, angle: Floats) -> Floats:
+    """Return the slopes (n, 4) rad/s; NaN not known, 0 to a side that has no edge."""
+    back = LOOKS - 1
+    slope = np.full(angle.shape, np.nan)
+    if len(time) > back:
+        seconds = (time[back:] - time[:-back]) * 1e-9
+        now, before = angle[back:], angle[:-back]
+        edge = np.isfinite(now) & np.isfinite(before)
+        way = np.subtract(now, before, where=edge, out=np.zeros_like(now))
+        way[np.isnan(now) | np.isnan(before)] = np.nan
+        way[~((seconds > 0.0) & (seconds <= LONGEST))] = np.nan
+        slope[back:] = way / np.where(seconds > 0.0, seconds, 1.0)[:, None]
+    return slope

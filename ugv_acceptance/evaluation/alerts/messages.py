@@ -58,10 +58,10 @@ ALERTS = {
         'The robot is close to tipping over to the side named.',
     ),
     'TIP_TREND': AlertText(
-        'the robot begins to tip: {detail}',
+        '{detail}',
         'stop, and drive back slowly; bring the arm low and to the high side',
         FailureSource.INTERACTION,
-        'On uneven ground or stairs: the tilt left shrinks so fast that the robot may be tipping.',
+        'On uneven ground or stairs: the tilt left shrinks fast, or is small when taken cautiously.',
     ),
     'TIP_MOVING': AlertText(
         '{moving} to the {subject}',

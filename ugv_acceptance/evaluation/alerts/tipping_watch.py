@@ -19,7 +19,7 @@ from ugv_acceptance.evaluation.ground import FLAT, KINDS
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.evaluation.tipping_trend import LOOKS, NOT_KNOWN, OK, Trend, trend_of
+from ugv_acceptance.evaluation.tipping_trend import LOOKS, NOT_KNOWN, OK, TREND, Trend, trend_of
 from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.robot import Payload, Vector
@@ -112,8 +112,8 @@ class TippingWatch:
             bad = found.level >= level
             values = np.where(bad, np.maximum(-left, LEAST_VALUE), -np.inf)
             feed(signal, time[old:], values[old:], lambda row: trend_words(found, row + old))
-        rough: Mask = ~np.isnan(looks).all(axis=1)
-        self._count(rough, found.level != NOT_KNOWN, old)
+        rough = np.isfinite(looks).any(axis=1)
+        self._count(np.asarray(rough), found.level != NOT_KNOWN, old)
         self.level = int(found.level[-1])
         self._time, self._looks = time[1 - LOOKS :], looks[1 - LOOKS :]
         if np.isnan(self._looks).all():
@@ -129,12 +129,14 @@ class TippingWatch:
 
 
 def trend_words(trend: Trend, row: int) -> str:
-    """Return how fast a margin shrinks at a look, and how long it lasts."""
+    """Return how fast a margin shrinks at a look, and how long it lasts; else that it is small."""
     side, slope, left = SIDES[trend.side[row]], trend.slope[row], trend.left[row]
-    if not (math.isfinite(slope) and math.isfinite(left)):
-        return f'hardly any tilt is left to the {side}'
+    if not (slope <= -TREND.rate and math.isfinite(left)):
+        return (
+            f'little tilt is left to the {side}, taken cautiously: as if half a step were missing'
+        )
     rate = f'the tilt left to the {side} shrinks by {math.degrees(-slope):.0f} degrees a second'
-    return f'{rate}: {left:.1f} s until nothing is left'
+    return f'the robot begins to tip: {rate}, {left:.1f} s until nothing is left'
 
 
 __all__ = ['NOT_KNOWN', 'OK', 'TippingWatch', 'trend_words']
