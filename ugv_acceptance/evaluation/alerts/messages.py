@@ -61,7 +61,7 @@ ALERTS = {
         '{detail}',
         'stop, and drive back slowly; bring the arm low and to the high side',
         FailureSource.INTERACTION,
-        'On uneven ground or stairs: the tilt left shrinks fast, or is small when taken cautiously.',
+        'Not on flat ground: the tilt left shrinks fast, or is small when taken cautiously.',
     ),
     'TIP_MOVING': AlertText(
         '{moving} to the {subject}',

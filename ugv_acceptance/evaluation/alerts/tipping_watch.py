@@ -113,7 +113,7 @@ class TippingWatch:
             values = np.where(bad, np.maximum(-left, LEAST_VALUE), -np.inf)
             feed(signal, time[old:], values[old:], lambda row: trend_words(found, row + old))
         rough = np.isfinite(looks).any(axis=1)
-        self._count(np.asarray(rough), found.level != NOT_KNOWN, old)
+        self._count(np.asarray(rough), np.isfinite(found.slope), old)
         self.level = int(found.level[-1])
         self._time, self._looks = time[1 - LOOKS :], looks[1 - LOOKS :]
         if np.isnan(self._looks).all():
