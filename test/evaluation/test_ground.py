@@ -132,7 +132,7 @@ def test_the_other_alerts_are_the_same_on_any_ground() -> None:
     assert facts(others) == facts(flat.watch.log)
 
 
-@hypothesis.settings(max_examples=25)
+@hypothesis.settings(max_examples=12)
 @given(
     st.lists(
         st.tuples(st.sampled_from(KINDS), st.floats(0.0, 4.0), st.floats(0.05, 3.0)), max_size=3
@@ -150,7 +150,7 @@ def test_kinds_that_change_are_the_same_live_and_recorded(
     assert facts(changing(told, messages, end)) == facts(evaluator.watch.log)
 
 
-@hypothesis.settings(max_examples=40)
+@hypothesis.settings(max_examples=25)
 @given(streams(), st.lists(st.integers(0, 120), max_size=5), st.lists(st.integers(0, 3000)))
 def test_any_messages_on_stairs_are_the_same_live_and_recorded(
     messages: list[Message], cuts: list[int], ticks: list[int]
