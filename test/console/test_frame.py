@@ -13,6 +13,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.console.frame import describe_robot, frame_of
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
+from ugv_acceptance.evaluation.ground import CARRIED
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import STANDING
 from ugv_acceptance.monitoring.drawing import figure_of
@@ -161,3 +162,23 @@ def test_the_robot_is_described_once() -> None:
     """Limits that are not known are null, not infinite."""
     found = json.loads(json.dumps(describe_robot(SETTINGS), allow_nan=False))
     assert [joint['limit'] for joint in found['joints']] == [None, 50.0, 50.0, None]
+
+
+def test_on_stairs_the_degrees_are_an_upper_bound() -> None:
+    """Neither cause nor numbers then say that the tilt left is enough."""
+    stairs = replace(FINE, ground='stairs', rough=True, cautious=0.1)
+    made = frame(stairs)
+    assert made['ground'] == {'words': 'stairs', 'rough': True, 'cautious_deg': 5.729578}
+    assert 'not begun to tip' in made['cause']
+    assert 'at most 22.9 deg of tilt left (right, upper bound), 5.7 deg taken' in made['left']
+    flat = frame(replace(FINE, ground='flat'))
+    assert flat['ground'] == {'words': 'flat', 'rough': False, 'cautious_deg': None}
+    assert flat['cause'] == 'all margins kept'
+    assert 'upper bound' not in flat['left']
+
+
+def test_raised_flippers_are_named_beside_the_tilt_left() -> None:
+    """What carries the body on flat ground only is a word of its own, and no alert."""
+    assert CARRIED in frame(replace(FINE, carried=True))['left']
+    assert CARRIED not in frame(FINE)['left']
+    assert CARRIED not in frame(replace(FINE, carried=True, rough=True))['left']

@@ -219,3 +219,21 @@ def test_names_are_shown_as_text(page: Page, repository: Path, tmp_path: Path) -
         assert HOSTILE in page.text('#torques')
         assert page.run('document.querySelectorAll("img").length') == 0
         assert page.run('window.hacked') is None
+
+
+def test_on_stairs_no_number_of_degrees_is_green(
+    page: Page, repository: Path, tmp_path: Path
+) -> None:
+    """The page names the ground; where it is not flat, a tilt left is at most so much."""
+    text = (repository / 'msg_configs' / 'packbot.yaml').read_text('utf-8')
+    text = text.replace('../urdf', str(repository / 'urdf'))
+    stairs = tmp_path / 'stairs.yaml'
+    stairs.write_text(text.replace('ground:', 'ground:\n  kind: stairs'), 'utf-8')
+    with console(str(repository / 'bags' / 'packbot_pass'), '--config', str(stairs)) as (url, _):
+        page.open(url)
+        seek(page, 1.0)
+        assert page.text('#ground').startswith('stairs: upper bound')
+        assert page.text('#map-ground') == '(on flat ground only)'
+        assert '≤' in page.text('#tilt')
+        assert page.run('document.querySelectorAll(".side-left.OK").length') == 0
+        assert 'not begun to tip' in page.text('#cause')

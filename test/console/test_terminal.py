@@ -1,6 +1,7 @@
 """The terminal, headless: the same words as the page, by keys alone."""
 
 import asyncio
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from ugv_acceptance.console.recording import RecordingFeed
 from ugv_acceptance.console.snapshot import AlertRow, Snapshot
 from ugv_acceptance.console.terminal import Terminal, alerts_of, margins_of, verdict_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR
+from ugv_acceptance.evaluation.ground import GroundWindow
 from ugv_acceptance.monitoring.drawing import figure_of
 
 CONFIG: Config = load()
@@ -85,3 +87,32 @@ def test_names_are_no_markup() -> None:
     shown = [str(next(iter(column.cells))) for column in alerts_of(frame).columns]
     assert shown[1:3] == ['[red]x[/red]', '[b]do[/b]']
     assert '[red]x[/red]' in verdict_of(frame).plain
+
+
+def test_the_ground_stands_above_the_tilt_left(feed: RecordingFeed) -> None:
+    """The kind of ground is told; on stairs each number of degrees is at most so much."""
+
+    def cells(snapshot: Snapshot) -> list[list[str]]:
+        frame = frame_of(snapshot, feed.settings, figure_of(feed.settings.robot))
+        table = margins_of(frame)
+        return [[str(cell) for cell in column.cells] for column in table.columns[:2]]
+
+    names, now = cells(feed.snapshot())
+    assert (names[0], now[0]) == ('ground', 'flat (not entered)')
+    assert not any('at most' in text for text in now)
+    _, now = cells(replace(feed.snapshot(), ground='stairs', rough=True))
+    assert now[0] == 'stairs'
+    assert any(text.startswith('at most ') for text in now)
+
+
+def test_a_recording_shows_the_ground_of_each_moment() -> None:
+    """In a window on stairs a recording shows an upper bound and the cautious margin."""
+    windows = (GroundWindow('stairs', 2.0, 5.0),)
+    ground = replace(CONFIG.settings.ground, windows=windows)
+    made = recording_feed(BAG, replace(CONFIG, settings=replace(CONFIG.settings, ground=ground)))
+    made.command('pause', {})
+    for at, words, rough in ((1.0, 'flat (not entered)', False), (3.0, 'stairs', True)):
+        made.command('seek', {'to_s': at})
+        shown = made.snapshot()
+        assert (shown.ground, shown.rough) == (words, rough)
+        assert math.isfinite(shown.cautious) == rough

@@ -2,7 +2,7 @@
 
 import struct
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,16 +13,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nodes.live_case import FOLDED, NAMES, imu, joints
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.encode import JointStateBytes, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.messages import LIVE
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
+from ugv_acceptance.evaluation.ground import CARRIED
 from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker
-from ugv_acceptance.monitoring.diagnostics import guarded
+from ugv_acceptance.monitoring.diagnostics import diagnostics_of, guarded, verdict_of
 from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.session import Session
-from ugv_acceptance.nodes.monitor.parameters import knobs_of, unknown
+from ugv_acceptance.nodes.monitor.parameters import (
+    changed,
+    check_locked,
+    knobs_of,
+    unknown,
+)
 
 CONFIG = load()
 NS = 1_000_000_000
@@ -293,3 +301,78 @@ def test_every_parameter_is_documented(repository: Path, tunable: Any) -> None:
 def test_every_alert_of_the_node_is_documented(repository: Path, code: str) -> None:
     """docs/ros_interface.md names every alert that only the node raises."""
     assert f'`{code}`' in (repository / 'docs' / 'ros_interface.md').read_text(encoding='utf-8')
+
+
+def standing_on(kind: str | None, seconds: float = 1.0) -> Session:
+    """Return a session of a PackBot that has stood on this kind of ground for so long."""
+    clock = Stopwatch(NS)
+    ground = replace(CONFIG.settings.ground, kind=kind)
+    told = replace(CONFIG.settings, ground=ground)
+    watched = Session(told, lambda _s, _m: None, lambda: None, lambda _t: None, clock)
+    for _ in range(round(seconds * 50)):
+        clock.at += NS // 50
+        watched.take_joint_state(joints(stamp=clock.at))
+        watched.take_imu(imu(stamp=clock.at))
+        watched.tick()
+    return watched
+
+
+def test_the_verdict_says_what_the_ground_is_taken_for() -> None:
+    """On flat ground the tilt left is a margin; nobody entered it, and that is said."""
+    status = verdict_of(standing_on(None))
+    assert (status.level, status.values['ground']) == (OK, 'flat (not entered)')
+    assert 'all margins kept' in status.message
+    assert 'at most' not in status.message
+    assert verdict_of(standing_on('flat')).values['ground'] == 'flat'
+
+
+def test_on_stairs_no_margin_in_degrees_is_an_ok() -> None:
+    """OK means there that the robot has not begun to tip; degrees are an upper bound."""
+    watched = standing_on('stairs')
+    status = verdict_of(watched)
+    assert status.level == OK
+    assert 'not begun to tip' in status.message
+    assert 'upper bound' in status.message
+    assert 'all margins kept' not in status.message
+    assert status.values['trend'] == 'OK'
+    tip = next(s for s in diagnostics_of(status, CONFIG, watched, None) if s.name == 'Tip-over')
+    assert 'upper bound' in tip.message
+    least = min(float(str(tip.values[f'{side}_deg'])) for side in SIDES)
+    assert float(str(tip.values['cautious_deg'])) < least
+    assert tip.values['ground'] == 'stairs'
+
+
+def test_before_the_trend_is_known_there_are_no_data() -> None:
+    """For the first moments on stairs nobody knows if the robot begins to tip."""
+    watched = standing_on('stairs', 0.16)
+    status = verdict_of(watched)
+    assert (status.level, watched.level, status.values['trend']) == (STALE, STALE, 'not known yet')
+    assert 'whether the robot begins to tip is not known yet' in status.message
+    tip = next(s for s in diagnostics_of(status, CONFIG, watched, None) if s.name == 'Tip-over')
+    assert tip.level == STALE
+
+
+def test_flippers_that_carry_the_body_are_named_beside_the_tilt() -> None:
+    """It is a word beside the margin and no alert; on stairs the upper bound says more."""
+    for kind, named in ((None, True), ('stairs', False)):
+        watched = standing_on(kind)
+        low = (*FOLDED[:3], -0.7)
+        for _ in range(5):
+            watched.clock.at += NS // 50  # type: ignore[attr-defined]  # a Stopwatch
+            watched.take_joint_state(joints(low, stamp=watched.clock.now()))
+            watched.take_imu(imu(stamp=watched.clock.now()))
+        watched.tick()
+        assert (CARRIED in verdict_of(watched).message) == named
+        assert not [alert for alert in watched.active if alert.rule.code == 'TIP_TREND']
+
+
+def test_the_kind_of_ground_is_a_parameter_of_the_operator() -> None:
+    """It is set while the monitor runs, even with locked parameters; another word is refused."""
+    (tunable,) = (k for k in knobs_of(CONFIG.settings) if k.name == 'ground.kind')
+    assert tunable.get(CONFIG.settings) == ''
+    told = changed(CONFIG.settings, knobs_of(CONFIG.settings), {'ground.kind': 'uneven'})
+    assert told.ground.kind == 'uneven'
+    assert changed(told, knobs_of(told), {'ground.kind': ''}).ground.kind is None
+    with pytest.raises(BadConfig, match=r"ground.kind: expected one of .*, got 'rubble'"):
+        changed(told, knobs_of(told), {'ground.kind': 'rubble'})
+    check_locked({'ground.kind': 'stairs'}, knobs_of(told))

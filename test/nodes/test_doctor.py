@@ -275,3 +275,16 @@ def test_it_hears_a_real_robot(live: Live) -> None:
     assert 'OK   joint names: all 4' in text
     assert 'OK   imu gravity' in text
     assert 'OK   imu orientation' in text
+
+
+@pytest.mark.parametrize(
+    ('kind', 'seen', 'asked'),
+    [(None, 'taken as flat (not entered)', True), ('stairs', 'taken as stairs', False)],
+)
+def test_it_says_what_the_ground_is_taken_for(kind: str | None, seen: str, asked: bool) -> None:  # noqa: FBT001 - a case
+    """Before a run the assumption is told; where nobody entered it, what to set."""
+    ground = replace(CONFIG.settings.ground, kind=kind)
+    config = replace(CONFIG, settings=replace(CONFIG.settings, ground=ground))
+    (found,) = (one for one in examine(healthy(), config) if one.about == 'ground')
+    assert (found.level, found.seen) == (OK, seen)
+    assert found.do.startswith('set ground.kind') == asked

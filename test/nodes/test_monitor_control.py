@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,9 @@ from std_srvs.srv import Trigger
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.config import load
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
+from ugv_acceptance.nodes.runner_world import Guard
 
 STRETCHED = (0.0, 0.0, 0.0, 2.0)
 
@@ -361,3 +364,40 @@ def test_stale_inputs_silence_the_margin_topics(live: Live) -> None:
     )
     live.spin(0.2)
     assert heard == []
+
+
+def ground_of(driver: Any) -> str:
+    """Return what the newest verdict says of the ground; empty before the first."""
+    if not driver.verdicts:
+        return ''
+    values = {pair.key: str(pair.value) for pair in driver.verdicts[-1].values}
+    return values.get('ground', '')
+
+
+def test_the_kind_of_ground_changes_while_it_runs(live: Live) -> None:
+    """The operator sets it, locked or not; the verdict names it, and a kind that is none is not."""
+    monitor, driver = live.running(lock_parameters=True)
+    live.until(lambda: ground_of(driver) == 'flat (not entered)', driver.send)
+    assert put(monitor, **{'ground.kind': 'stairs'}).successful
+    live.until(lambda: ground_of(driver) == 'stairs', driver.send)
+    live.until(lambda: 'upper bound' in driver.verdicts[-1].message, driver.send)
+    refused = put(monitor, **{'ground.kind': 'rubble'})
+    assert not refused.successful
+    assert 'expected one of flat, uneven, stairs' in refused.reason
+    assert put(monitor, **{'ground.kind': 'flat'}).successful
+    live.until(lambda: ground_of(driver) == 'flat', driver.send)
+
+
+def test_a_runner_tells_the_kind_of_ground_of_its_step(live: Live) -> None:
+    """Told by the service of the monitor's parameters; a step without one gives it back."""
+    monitor, driver = live.running()
+    guard = live.add(Guard(load(), lambda _: None))
+
+    def tell(kind: str | None) -> None:
+        thread = threading.Thread(target=guard.commands.tell_ground, args=(kind,), daemon=True)
+        thread.start()
+        live.until(lambda: not thread.is_alive(), driver.send)
+
+    for kind, told in (('uneven', 'uneven'), (None, '')):
+        tell(kind)
+        assert monitor.get_parameter('ground.kind').value == told

@@ -15,7 +15,7 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.plan.arm_paths import Routes, safe_path
-from ugv_acceptance.plan.card import SHOWN, card_of
+from ugv_acceptance.plan.card import SHOWN, card_of, group_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
@@ -187,6 +187,7 @@ def test_the_card_shows_every_step_and_loads_nothing() -> None:
     assert all(f'</span>{step.title}</h3>' in card for step in PLAN.steps)
     assert card.count('aria-label="the robot from') == len(PLAN.steps)
     assert PLAN.sha256 in card
+    assert 'The ground is taken as flat (not entered)' in card
     assert 'src=' not in card
     assert '<link' not in card
     used = {p.split()[1] for s in PLAN.steps for p in s.alerts.must}
@@ -232,3 +233,17 @@ def test_a_drawing_leans_to_the_low_side(
     # The arm stretched out points to the low side: towards the side it is turned to, level.
     assert (points[-1][0] - points[0][0]) * (1.0 if 'up' in ground else lean) > 0.0
     assert points[-1][1] == pytest.approx(points[0][1], abs=0.02)
+
+
+def test_the_card_says_what_each_step_stands_on() -> None:
+    """Where a step's ground is not flat, the card says what the tilt left is worth there."""
+    step, arm = PLAN.steps[0], Arm(CONFIG.settings, roles_of(CONFIG.settings))
+    for ground, told in (
+        (Ground(kind='stairs'), 'is an upper bound; tip-over not judged as passed)'),
+        (Ground(kind='uneven', accept='trend', reason='r'), 'upper bound; tip-over by the trend)'),
+    ):
+        on = step.model_copy(update={'ground': ground})
+        (row,) = group_of(arm, PLAN, [on]).rows
+        assert row.ground.startswith(f'{ground.kind}; ')
+        assert row.ground.endswith(told)
+    assert 'upper bound' not in group_of(arm, PLAN, [step]).rows[0].ground

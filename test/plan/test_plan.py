@@ -97,3 +97,27 @@ def test_a_pattern_names_level_code_and_subject_as_far_as_it_goes(
 ) -> None:
     """An alert pattern matches any value of the parts that it leaves out."""
     assert matches(pattern, 'ERROR', 'TIP_OVER', 'left') is found
+
+
+def with_ground(**ground: object) -> Plan:
+    """Return the plan with this ground in its step."""
+    return Plan.model_validate({**PLAN, 'steps': [{**STEP, 'ground': ground}]})
+
+
+def test_a_plan_without_kinds_of_ground_keeps_its_hash() -> None:
+    """The hash counts a kind only where a step has one, so that plans made before are the same."""
+    assert with_ground(tilt_deg=0.0).sha256 == Plan.model_validate(PLAN).sha256
+    kinds = {with_ground(kind=kind).sha256 for kind in ('flat', 'uneven', 'stairs')}
+    assert len(kinds | {Plan.model_validate(PLAN).sha256}) == 4
+    text = plan_text(with_ground(kind='stairs', accept='trend', reason='belayed'))
+    assert 'kind: stairs' in text
+    assert 'kind' not in plan_text(Plan.model_validate(PLAN))
+
+
+@pytest.mark.parametrize(
+    'ground', [{'kind': 'rubble'}, {'accept': 'trend'}, {'reason': 'r'}, {'accept': 'cautious'}]
+)
+def test_a_step_names_a_known_ground_and_a_rule_with_its_reason(ground: dict[str, object]) -> None:
+    """Anything else is refused."""
+    with pytest.raises(ValueError, match='ground'):
+        with_ground(**ground)

@@ -190,3 +190,15 @@ def test_a_monitor_that_falls_silent_ends_the_run(tmp_path: Path) -> None:
         ['the monitor publishes nothing'],
     )
     assert runner.over == 'the monitor publishes nothing'
+
+
+def test_a_step_tells_the_monitor_its_kind_of_ground(tmp_path: Path) -> None:
+    """The evaluation stands on it from the set-up on; a step without one, as configured."""
+    plan = plan_of({'ground': {'kind': 'stairs'}}, {})
+    runner = runner_of(tmp_path, plan)
+    evaluator = runner.world.evaluator  # type: ignore[attr-defined]  # the simulated world's
+    seen = []
+    for one in plan.steps:
+        assert runner.hands.set_up(one)
+        seen.append(evaluator.settings.ground.kind)
+    assert seen == ['stairs', None]

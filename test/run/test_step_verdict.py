@@ -11,7 +11,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config import load
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.derive import Wanted, derive
-from ugv_acceptance.plan.plan import Step, plan_text, read_plan
+from ugv_acceptance.plan.plan import Ground, Step, plan_text, read_plan
 from ugv_acceptance.run.catalogue import case_of
 from ugv_acceptance.run.folder import open_folder
 from ugv_acceptance.run.record import record
@@ -219,3 +219,29 @@ def test_the_result_names_the_plan_and_every_step(tmp_path: Path) -> None:
         assert f'robot files sha256 {CONFIG.sha256}' in text
         assert 'robot serial number not entered\nugv_acceptance ' in text
     assert 'gripper empty: no limit is near, on level ground' in text
+
+
+def on(**ground: str) -> Step:
+    """Return a step on this ground that expects nothing."""
+    return step(must_not=()).model_copy(update={'ground': Ground.model_validate(ground)})
+
+
+@pytest.mark.parametrize(
+    ('ground', 'expected', 'told'),
+    [
+        ({}, 'PASS', 'all alerts as expected'),
+        ({'kind': 'flat'}, 'PASS', 'all alerts as expected'),
+        ({'kind': 'stairs'}, 'INCONCLUSIVE', 'the ground was taken as stairs for 28.0 s'),
+        ({'kind': 'uneven', 'accept': 'trend', 'reason': 'belayed'}, 'PASS', 'accepted (belayed)'),
+    ],
+)
+def test_a_step_on_stairs_passes_by_an_accepted_rule_only(
+    repository: Path, ground: dict[str, str], expected: str, told: str
+) -> None:
+    """Where its alerts are as expected, degrees that are an upper bound still show nothing."""
+    bag = repository / 'bags' / 'packbot_pass'
+    start = int(seen_in(bag, CONFIG).joined()[0][0])
+    done = Done(start, start + 1_000_000_000, start + 20_000_000_000)
+    result = judge_step(on(**ground), bag, CONFIG, done)
+    assert result['verdict'] == expected
+    assert told in result['reasons'][0]

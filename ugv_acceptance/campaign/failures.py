@@ -28,6 +28,7 @@ NO_TORQUE = frozenset({'scaled', 'none', 'constant'})
 # Safeguard -> the alerts that show the same failure, and where to look first without one.
 SHOWN_BY: dict[str, tuple[tuple[str, ...], FailureSource]] = {
     'tipping': (('TIP_OVER',), FailureSource.INTERACTION),
+    'ground': (('TIP_TREND', 'TIP_OVER'), FailureSource.INTERACTION),
     'torque_limit': (('TORQUE_LIMIT',), FailureSource.EFFECTOR),
     'measured_effort': (('EFFORT_LIMIT',), FailureSource.EFFECTOR),
     'chassis_acceleration': (

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
+from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, GroundKinds, Overwrite, UrdfFile
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
@@ -33,6 +33,7 @@ def evaluate(
         ),
     ] = False,
     criteria: CriteriaFile = None,
+    ground: GroundKinds = None,
     init_criteria: Annotated[
         Path | None, typer.Option(help='Propose criteria from this (good) run in this file.')
     ] = None,
@@ -68,15 +69,18 @@ def evaluate(
       ugv-acceptance evaluate run --config my_robot.yaml --urdf my_robot.urdf --compare-effort
       ugv-acceptance evaluate run --criteria site.yaml --json r.json --report r.html --junit r.xml
       ugv-acceptance evaluate run --annotate run_judged.mcap
+      ugv-acceptance evaluate run --ground stairs=12s..40s
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_json
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.evidence import Papers, evaluate_files, write_junit
+    from ugv_acceptance.cli.ground_option import ground_from
     from ugv_acceptance.cli.result_text import print_result, while_read
     from ugv_acceptance.config import load
     from ugv_acceptance.config.identity import file_of, identity_from
 
-    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria, annotate)
+    under = ground_from(ground)
+    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria, annotate, under)
     groups, loaded = recordings(bags), load(config, urdf=urdf)
     of_all = [Output('--json', json_file, kinds.RESULT), Output('--junit', junit, kinds.JUNIT)]
     inputs = inputs_of(loaded, bags, criteria=criteria, identity=file_of(identity))

@@ -16,13 +16,17 @@ if TYPE_CHECKING:
     from ugv_acceptance.cli.outputs import Output
     from ugv_acceptance.config import Config
     from ugv_acceptance.evaluation.downsampling import StripRecorder
+    from ugv_acceptance.evaluation.ground import Ground
     from ugv_acceptance.evaluation.settings import Settings
     from ugv_acceptance.offline.evaluation import Evaluation
 
 
 @dataclass(frozen=True, slots=True)
 class Papers:
-    """The output files that the user asked for, and the criteria a recording is judged by."""
+    """The output files that the user asked for, and the criteria a recording is judged by.
+
+    `ground` is what the ground of the recording was, None: as configuration and criteria say.
+    """
 
     report: Path | None = None
     pdf: Path | None = None
@@ -31,6 +35,7 @@ class Papers:
     criteria: Path | None = None
     init_criteria: Path | None = None
     annotate: Path | None = None
+    ground: 'Ground | None' = None
 
     @property
     def paged(self) -> bool:
@@ -87,6 +92,7 @@ def evaluate_files(
             recording,
             config=config,
             criteria=papers.criteria,
+            ground=papers.ground,
             identity=identity,
             options=Options(tuple(takers), progress, detail, compare_effort),
         )

@@ -10,6 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
+from ugv_acceptance.evaluation.ground import CARRIED, UPPER_BOUND, ground_words
+from ugv_acceptance.model.stability import RAISED, STATES
 from ugv_acceptance.report.format import number_text
 
 Values = dict[str, Any]
@@ -142,13 +144,38 @@ def _print_stability(console: Console, d: Values) -> None:
     )
     names = ' '.join(d['support_polygon']) or 'none'
     console.print(f'Support polygon: {escape(names)} ({d["state"]})')
-    table = _table('Tilt left before tipping', 'side', 'deg', 'restoring N m', 'energy J')
+    cautious = _print_ground(console, d)
+    title = 'Tilt left before tipping' + (f' ({UPPER_BOUND})' if cautious else '')
+    table = _table(title, 'side', 'deg', 'restoring N m', 'energy J')
     for side, margin in d['sides'].items():
         angle = margin['tilt_left_deg']
-        text = '-' if angle is None else f'[{"green" if angle > 0 else "red"}]{angle:.1f}[/]'
+        text = '-' if angle is None else _tilt(angle, bound=bool(cautious))
         row = (margin['restoring_moment_nm'], margin['energy_j'])
         table.add_row(side, text, *('-' if value is None else number_text(value) for value in row))
     console.print(table)
+
+
+def _print_ground(console: Console, d: Values) -> Values | None:
+    """Print what the ground is taken for; return the cautious margins (deg) where not flat."""
+    ground = d['ground']
+    cautious: Values | None = ground['cautious_deg']
+    text = f'Ground: {ground_words(ground["kind"])}'
+    if cautious:
+        known = [f'{side} {angle:.1f}' for side, angle in cautious.items() if angle is not None]
+        text += (
+            ', so the tilt left is an upper bound; taken cautiously (half of '
+            f'{ground["pitch_m"]:g} m cut from each end of the tracks), deg: {", ".join(known)}'
+        )
+    elif d['state'] == STATES[RAISED]:
+        text += f'; {CARRIED}'
+    console.print(text, soft_wrap=True)
+    return cautious
+
+
+def _tilt(angle: float, *, bound: bool) -> str:
+    """Return a tilt left (deg), coloured: an upper bound is never green."""
+    good = '<= {:.1f}' if bound else '[green]{:.1f}[/]'
+    return (good if angle > 0 else '[red]{:.1f}[/]').format(angle)
 
 
 def _xyz(link: Values) -> list[str]:

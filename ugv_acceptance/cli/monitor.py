@@ -17,6 +17,7 @@ from rich.table import Table
 
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
 from ugv_acceptance.evaluation.alerts.messages import level_words
+from ugv_acceptance.evaluation.ground import ground_words
 
 if TYPE_CHECKING:
     from ugv_acceptance.monitoring.diagnostics import Status
@@ -122,11 +123,16 @@ def table_of(monitor: 'Monitor') -> Table:
         if math.isfinite(limit):
             left = f'{limit - abs(torque):.1f}'
             table.add_row(escape(name), f'{torque:.1f}', f'{limit:.1f}', left)
+    if settings.hears_imu:
+        table.add_row('ground', ground_words(settings.ground.kind), '', '')
+    most = '<= ' if settings.ground.rough else ''
     for side, angle in zip(
         ('front', 'left', 'rear', 'right'), margins.stability.angle, strict=True
     ):
         least = math.degrees(settings.limits.tip_error)
-        table.add_row(f'tip to the {side} (deg)', '', f'{least:.1f}', f'{math.degrees(angle):.1f}')
+        table.add_row(
+            f'tip to the {side} (deg)', '', f'{least:.1f}', f'{most}{math.degrees(angle):.1f}'
+        )
     return table
 
 

@@ -21,6 +21,13 @@ CriteriaFile = Annotated[
     Path | None,
     typer.Option(help='YAML file of criteria; without it the limits of the configuration.'),
 ]
+GroundKinds = Annotated[
+    list[str] | None,
+    typer.Option(
+        '--ground',
+        help='Kind of ground: flat, uneven, stairs; for a time: stairs=12s..40s (repeatable).',
+    ),
+]
 PayloadMass = Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')]
 Overwrite = Annotated[
     bool,

@@ -15,6 +15,8 @@ from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.report.format import (
     assumed_line,
     doubts_of,
+    ground_line,
+    is_bound,
     missing_text,
     not_checked_lines,
     number_text,
@@ -76,7 +78,7 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
-    for line in (origin_line(result), assumed_line(result)):
+    for line in filter(None, (origin_line(result), assumed_line(result), ground_line(result))):
         console.print(f'    {escape(line)}', soft_wrap=True)
     unchecked = not_checked_lines(result)
     if unchecked:
@@ -133,7 +135,7 @@ def _margins(result: dict[str, Any]) -> Table:
         f'tip-over ({edge})',
         '',
         '',
-        _number(stability['min_angle_deg'], 'deg'),
+        ('<= ' if is_bound(result) else '') + _number(stability['min_angle_deg'], 'deg'),
         _number(stability['time_of_min_s'], 's'),
         _number(stability['time_in_violation_s'], 's', 2),
     )

@@ -11,6 +11,7 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import (
@@ -61,6 +62,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'centre_of_gravity_m': list(found.cog),
         'contacts': _contacts(robot, found, stance),
         **_stability(robot, stance, gravity),
+        'ground': _ground(config, q, gravity, load),
         'uncertainty': dict(config.uncertainty),
         'warnings': [
             *config.warnings,
@@ -212,6 +214,20 @@ def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]
         },
         'zmp_margin_m': _finite(margins.zmp) if stands else None,
     }
+
+
+def _ground(
+    config: Config, q: list[float], gravity: tuple[float, float, float], load: Payload
+) -> Values:
+    """Return what the ground is taken for; where it is not flat also the cautious margins."""
+    robot, ground = config.settings.robot, config.settings.ground
+    found: Values = {'kind': ground.kind, 'pitch_m': ground.pitch, 'cautious_deg': None}
+    if ground.rough:
+        short = cautious_mechanics(robot, ground.pitch)
+        angles = cautious_angles(short, q, gravity, load)
+        pairs = zip(SIDES, angles, strict=True)
+        found['cautious_deg'] = {side: _finite(math.degrees(angle)) for side, angle in pairs}
+    return found
 
 
 def _outside(robot: Robot, q: list[float]) -> list[str]:

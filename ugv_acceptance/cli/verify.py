@@ -9,6 +9,7 @@ from ugv_acceptance import AcceptanceError
 from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
+    from ugv_acceptance.evaluation.ground import Ground
     from ugv_acceptance.model.robot import Payload
 
 # Relative difference of numbers that is rounding of another machine's arithmetic.
@@ -121,15 +122,23 @@ def again(
     if criteria is None and named is not None:
         criteria = _near(named, folder, '--criteria')
     options = Options(compare_effort='effort' in told)
-    carried = payload_of(told)
-    result = evaluate(paths, config=loaded, criteria=criteria, payload=carried, options=options)
+    result = evaluate(
+        paths,
+        config=loaded,
+        criteria=criteria,
+        payload=payload_of(told),
+        ground=ground_of(told),
+        options=options,
+    )
     found: Json = json.loads(result.to_json())
-    if 'limits_hash' not in told:  # written before results said it
-        found = {key: value for key, value in found.items() if key not in _LATER}
+    for key, first in _LATER.items():  # written before results said it
+        if first not in told:
+            found.pop(key, None)
     return found
 
 
-_LATER = ('limits_hash', 'limits_relaxed')
+# What results did not say once, and the key by whose absence that is seen.
+_LATER = {'limits_hash': 'limits_hash', 'limits_relaxed': 'limits_hash', 'ground': 'ground'}
 
 
 def payload_of(told: Json) -> 'Payload | None':
@@ -141,6 +150,23 @@ def payload_of(told: Json) -> 'Payload | None':
         return None if said is None else Payload(float(said['mass_kg']), tuple(said['cog_m']))
     except (KeyError, TypeError, ValueError) as error:
         raise AcceptanceError(f'declared_payload: expected mass_kg and cog_m: {error}') from None
+
+
+def ground_of(told: Json) -> 'Ground | None':
+    """Return the ground that was entered when a result was made, None if none was."""
+    from ugv_acceptance.evaluation.ground import KINDS, Ground, GroundWindow
+
+    said: Any = told.get('declared_ground')
+    try:
+        parts = [(w['kind'], float(w['start_s']), float(w['end_s'])) for w in said['windows']]
+        always = said['kind']
+    except (KeyError, TypeError, ValueError) as error:
+        if said is None:
+            return None
+        raise AcceptanceError(f'declared_ground: expected kind and windows: {error}') from None
+    if not {always, *(kind for kind, _, _ in parts)} <= {None, *KINDS}:
+        raise AcceptanceError(f'declared_ground: expected kinds {", ".join(KINDS)}')
+    return Ground(always, windows=tuple(GroundWindow(*part) for part in parts))
 
 
 # Where a file lies, what computed it and what a person entered may differ.

@@ -13,6 +13,7 @@ from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
@@ -83,6 +84,7 @@ def settings_from(build: Build) -> Settings:
         Delays(**build.file.delays.model_dump()),
         build.file.unsafe_limits or '',
         build.file.payload is not None and build.file.payload.known,
+        Ground(build.file.ground.kind, build.file.ground.pitch),
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)

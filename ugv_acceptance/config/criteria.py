@@ -17,6 +17,7 @@ from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
+    AcceptedRule,
     AlertDemand,
     CriteriaSet,
     Criterion,
@@ -25,8 +26,10 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     MapDemand,
     Value,
 )
+from ugv_acceptance.evaluation.criteria.ground_statement import SAFEGUARD as GROUND
 from ugv_acceptance.evaluation.criteria.quantities import DATA, INPUTS, SIGNALS, subjects_of
 from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS
+from ugv_acceptance.evaluation.ground import GroundWindow
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Joint
 
@@ -86,6 +89,22 @@ class CriterionSection(Section):
     cell: Annotated[Positive, _number('angle', 'length')] | None = None
 
 
+class WindowSection(Section):
+    """A kind of ground and the times (s) between which a recording was made on it."""
+
+    kind: Literal['flat', 'uneven', 'stairs']
+    between: Between
+
+
+class CriteriaGroundSection(Section):
+    """What the ground of the recordings is, and the rule accepted where it is not flat, and why."""
+
+    kind: Literal['flat', 'uneven', 'stairs'] | None = None
+    windows: tuple[WindowSection, ...] = ()
+    accept: Literal['trend', 'cautious'] | None = None
+    reason: Reason | None = None
+
+
 class CriteriaFile(Section):
     """The keys of a criteria file."""
 
@@ -94,6 +113,7 @@ class CriteriaFile(Section):
     uncertainty: Method = 'rss'
     coverage: Share = 0.95
     waive: dict[str, Reason] = Field(default={})
+    ground: CriteriaGroundSection = CriteriaGroundSection()
     criteria: dict[str, CriterionSection]
 
 
@@ -168,11 +188,32 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
         file.coverage,
         file.uncertainty,
         tuple(file.waive.items()),
+        _accepted(document, file.ground),
+        file.ground.kind,
+        tuple(GroundWindow(w.kind, *w.between) for w in file.ground.windows),
     )
 
 
+def _accepted(document: Document, section: CriteriaGroundSection) -> AcceptedRule | None:
+    """Return the rule accepted on ground that is not flat; BadConfig without the reason for it."""
+    if section.accept is not None and section.reason is not None:
+        return AcceptedRule(section.accept, section.reason)
+    for key, given, other in (
+        ('reason', section.accept, 'a reason why this rule is accepted'),
+        ('accept', section.reason, 'the rule accepted for this reason: trend or cautious'),
+    ):
+        if given is not None:
+            raise BadConfig(f'{document.where(("ground", key))}: expected {other}, got none')
+    return None
+
+
 def _check_safeguard(document: Document, name: str) -> None:
-    """Raise BadConfig if a waiver names no safeguard."""
+    """Raise BadConfig if a waiver names no safeguard, or the one that needs a rule in its place."""
+    if name == GROUND:
+        raise BadConfig(
+            f'{document.where(("waive", name))}: it cannot be waived; say under ground which rule '
+            'is accepted (accept: trend or cautious), and the reason'
+        )
     if name not in SAFEGUARDS:
         near = get_close_matches(name, SAFEGUARDS, 1, 0.5)
         hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(SAFEGUARDS)}'

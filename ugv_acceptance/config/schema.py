@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic_core import PydanticCustomError
 
 from ugv_acceptance.config.units import Given, Measure, parse, shown, split_key
+from ugv_acceptance.evaluation.ground import PITCH
 from ugv_acceptance.evaluation.permitted_limits import checked_reason
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 from ugv_acceptance.model.robot import Robot
@@ -179,10 +180,15 @@ class ContactSection(Section):
 
 
 class GroundSection(Section):
-    """Height of the tracks' ground plane in base_link, and the tolerance of contact with it."""
+    """Height of the tracks' ground plane in base_link, tolerance of contact with it, its kind.
+
+    `kind` and `pitch` as in evaluation.ground.Ground; without a kind the ground is taken as flat.
+    """
 
     height: Annotated[float, _number('length')] = _ROBOT.ground
     tolerance: Annotated[Positive, _number('length')] = _ROBOT.contact_tolerance
+    kind: Literal['flat', 'uneven', 'stairs'] | None = None
+    pitch: Annotated[Positive, _number('length')] = PITCH
 
 
 class PayloadSection(Section):

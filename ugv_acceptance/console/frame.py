@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
+from ugv_acceptance.evaluation.ground import CARRIED, bound_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.least_margins import (
     TILT_NOT_CHECKED,
@@ -60,7 +61,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
     cause, advice = _cause(snapshot, level)
-    cause = cause or kept_words(settings)
+    cause = cause or kept_words(settings, rough=snapshot.rough)
     return {
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
@@ -75,6 +76,11 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'attitude': _attitude(snapshot),
         'tilt': _tilt(snapshot),
         'state': STATES[snapshot.state],
+        'ground': {
+            'words': snapshot.ground,
+            'rough': snapshot.rough,
+            'cautious_deg': number(math.degrees(snapshot.cautious)),
+        },
         'torque': _torque(snapshot, settings),
         'inputs': [_input(row) for row in snapshot.inputs],
         'payload': {
@@ -106,6 +112,10 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
             f'{-degrees:.1f} degrees past the tipping point',
         )
         tilt = f'{ways[degrees < 0]} to the {side}'
+        if snapshot.rough:
+            tilt = bound_words(side, angle, snapshot.cautious)
+        elif snapshot.carried:
+            tilt = f'{tilt}; {CARRIED}'
     elif not settings.hears_imu:
         tilt = TILT_NOT_CHECKED
     else:

@@ -19,10 +19,14 @@ from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
+from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
 from ugv_acceptance.evaluation.inputs.payload import payload_from
+from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.shortened_tracks import has_tracks
+from ugv_acceptance.model.stability import RAISED
 from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.offline.evaluation import Evaluation
 from ugv_acceptance.offline.judge import Options
@@ -116,7 +120,28 @@ class ShownRecording:
             payload,
             alerts,
             (*(self._input(w, k, when) for w in self._used()), self._payload_input(when)),
+            **self._ground(k, when, payload, known=known),
         )
+
+    def _ground(self, k: int, when: int, payload: Payload, *, known: bool) -> dict[str, Any]:
+        """Return what a snapshot says of the ground at `when` (ns), in row `k` of the track."""
+        settings, track = self.settings, self.track
+        ground = settings.ground
+        seconds = np.array([(when - self.bag.start_ns) / 1e9])
+        kind = KINDS[int(ground.numbers_at(seconds)[0])]
+        entered = ground.kind or any(w.start <= seconds[0] < w.end for w in ground.windows)
+        rough = kind != FLAT and settings.hears_imu
+        cautious = math.nan
+        if rough and known:
+            q, gravity = _numbers(track.q[k]), _numbers(track.gravity[k])
+            short = cautious_mechanics(settings.robot, ground.pitch)
+            cautious = min(cautious_angles(short, q, gravity, payload))  # type: ignore[arg-type]
+        return {
+            'ground': ground_words(kind if entered else None) if settings.hears_imu else '',
+            'rough': rough,
+            'cautious': cautious,
+            'carried': not rough and int(track.state[k]) == RAISED and has_tracks(settings.robot),
+        }
 
     def _used(self) -> list[int]:
         """Return the numbers of the inputs that the configuration uses."""

@@ -58,6 +58,9 @@ class Snapshot:
     numbers are NaN. `torque` (N m; N), `angle` (rad) the tilt left to each of SIDES, `state` a
     number in STATES, `effort` what the motors measure, `hints` what else
     the operator should know, in words. `stamp` (ns) is in the header of the newest message.
+    `ground` says in words what the ground is taken for; where it is not flat (`rough`) the angles
+    are an upper bound, and `cautious` (rad) is the cautious margin. `carried`: points below the
+    tracks carry the robot.
     """
 
     time: int
@@ -75,6 +78,10 @@ class Snapshot:
     inputs: tuple[InputRow, ...] = ()
     hints: tuple[str, ...] = ()
     stamp: int | None = None
+    ground: str = ''
+    rough: bool = False
+    cautious: float = math.nan
+    carried: bool = False
 
 
 class Feed(Protocol):

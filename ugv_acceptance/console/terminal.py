@@ -160,9 +160,13 @@ def margins_of(frame: Plain) -> Table:
     if frame['level'] == LEVELS[STALE]:
         table.add_row(*([frame['word']] * 3))
         return table
+    ground = frame['ground']
+    if ground['words']:
+        table.add_row('ground', Text(str(ground['words'])), '', '')
     for row in frame['tilt']:
         left = row['left_deg']
-        now = 'no edge' if left is None else f'{left:.1f} deg left'
+        most = 'at most ' if ground['rough'] else ''
+        now = 'no edge' if left is None else f'{most}{left:.1f} deg left'
         table.add_row(f'tip to the {row["side"]}', now, '', '')
     for row in frame['torque']:
         if row['limit'] is not None and row['use'] is not None:

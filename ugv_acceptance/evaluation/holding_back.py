@@ -51,6 +51,7 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
         moment=_blank(rows.moment, doubtful),
         energy=_blank(rows.energy, doubtful),
         zmp=_blank(rows.zmp, doubtful),
+        ground=replace(rows.ground, cautious=_blank(rows.ground.cautious, doubtful)),
     )
 
 

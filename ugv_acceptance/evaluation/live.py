@@ -10,6 +10,7 @@ from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Signal
+from ugv_acceptance.evaluation.alerts.tipping_watch import NOT_KNOWN as NO_TREND
 from ugv_acceptance.evaluation.chassis.motion import (
     NO_RATE,
     UNWITNESSED,
@@ -26,10 +27,12 @@ from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTim
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
+from ugv_acceptance.model.shortened_tracks import has_tracks
 from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
     NO_CONTACT,
     NOT_KNOWN,
+    RAISED,
     Stability,
     Stance,
     stability_of,
@@ -230,6 +233,7 @@ class LiveEvaluator:
             self.payload, self.load_known = carried, True
         self.settings = self.watch.settings = settings
         self._imu.adopt(settings)
+        self.watch.trend.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
         for fresh in self._fresh:
@@ -261,9 +265,25 @@ class LiveEvaluator:
 
     @property
     def level(self) -> int:
-        """The most severe level of the active alerts; at least STALE while margins are unknown."""
+        """The most severe level of the active alerts; at least STALE while margins are unknown.
+
+        On ground that is not flat also while it is not known whether the robot begins to tip.
+        """
         active = [alert.rule.level for alert in self.watch.active]
-        return max([*active, OK if self.margins else STALE])
+        known = self.margins is not None and not self.waits_for_trend
+        return max([*active, OK if known else STALE])
+
+    @property
+    def carried(self) -> bool:
+        """Whether points below the tracks (flippers) carry a robot now that has tracks."""
+        raised = self.margins is not None and self.margins.stability.state == RAISED
+        return raised and has_tracks(self.settings.robot)
+
+    @property
+    def waits_for_trend(self) -> bool:
+        """Whether the ground is not flat, and it is not known yet if the robot begins to tip."""
+        judged = self.settings.ground.rough and not self._level
+        return judged and self.watch.trend.level == NO_TREND
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
         fresh = self._fresh[which]
@@ -324,6 +344,9 @@ class LiveEvaluator:
         prediction = self.watch.prediction
         if now >= prediction.due:
             prediction.keep(now, stability.angle, torque, self._joints.effort, q)
+            stands = self._chassis.stands
+            if stands is not None and not self._level:
+                self.watch.trend.keep(now, stability.angle, q, gravity, stands[2])
         return self.margins
 
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:

@@ -52,6 +52,21 @@ NO_CHASSIS_ROWS = ChassisRows(np.zeros(0, np.intp), _NONE, _NONE, _NONE > 0.0, _
 
 
 @dataclass(frozen=True, slots=True)
+class GroundRows:
+    """What the ground of a part's rows is taken for; both empty where it is flat all the time.
+
+    `kind` (n,) is a number in ground.KINDS, `cautious` (n, 4) rad the tilt left to each of SIDES
+    with shortened tracks, NaN on flat ground and where margins are not known.
+    """
+
+    kind: NDArray[np.int8]
+    cautious: Floats
+
+
+NO_GROUND_ROWS = GroundRows(np.zeros(0, np.int8), _NONE)
+
+
+@dataclass(frozen=True, slots=True)
 class MarginRows:
     """Margins of a part of a recording, one row a message of either input, in order of receipt.
 
@@ -73,6 +88,7 @@ class MarginRows:
     zmp: Floats
     pairs: Pairs
     chassis: ChassisRows = NO_CHASSIS_ROWS
+    ground: GroundRows = NO_GROUND_ROWS
 
     @property
     def q(self) -> Floats:

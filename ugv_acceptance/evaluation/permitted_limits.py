@@ -197,8 +197,8 @@ def checked_reason(text: str) -> str:
 def limits_hash(settings: Settings) -> str:
     """Return a hash (16 hex digits) of everything alerts are judged by.
 
-    That is limits, delays and the IMU's thresholds. Numbers count with nine digits, so that
-    rounding in unit conversions does not change it.
+    That is limits, delays, the IMU's thresholds, and the kind of ground where it is not flat.
+    Numbers count with nine digits, so that rounding in unit conversions does not change it.
     """
     limits, imu = asdict(settings.limits), asdict(settings.imu)
     names = settings.robot.joint_names
@@ -208,6 +208,8 @@ def limits_hash(settings: Settings) -> str:
         del imu[key]
     del limits['rated']
     told = {'limits': limits, 'delays': asdict(settings.delays), 'imu': imu}
+    if settings.ground.rough:  # other alerts are raised there
+        told['ground'] = {'kind': settings.ground.taken}
     text = json.dumps(_canonical(told), sort_keys=True, separators=(',', ':'))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -27,6 +27,7 @@ from ugv_acceptance.evaluation.inputs.payload import (
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
+from ugv_acceptance.evaluation.rough_ground import ground_rows
 from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
@@ -89,6 +90,7 @@ class RecordedEvaluator:
     gaps: tuple[list[Gap], list[Gap]] = field(default_factory=lambda: ([], []))
     first_payload: tuple[int, Payload] | None = None
     _known_until: int | None = None
+    _began: int = 0
 
     def __post_init__(self) -> None:
         self.watch = RuleSet(self.settings)
@@ -133,6 +135,7 @@ class RecordedEvaluator:
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
+        self._began = now
         for fresh in self.fresh:
             fresh.started = now
         self.watch.relax(now)
@@ -176,6 +179,7 @@ class RecordedEvaluator:
         )
         load = self._payload.at(newest.joints.time)
         rows = self._margins(newest, load)
+        rows = replace(rows, ground=ground_rows(self.settings, self._began, rows, load))
         lost = self._lost(rows)
         self._watch_pairs(rows, lost)
         chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))

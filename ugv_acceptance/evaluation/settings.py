@@ -6,6 +6,7 @@ YAML file and validates them; they are not validated again here.
 
 from dataclasses import dataclass
 
+from ugv_acceptance.evaluation.ground import NOT_ENTERED, Ground
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
@@ -103,7 +104,7 @@ class Settings:
 
     `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is. With
     `payload_known` the robot's payload is that carried until another is declared; without it, it is
-    only assumed.
+    only assumed. `ground` is what the ground is taken for.
     """
 
     robot: Robot
@@ -113,6 +114,7 @@ class Settings:
     delays: Delays = Delays()
     unsafe: str = ''
     payload_known: bool = False
+    ground: Ground = NOT_ENTERED
 
     @property
     def hears_joints(self) -> bool:

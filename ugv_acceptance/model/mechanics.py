@@ -5,7 +5,7 @@ sample that only brings a new attitude costs three products a joint.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -13,7 +13,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
 from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
-from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.robot import Contact, Robot
 from ugv_acceptance.model.torque_gradients import PointLoad, carried_by, in_base, steps_of
 from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
 
@@ -72,6 +72,18 @@ def mechanics_of(robot: Robot) -> Mechanics:
         compile_kernel(_holding_formula(robot, tree), [*names, *load, *gravity]),
         compile_kernel(_force_formula(robot, tree), [*names * 3, *gravity, *load]),
     )
+
+
+def with_contacts(mechanics: Mechanics, contacts: Sequence[Contact]) -> Mechanics:
+    """Return the mechanics of the same robot with other contact points.
+
+    Only what depends on these is compiled, which takes a part of the time of `mechanics_of`.
+    """
+    robot = replace(mechanics.robot, contacts=tuple(contacts))
+    load = ['payload_mass', 'payload_x', 'payload_y', 'payload_z']
+    formula = _posture_formula(robot, mechanics.tree)
+    kernel = compile_kernel(formula, [*robot.joint_names, *load])
+    return replace(mechanics, robot=robot, posture=kernel)
 
 
 def _to_tree(robot: Robot, tree: Tree) -> list[int]:

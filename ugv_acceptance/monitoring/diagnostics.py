@@ -13,10 +13,10 @@ from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
-from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
+from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
 from ugv_acceptance.monitoring.session import Session
 
 
@@ -30,22 +30,19 @@ class Status:
     values: dict[str, object] = field(default_factory=dict)
 
 
-def _tilt_words(side: str, angle: float) -> str:
-    return f'{math.degrees(angle):.1f} deg of tilt left ({side})'
-
-
 def verdict_of(session: Session) -> Status:
     """Return the verdict line for the operator: most severe cause, what is left, what to do."""
     alarm_tracker, now = session.alarm_tracker, session.clock.now()
     margins, active = session.evaluator.margins, session.active
     session.advisory.renew(now, active)
-    left = _left(margins, session.settings) if margins else 'margins not known'
+    left = _left(margins, session) if margins else 'margins not known'
     unseen = sum(alarm.state.unseen for alarm in alarm_tracker.alarms.table.values())
     values: dict[str, object] = {
         'left': left,
         'alerts_active': len(active),
         'alerts_unacknowledged': unseen,
         **_limits(session),
+        **ground_values(session.evaluator),
     }
     known = session.advisory.values(now)
     left = '; '.join([left, *session.advisory.hints(now)])
@@ -55,17 +52,21 @@ def verdict_of(session: Session) -> Status:
         waited = ' and '.join(name for name in session.counts if name != 'payload')
         text = f'waiting for {waited}: no margins yet'
         return Status(STALE, '', text, values | known)
+    if session.evaluator.waits_for_trend:
+        ground = session.settings.ground.taken
+        text = f'{ground}: whether the robot begins to tip is not known yet; {left}'
+        return Status(STALE, '', text, values | known)
     if alarm_tracker.waiting:
         return _over(session, alarm_tracker.waiting[-1], left, values | known)
-    return Status(OK, '', f'{kept_words(session.settings)}: {left}', values | known)
+    kept = kept_words(session.settings, rough=session.settings.ground.rough)
+    return Status(OK, '', f'{kept}: {left}', values | known)
 
 
-def _left(margins: Margins, settings: Settings) -> str:
-    side, angle = least_tilt(margins.stability.angle)
-    tilt = _tilt_words(side, angle) if side else 'no tilt margin'
+def _left(margins: Margins, session: Session) -> str:
+    settings = session.settings
     if not settings.hears_imu:
         return with_most_used('', margins.torque, settings)
-    return with_most_used(tilt, margins.torque, settings)
+    return with_most_used(tilt_words(margins, session.evaluator), margins.torque, settings)
 
 
 def _worst(
@@ -169,15 +170,13 @@ def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
 
 
 def margin_statuses(
-    settings: Settings,
-    margins: Margins | None,
-    active: Sequence[Alert],
-    moving: Sequence[float] | None = None,
+    evaluator: LiveEvaluator, active: Sequence[Alert], moving: Sequence[float] | None = None
 ) -> Iterator[Status]:
     """Yield a status for every judged joint, and one for the tip-over margins.
 
     `moving` is the tilt left (rad) to each of SIDES with the energy of the turn the robot is in.
     """
+    settings, margins = evaluator.settings, evaluator.margins
     for j, name in enumerate(settings.robot.joint_names):
         limit = settings.limits.torque[j]
         if math.isfinite(limit):
@@ -193,31 +192,32 @@ def margin_statuses(
             }
             yield Status(level, f'Torque {name}', text, numbers)
     if settings.hears_imu:
-        yield _tip_status(margins, active, moving)
+        yield _tip_status(evaluator, active, moving)
     else:
         yield Status(STALE, 'Tip-over', TILT_NOT_CHECKED)
 
 
 def _tip_status(
-    margins: Margins | None, active: Sequence[Alert], moving: Sequence[float] | None
+    evaluator: LiveEvaluator, active: Sequence[Alert], moving: Sequence[float] | None
 ) -> Status:
-    codes = ('TIP_OVER', 'NO_SUPPORT', 'TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')
+    codes = ('TIP_OVER', 'TIP_TREND', 'NO_SUPPORT', 'TIP_MOVING', 'ACCELERATION', 'TRACK_LIFT')
+    margins = evaluator.margins
     level = max(_level(active, code, None, margins) for code in codes)
     if margins is None:
-        return Status(level, 'Tip-over', 'not known')
+        return Status(level, 'Tip-over', 'not known', ground_values(evaluator))
+    level = max(level, STALE if evaluator.waits_for_trend else OK)
     stability = margins.stability
     state = STATES[int(stability.state)]
-    values: dict[str, object] = {'state': state}
+    values: dict[str, object] = {'state': state, **ground_values(evaluator)}
     for side, angle, moment in zip(SIDES, stability.angle, stability.moment, strict=True):
         values[f'{side}_deg'] = math.degrees(angle)
         values[f'{side}_moment_nm'] = float(moment)
     if stability.state >= NO_CONTACT:
         return Status(level, 'Tip-over', f'no margin: {state}', values)
-    side, angle = least_tilt(stability.angle)
-    values['edge'] = side
+    values['edge'], _ = least_tilt(stability.angle)
     if moving is not None:
         values['moving_deg'] = math.degrees(min(moving))
-    return Status(level, 'Tip-over', _tilt_words(side, angle), values)
+    return Status(level, 'Tip-over', tilt_words(margins, evaluator), values)
 
 
 def _level(active: Sequence[Alert], code: str, subject: str | None, margins: Margins | None) -> int:
@@ -274,9 +274,8 @@ def diagnostics_of(
     statuses = [_monitor(verdict, config, session)]
     if session is not None:
         active = session.active
-        evaluator = session.evaluator
-        moving = evaluator.moving
-        statuses += margin_statuses(session.settings, evaluator.margins, active, moving)
+        moving = session.evaluator.moving
+        statuses += margin_statuses(session.evaluator, active, moving)
         statuses += [_input(name, session, inputs, active) for name in session.counts]
     return statuses
 

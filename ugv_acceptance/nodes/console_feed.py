@@ -7,6 +7,7 @@ twice as much and show it no sooner.
 """
 
 import gc
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -249,6 +250,10 @@ class ConsoleNode(Node):
             inputs=rows,
             hints=hearing.hints_of(self.said),
             stamp=margins.stamp,
+            ground=self.said.get('ground', ''),
+            rough='trend' in self.said,
+            cautious=math.radians(float(self.said.get('cautious_deg', 'nan'))),
+            carried='trend' not in self.said and evaluator.carried,
         )
 
     def _newest(self, row: AlertRow) -> AlertRow:

@@ -14,6 +14,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Inertia, InertiaStamped, Twist, Vector3
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.experimental.events_executor import EventsExecutor
@@ -36,7 +38,7 @@ from ugv_acceptance.plan.motions import HITCH
 from ugv_acceptance.run.actuation import OPERATOR, SIM
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
-SIMULATOR = 'packbot_simulator'
+SIMULATOR, MONITOR = 'packbot_simulator', 'acceptance_monitor'
 # Seconds in which a simulator answers, on a busy machine too.
 ANSWER_WITHIN = 30.0
 
@@ -54,6 +56,8 @@ class RosCommands:
         self._pull = publish(Vector3, f'{SIMULATOR}/pull', 10)
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
         self._reset: Any = node.create_client(Trigger, f'{SIMULATOR}/reset')
+        self._told = config.settings.ground.kind or ''
+        self._set: Any = node.create_client(SetParameters, f'{MONITOR}/set_parameters')
 
     def unheard(self, mode: str) -> str:
         """Return a topic this mode needs that has no subscriber yet; empty: none.
@@ -100,6 +104,16 @@ class RosCommands:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._payload.publish(message)
 
+    def tell_ground(self, kind: str | None) -> None:
+        """Tell the monitor the kind of ground, and wait until it took it; None: as configured."""
+        told = kind or self._config.settings.ground.kind or ''
+        if told == self._told:
+            return
+        text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=told)
+        request = SetParameters.Request(parameters=[Parameter(name='ground.kind', value=text)])
+        if self._set.wait_for_service(ANSWER_WITHIN) and self._done(self._set.call_async(request)):
+            self._told = told
+
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
         self._ground.publish(Vector3(x=tilt, y=heading, z=rate))
@@ -115,12 +129,14 @@ class RosCommands:
     def stand_up(self) -> None:
         """Reset the simulated robot to its start, and wait until that is done."""
         if self._reset.wait_for_service(ANSWER_WITHIN):
-            future, end = (
-                self._reset.call_async(Trigger.Request()),
-                time.monotonic() + ANSWER_WITHIN,
-            )
-            while not future.done() and time.monotonic() < end:
-                time.sleep(0.01)
+            self._done(self._reset.call_async(Trigger.Request()))
+
+    def _done(self, future: Future) -> bool:
+        """Wait for an answer; return whether it came."""
+        end = time.monotonic() + ANSWER_WITHIN
+        while not future.done() and time.monotonic() < end:
+            time.sleep(0.01)
+        return bool(future.done())
 
     def _inertia(self, mass: float) -> Inertia:
         message = Inertia(m=float(mass))
@@ -128,7 +144,6 @@ class RosCommands:
         return message
 
 
-MONITOR = 'acceptance_monitor'
 # Seconds between checks of the watchdog; checks without a message after which the monitor is dead,
 # and after which recorded data is flushed. Checks are counted, not seconds: while this process
 # itself is stopped, it cannot receive, and that is not the monitor's fault.

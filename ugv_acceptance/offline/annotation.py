@@ -6,6 +6,7 @@ monitor's own functions, which are called for the recording's moments one after 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from ugv_acceptance.bag.annotated import Said
 from ugv_acceptance.bag.encode import JointStateBytes
 from ugv_acceptance.bag.encode_views import Diagnosis, diagnoses_cdr, diagnosis_cdr, markers_cdr
 from ugv_acceptance.bag.reader import Bag
+from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.alerts.tipping_watch import TippingWatch
+from ugv_acceptance.evaluation.ground import KINDS
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, Stability
 from ugv_acceptance.monitoring.alarm_tracker import Event, events_of
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
@@ -74,6 +79,7 @@ class Annotation:
     _due: list[int] = field(init=False)
     _until: int = 0
     _stamp: int = 0
+    _trend: TippingWatch = field(init=False)
 
     def __post_init__(self) -> None:
         self.names = topic_names(self.bag)
@@ -81,6 +87,7 @@ class Annotation:
         told = {moment_of(a): r.advice for a, r in zip(log, results, strict=True)}
         nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
         self._session = ReplayedSession(self.settings, *nothing, self._clock, told=told)
+        self._trend = RuleSet(self.settings).trend
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
@@ -122,9 +129,27 @@ class Annotation:
             yield from self._up_to(now)
             self._until, self._stamp = until[k], stamp
             j = of[k]
-            self._session.take(margins, payloads.at(int(heard[j])), measured[j])
+            load = payloads.at(int(heard[j]))
+            self._session.take(margins, load, measured[j])
+            if len(rows.ground.kind):
+                self._stand_on(int(rows.ground.kind[k]), margins, load)
             if margins is not None:
                 yield from self._margins(now, stamp, margins)
+
+    def _stand_on(self, number: int, margins: Margins | None, load: Payload) -> None:
+        """Let the session stand on a kind of ground (a number in KINDS), with the trend so far."""
+        session, trend = self._session, self._trend
+        if session.settings.ground.taken != KINDS[number]:
+            ground = replace(self.settings.ground, kind=KINDS[number])
+            settings = replace(self.settings, ground=ground)
+            session.settings = session.evaluator.settings = settings
+            trend.adopt(settings)
+        if margins is not None and margins.time >= trend.due:
+            angle: Any = margins.stability.angle
+            trend.keep(margins.time, angle, margins.q, margins.gravity, load)
+            trend.judge()
+        session.evaluator.watch.trend.level = trend.level
+        session.evaluator.watch.trend.cautious = trend.cautious
 
     def _margins(self, now: int, stamp: int, margins: Margins) -> Iterator[Said]:
         joints, sides = self._bytes
@@ -187,7 +212,7 @@ class Annotation:
     def _verdict(self, now: int) -> Iterator[Said]:
         session, status = self._session, verdict_of(self._session)
         yield Said(now, self.names['verdict'], diagnosis_cdr(self._diagnosis(status)))
-        of = margin_statuses(self.settings, session.evaluator.margins, session.active)
+        of = margin_statuses(session.evaluator, session.active)
         monitor = replace(status, name='Monitor')
         yield Said(now, self.names['diagnostics'], self._array(now, [monitor, *of]))
 

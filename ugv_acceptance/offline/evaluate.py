@@ -26,6 +26,7 @@ from ugv_acceptance.evaluation.criteria.statement import Objection
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.criteria.verdict import not_checked_json
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
+from ugv_acceptance.evaluation.ground import Ground, with_ground
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
@@ -43,6 +44,7 @@ def evaluate(
     config: Config | Path | str | None = None,
     criteria: CriteriaSet | Path | str | None = None,
     payload: Payload | float | None = None,
+    ground: Ground | None = None,
     identity: Mapping[str, str] | None = None,
     options: Options = DEFAULTS,
 ) -> Evaluation:
@@ -61,6 +63,8 @@ def evaluate(
     payload
         The payload carried until a message declares another: kg at the origin of the payload link,
         or a Payload; by default that of `config`.
+    ground
+        What the ground was, all the time or in windows, beyond what `config` and `criteria` say.
     identity
         What a person enters for the report: operator, robot_serial, place, ...
     options
@@ -87,6 +91,7 @@ def evaluate(
     opened = recording if isinstance(recording, Recording) else open_recording(recording)
     opened = replace(opened, names=opened.names or robot.topics.names)
     demanded = _criteria(criteria, settings)
+    settings = _on_ground(settings, demanded, ground)
     effort = EffortComparison(settings)
     if options.compare_effort:
         options = replace(options, takers=(effort.add, *options.takers))
@@ -100,6 +105,9 @@ def evaluate(
     if payload is not None:
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
+    if ground is not None:
+        windows = [{'kind': w.kind, 'start_s': w.start, 'end_s': w.end} for w in ground.windows]
+        result['declared_ground'] = {'kind': ground.kind, 'windows': windows}
     add_acknowledgements(result, opened.bag)
     if options.compare_effort:
         result['effort'] = effort.result(opened.start_ns)
@@ -149,6 +157,16 @@ def _carrying(config: Config, payload: Payload | float | None) -> Settings:
         )
     robot = replace(settings.robot, payload=known)
     return replace(settings, robot=robot, payload_known=True)
+
+
+def _on_ground(settings: Settings, criteria: CriteriaSet | None, given: Ground | None) -> Settings:
+    """Return settings with what is known of the ground: the criteria's, and what is `given`."""
+    ground = settings.ground
+    if criteria is not None:
+        ground = with_ground(ground, criteria.ground_kind, criteria.ground_windows)
+    if given is not None:
+        ground = with_ground(ground, given.kind, given.windows)
+    return replace(settings, ground=ground)
 
 
 def _criteria(criteria: CriteriaSet | Path | str | None, settings: Settings) -> CriteriaSet | None:

@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     default_criteria,
 )
 from ugv_acceptance.evaluation.criteria.findings import Findings
+from ugv_acceptance.evaluation.criteria.ground_statement import GroundExamination
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
@@ -117,6 +118,7 @@ def _examinations(
     sources: tuple[Source, ...],
     evaluator: RecordedEvaluator,
     limits: CriteriaMeasurement,
+    criteria: CriteriaSet,
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
     return (
@@ -126,6 +128,7 @@ def _examinations(
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
+        GroundExamination(settings, criteria, evaluator.watch.trend, evaluator.watch.log),
     )
 
 
@@ -150,7 +153,8 @@ class _Reading:
 
     def __post_init__(self) -> None:
         self.summary = Summary(self.settings, self.limits.start)
-        self.examinations = _examinations(self.settings, self.sources, self.evaluator, self.limits)
+        of = self.evaluator, self.limits, self.asked.criteria
+        self.examinations = _examinations(self.settings, self.sources, *of)
         log = self.evaluator.watch.log
         self.told = AlertAdvice(self.settings, log, self.limits.payloads.at)
         self.held = HeldMargins(log)

@@ -89,7 +89,8 @@ class ReplayedSession(Session):
     @property
     def level(self) -> int:
         """The most severe level at that moment."""
-        return max([OK if self.evaluator.margins else STALE, *(a.rule.level for a in self.active)])
+        known = self.evaluator.margins is not None and not self.evaluator.waits_for_trend
+        return max([OK if known else STALE, *(a.rule.level for a in self.active)])
 
     def take(self, margins: Margins | None, payload: Payload, measured: Measured) -> None:
         """Take the margins of a message (None if unknown), its payload, rates and efforts."""

@@ -11,6 +11,7 @@ from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import ALERTS, level_words, pattern_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
+from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
@@ -22,6 +23,7 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 # The order in which the card tells what alerts mean: robot, inputs, what was set.
 SHOWN = (
     'TIP_OVER',
+    'TIP_TREND',
     'TORQUE_LIMIT',
     'TIP_MOVING',
     'TIP_AHEAD',
@@ -122,6 +124,7 @@ def card_of(plan: Plan, config: Config) -> str:
         levels=[(level_words(level), text, do) for level, text, do in LEVELS],
         meanings=[(code, ALERTS[code].meaning, ALERTS[code].to_do) for code in SHOWN],
         maps=safe_maps(arm, plan),
+        ground=ground_words(config.settings.ground.kind),
         length=time_text(duration(plan), digits=2),
         home=_text(plan.home_deg),
     )
@@ -144,20 +147,29 @@ def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Seque
     moved = {n: a for n, a in step.posture_deg.items() if a != plan.home_deg.get(n)}
     told = {'tilt_left_deg': '{:.1f}° of tilt left', 'use': '{:.0%} of the torque limit'}
     expected = [told[key].format(value) for key, value in step.expected.items() if key in told]
-    tilt = step.ground.tilt_deg
-    words = ORIENTATIONS[step.ground.orientation].words
     q = np.array(vector_of(arm.robot, plan.home_deg, step.posture_deg))
     return Row(
         step,
         step.id.partition('-')[0],
         _text(moved) or 'home',
         ', '.join(expected),
-        f'ramp of {tilt:g}°, {words}' if tilt else words,
+        _ground(step),
         f'{step.payload_kg:g} kg' if step.payload_kg else 'none',
         tuple(p for p in step.preparation[GROUND_AND_LOAD:] if p not in common),
         sketch(arm, q, step),
         tuple(p for p in step.alerts.must_not if p not in never),
     )
+
+
+def _ground(step: Step) -> str:
+    """Return what a step's ground is, and what that means for the tilt left."""
+    ground = step.ground
+    words = ORIENTATIONS[ground.orientation].words
+    text = f'ramp of {ground.tilt_deg:g}°, {words}' if ground.tilt_deg else words
+    if ground.kind in (None, FLAT):
+        return text
+    judged = 'by the trend' if ground.accept else 'not judged as passed'
+    return f'{ground.kind}; {text} (tilt left is an upper bound; tip-over {judged})'
 
 
 def _text(posture: Posture) -> str:

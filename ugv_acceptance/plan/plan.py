@@ -50,10 +50,23 @@ class _Part(BaseModel):
 
 
 class Ground(_Part):
-    """The ground of a step: one of the orientations of the paper's Figure 6, and its tilt (deg)."""
+    """The ground of a step: one of the orientations of the paper's Figure 6, and its tilt (deg).
+
+    `kind` is flat, uneven or stairs; None: as the robot's configuration says. Where it is not flat
+    a step passes only if it says which rule it accepts for tip-over (`accept`), and the `reason`.
+    """
 
     orientation: Annotated[str, AfterValidator(_orientation)] = 'level'
     tilt_deg: Annotated[Finite, Field(ge=0, le=60)] = 0.0
+    kind: Literal['flat', 'uneven', 'stairs'] | None = None
+    accept: Literal['trend'] | None = None
+    reason: Annotated[str, Field(min_length=1)] | None = None
+
+    @model_validator(mode='after')
+    def _reasoned(self) -> 'Ground':
+        if (self.accept is None) != (self.reason is None):
+            raise ValueError('expected accept and reason together, or neither')
+        return self
 
 
 class Alerts(_Part):
@@ -128,7 +141,12 @@ class Plan(_Part):
     @property
     def sha256(self) -> str:
         """SHA-256 of the plan's content; comments and the order of keys do not change it."""
-        text = json.dumps(self.model_dump(mode='json'), sort_keys=True)
+        plain = self.model_dump(mode='json')
+        for step in plain['steps']:  # keys that a plan may leave out; old plans keep their hash
+            for key in ('kind', 'accept', 'reason'):
+                if step['ground'][key] is None:
+                    del step['ground'][key]
+        text = json.dumps(plain, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
 

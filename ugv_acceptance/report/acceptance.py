@@ -16,6 +16,7 @@ from ugv_acceptance.report.format import (
     assumed_line,
     bound_text,
     doubts_of,
+    ground_line,
     interval_text,
     limit_text,
     load_text,
@@ -98,7 +99,9 @@ def acceptance_page(
         unchecked=not_checked_lines(result),
         error_rate=error_rate_line(),
         closing=CLOSING[result['verdict']],
-        first_lines=[origin_line(result), assumed_line(result)],
+        first_lines=[
+            line for of in (origin_line, assumed_line, ground_line) if (line := of(result))
+        ],
         identity=[(words, _entered(result, key)) for key, words in parts.items()],
         inputs=[(key, result['inputs'][key]) for key in ('joint_states', 'imu')],
         alerts=result['alerts'][:MOST_ALERTS],

@@ -1,6 +1,7 @@
 """Formats the numbers of a result as text; an unknown number is a dash, never a zero."""
 
 from ugv_acceptance.evaluation.criteria.quantities import DATA
+from ugv_acceptance.evaluation.ground import FLAT
 from ugv_acceptance.type_aliases import Json
 
 DASH = '\N{EN DASH}'
@@ -124,6 +125,29 @@ def assumed_line(result: Json) -> str:
         by_reason.setdefault(reason, []).append(name)
     groups = (f'{", ".join(names)} ({reason})' for reason, names in by_reason.items())
     return f'assumed, not measured: {"; ".join(groups)}'
+
+
+def ground_line(result: Json) -> str:
+    """Return what the ground was taken for where somebody entered it; '' where nobody did."""
+    ground = result.get('ground')
+    if ground is None or not (ground['kind'] or ground['windows']):
+        return ''
+    parts = [f'{w["kind"]} from {w["start_s"]:g} to {w["end_s"]:g} s' for w in ground['windows']]
+    kind = ground['kind'] or FLAT
+    text = f'ground, as entered: {", ".join([*parts, f"else {kind}"]) if parts else kind}'
+    if not is_bound(result):
+        return text
+    text += '; where it is not flat, margins in degrees are an upper bound'
+    cautious = ground['cautious']
+    if cautious is None:
+        return text
+    least = f'{cautious["deg"]:.1f} deg to the {cautious["side"]} at {cautious["time_s"]:.1f} s'
+    return f'{text}, and taken cautiously at least {least} were left'
+
+
+def is_bound(result: Json) -> bool:
+    """Return whether margins in degrees of a run are an upper bound: it was not on flat ground."""
+    return result.get('ground', {}).get('upper_bound') is not None
 
 
 def load_text(result: Json) -> str:

@@ -56,6 +56,7 @@ class Hands:
         elif not self.told(f'{step.id}: set up: {"; ".join(step.preparation)}'):
             return False
         commands.declare(step.payload_kg)
+        commands.tell_ground(step.ground.kind)
         return True
 
     def move(self, posture: Mapping[str, float], speed: float) -> float:

@@ -5,7 +5,7 @@ same recordings, bit for bit, and the same verdicts. Steps are judged as over RO
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ugv_acceptance import BadSample
@@ -158,6 +158,14 @@ class Offline:
             self.bag.write(self._topics()[2][0], now, inertia_cdr(now, frame, mass, cog))
         self.evaluator.carry(now, mass, cog, frame)
 
+    def stand_on(self, kind: str | None) -> None:
+        """Take the kind of ground from now on; None: that of the configuration."""
+        settings = self.config.settings
+        ground = replace(settings.ground, kind=kind or settings.ground.kind)
+        payload = self.evaluator.payload
+        robot = replace(settings.robot, payload=payload)
+        self.evaluator.adopt(replace(settings, robot=robot, ground=ground))
+
 
 @dataclass(frozen=True, slots=True)
 class OfflineCommands:
@@ -181,6 +189,10 @@ class OfflineCommands:
     def declare(self, mass: float) -> None:
         """Declare to the evaluation what is carried (kg)."""
         self.world.declare(mass)
+
+    def tell_ground(self, kind: str | None) -> None:
+        """Tell the evaluation the kind of ground; None: that of the configuration."""
+        self.world.stand_on(kind)
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""

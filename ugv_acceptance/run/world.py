@@ -102,6 +102,9 @@ class Commands(Protocol):
     def declare(self, mass: float) -> None:
         """Declare to the monitor what is carried (kg)."""
 
+    def tell_ground(self, kind: str | None) -> None:
+        """Tell the monitor the kind of ground; None: that of the configuration."""
+
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
 

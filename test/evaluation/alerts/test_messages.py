@@ -2,12 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
 from evaluation.streams import T0, settings
 
-from ugv_acceptance.evaluation.alerts.messages import advice, describe, tilt_left
+from ugv_acceptance.evaluation.alerts.messages import advice, describe
+from ugv_acceptance.evaluation.alerts.robot_words import tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
+from ugv_acceptance.evaluation.alerts.tipping_watch import trend_words
 from ugv_acceptance.evaluation.settings import Limits
+from ugv_acceptance.evaluation.tipping_trend import Trend
 
 TOLD = settings(limits=Limits((45.0, 30.0)))
 RAD = math.radians(1.0)
@@ -73,3 +77,19 @@ def test_a_tilt_of_nothing_is_still_left(degrees: float, said: str) -> None:
 def test_what_helps_is_told_beside_what_happened() -> None:
     """Each alert code has its advice, whatever the subject."""
     assert advice('INPUT_STALE').startswith('check that its driver is running')
+
+
+@pytest.mark.parametrize(
+    ('slope', 'left', 'told'),
+    [
+        (-20.0, 0.8, 'the robot begins to tip: the tilt left to the left shrinks by 20 degrees'),
+        (0.0, math.inf, 'little tilt is left to the left, taken cautiously'),
+        (math.nan, math.nan, 'little tilt is left to the left, taken cautiously'),
+    ],
+)
+def test_a_trend_is_told_by_its_cause(slope: float, left: float, told: str) -> None:
+    """A margin that shrinks says how fast and how long it lasts, one that is small that it is."""
+    one = Trend(
+        np.array([WARN], np.int8), np.array([1], np.int8), np.radians([slope]), np.array([left])
+    )
+    assert trend_words(one, 0).startswith(told)

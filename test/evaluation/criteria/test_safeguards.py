@@ -253,7 +253,7 @@ def test_a_safeguard_without_its_input_is_not_called_checked() -> None:
     _, found = findings(TOLD, NOTHING, (QUIET,), data=GOOD)
     level = replace(TOLD, imu=replace(TOLD.imu, attitude='level'))
     unlimited = replace(level, limits=replace(TOLD.limits, torque=(float('inf'),) * 2))
-    without = {'tipping', 'chassis_acceleration', 'imu', 'torque_limit'}
+    without = {'tipping', 'ground', 'chassis_acceleration', 'imu', 'torque_limit'}
     for told, names in ((TOLD, set()), (unlimited, without)):
         held = Safeguarded((), ())
         result = safeguards_result(held, found.measurement.criteria, told)

@@ -36,11 +36,17 @@ export function showVerdict(shown) {
 export function showTilt(frame, hello) {
   for (const { side, left_deg } of frame.tilt) {
     const box = document.querySelector(`.side-left[data-side="${side}"]`);
-    const level = left_deg === null ? 'OK' : left_deg <= hello.tip_error_deg ? 'ERROR' : left_deg <= hello.tip_warn_deg ? 'WARN' : 'OK';
+    // Where the ground is not flat the number is an upper bound: it never shows that all is well.
+    const bound = frame.ground.rough && left_deg !== null;
+    const shown = left_deg === null ? 'OK' : left_deg <= hello.tip_error_deg ? 'ERROR' : left_deg <= hello.tip_warn_deg ? 'WARN' : 'OK';
+    const level = bound && shown === 'OK' ? 'BOUND' : shown;
     box.className = `side-left ${level}`;
     if (!box.firstChild) box.append(element('span', '', side), element('b'));
-    text(box.lastChild, left_deg === null ? 'no edge' : `${fixed(left_deg)}°`);
+    text(box.lastChild, left_deg === null ? 'no edge' : `${bound ? '≤ ' : ''}${fixed(left_deg)}°`);
   }
+  const g = frame.ground, cautious = g.cautious_deg === null ? '' : `, ${fixed(g.cautious_deg)}° taken cautiously`;
+  text($('ground'), !g.words ? '' : g.rough ? `${g.words}: upper bound${cautious}` : `ground: ${g.words}`);
+  text($('map-ground'), g.rough ? '(on flat ground only)' : '');
   const a = frame.attitude;
   const lean = (value, plus, minus) => `${fixed(Math.abs(value))}° ${value >= 0 ? plus : minus}`;
   text($('attitude'), !a ? 'attitude not known' : a.slope_deg < 1 ? `level: slope ${fixed(a.slope_deg)}°` : `slope ${fixed(a.slope_deg)}°: ${lean(a.pitch_deg, 'nose down', 'nose up')}, ${lean(a.roll_deg, 'right side down', 'left side down')}`);

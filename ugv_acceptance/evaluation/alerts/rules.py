@@ -5,6 +5,7 @@ from itertools import chain
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
+from ugv_acceptance.evaluation.alerts.tipping_watch import LEAST_VALUE, TippingWatch
 from ugv_acceptance.evaluation.chassis.motion import CALM, CAUTION, LIFT, LOW, ChassisSignals
 from ugv_acceptance.evaluation.inputs.imu import AttitudeSignals
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionSignals
@@ -15,7 +16,9 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
 # Alerts of level ERROR with these codes are failures of the robot; all others are input faults.
-FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'TIP_MOVING', 'NO_SUPPORT')
+FAILURES = ('TORQUE_LIMIT', 'TIP_OVER', 'TIP_MOVING', 'TIP_TREND', 'NO_SUPPORT')
+# A tilt swings, so these alerts end later than others.
+SWINGING = ('TIP_OVER', 'TIP_TREND')
 # Share of g by which the acceleration at rest may differ from g.
 STRANGE = 0.15
 # Margin (rad) of a moving robot from which DANGER ends.
@@ -38,7 +41,7 @@ def urgency(code: str, level: int) -> int:
     """
     if code.startswith('IMU_') and level > WARN:
         return 2
-    return 1 if code in ('TIP_OVER', 'NO_SUPPORT') else 0
+    return 1 if code in ('TIP_OVER', 'TIP_TREND', 'NO_SUPPORT') else 0
 
 
 @dataclass(slots=True)
@@ -65,6 +68,7 @@ class RuleSet:
     attitude: AttitudeSignals = field(init=False)
     prediction: Prediction = field(init=False)
     slide: Signal = field(init=False)
+    trend: TippingWatch = field(init=False)
     relaxed: dict[str, Signal] = field(init=False)
     _told: Settings | None = None
 
@@ -99,6 +103,7 @@ class RuleSet:
         self.attitude = self._attitude()
         self.prediction = foresight_of(self.settings, self._warning)
         self.slide = self._slide()
+        self.trend = TippingWatch(self.settings, self._trend())
         self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
 
     def relax(self, now: int) -> None:
@@ -118,10 +123,12 @@ class RuleSet:
     def predict(self) -> None:
         """Judge the live samples kept for the prediction; call it before time passes."""
         self.prediction.judge(self.settings.limits.torque)
+        self.trend.judge()
 
     def predict_rows(self, rows: MarginRows) -> None:
         """Judge the prediction rules on the next part of a recording."""
         self.prediction.rows(rows, self.settings.limits.torque)
+        self.trend.rows(rows)
 
     def _warning(self, code: str, subject: str, at: tuple[float, float], delay: float) -> Signal:
         return self._signal(code, subject, WARN, at, delay)
@@ -136,7 +143,7 @@ class RuleSet:
         reach: float = 0.0,
     ) -> Signal:
         delays = self.settings.delays
-        off = int((delays.tip_off if code == 'TIP_OVER' else delays.off) * 1e9)
+        off = int((delays.tip_off if code in SWINGING else delays.off) * 1e9)
         # A warning does not make margins doubtful.
         back = int(reach * 1e9) if level > WARN else 0
         rule = Rule(code, subject, level, *at, int(on_delay * 1e9), off, reach=back)
@@ -170,6 +177,12 @@ class RuleSet:
         known = limits.friction < float('inf')
         on = -limits.tip_warn if known else float('inf')
         return self._warning('SLIDE', 'robot', (on, on - limits.tip_deadband), delay)
+
+    def _trend(self) -> tuple[Signal, Signal]:
+        """Return the signals of a robot that begins to tip; their value is minus the time (s)."""
+        at, delay = (LEAST_VALUE, LEAST_VALUE), self.settings.delays.tip_on
+        warn, error = (self._signal('TIP_TREND', 'robot', n, at, delay) for n in (WARN, ERROR))
+        return warn, error
 
     def _fault(self, code: str, subject: str, level: int, on_delay: float | None = None) -> Signal:
         """Return the signal of a fault, whose value is 1 (there) or 0 (not there)."""
@@ -263,6 +276,7 @@ class RuleSet:
             *faults,
             *chain.from_iterable(self.chassis.all()),
             self.slide,
+            *self.trend.signals,
             *self.prediction.signals(),
             *self.relaxed.values(),
         ]

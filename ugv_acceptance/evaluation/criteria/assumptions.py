@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import not_judged
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
+from ugv_acceptance.evaluation.ground import FLAT
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
@@ -33,7 +34,7 @@ def assumptions(
     `first_payload` is the first payload that was declared, and when (ns).
     """
     found = [
-        NotChecked('ground', 'it is taken as flat, firm, and reaching under every contact point'),
+        *_ground(settings),
         *_load(settings, first_payload),
         *not_judged(settings),
         *_demands(measurement),
@@ -42,6 +43,16 @@ def assumptions(
         why = 'the configuration states no uncertainty (+/-) of its numbers'
         found.append(NotChecked('margins without a bound', why))
     return Statement(not_checked=tuple(found))
+
+
+def _ground(settings: Settings) -> Iterator[NotChecked]:
+    """Yield what is assumed of the ground where it is taken as flat."""
+    ground = settings.ground
+    if ground.rough and FLAT not in [window.kind for window in ground.windows]:
+        return
+    asked = '' if ground.kind else 'nobody entered its kind: '
+    why = f'{asked}it is taken as flat, firm, and reaching under every contact point'
+    yield NotChecked('ground', f'{why} at other times' if ground.ever_rough else why)
 
 
 def _load(settings: Settings, first: FirstPayload) -> Iterator[NotChecked]:

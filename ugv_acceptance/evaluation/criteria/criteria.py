@@ -10,11 +10,14 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ugv_acceptance.evaluation.ground import GroundWindow
 from ugv_acceptance.evaluation.settings import Settings
 
 PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
 # How the uncertainties of several sources are combined; IGNORED: shown, but it decides nothing.
 RSS, WORST_CASE, IGNORED = 'rss', 'worst_case', 'ignored'
+# Rules by which criteria may judge tip-over on ground that is not flat.
+TREND, CAUTIOUS = 'trend', 'cautious'
 # Share of a window that must be evaluated for a PASS.
 LEAST_COVERAGE = 0.95
 # A shorter recording (s) cannot show that an input is silent or that an IMU contradicts itself.
@@ -117,11 +120,21 @@ class Criterion:
 
 
 @dataclass(frozen=True, slots=True)
+class AcceptedRule:
+    """The rule (TREND or CAUTIOUS) that is accepted for tip-over where not flat, and why."""
+
+    rule: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class CriteriaSet:
     """A set of criteria judged together; `sha256` is of its file, or of the defaults as JSON.
 
     `coverage` is the share of each window that must be evaluated for a PASS, `waive` the names of
-    safeguards that are not to hold, with the reason.
+    safeguards that are not to hold, with the reason. `ground` is the rule accepted on ground that
+    is not flat, None: none is. `ground_kind` and `ground_windows` say what the ground of a
+    recording is, as in ground.Ground; None and none: they say nothing.
     """
 
     name: str
@@ -132,6 +145,9 @@ class CriteriaSet:
     coverage: float = LEAST_COVERAGE
     uncertainty: str = RSS
     waive: tuple[tuple[str, str], ...] = ()
+    ground: AcceptedRule | None = None
+    ground_kind: str | None = None
+    ground_windows: tuple[GroundWindow, ...] = ()
 
     def uncertainty_of(self, criterion: Criterion) -> str:
         """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""

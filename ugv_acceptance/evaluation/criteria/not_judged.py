@@ -35,10 +35,15 @@ def absent_imu(settings: Settings, topic: str | None) -> Statement:
     return Statement(objections=(Objection('unseen_stretches', INCONCLUSIVE, reason),))
 
 
-def kept_words(settings: Settings) -> str:
-    """Return what it means that no limit was passed: all margins, or those that are measured."""
+def kept_words(settings: Settings, *, rough: bool = False) -> str:
+    """Return what it means that no limit was passed: all margins, or those that are measured.
+
+    Where the ground is not flat (`rough`) no margin tells that the robot is far from tipping.
+    """
     if not settings.hears_imu:
         return 'all torque margins kept, tip-over not checked'
+    if rough:
+        return 'the robot has not begun to tip; how far it is from that is not known on this ground'
     if not settings.hears_joints:
         return 'all tip-over margins kept, no torque checked'
     return 'all margins kept'

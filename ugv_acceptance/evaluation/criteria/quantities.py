@@ -102,6 +102,9 @@ SIGNALS = {
     'tilt': SignalKind(_tilt, 'robot', ('angle',), 'deg', 'tilt of the base', _DEGREES),
 }
 
+# Signals that are tip-over margins.
+OF_TIPPING = ('tip_angle', 'tip_moment', 'tip_energy', 'zmp')
+
 
 def subjects_of(kind: SignalKind, settings: Settings) -> tuple[str, ...]:
     """Return the names of a signal's columns: joints, SIDES, or ('robot',)."""

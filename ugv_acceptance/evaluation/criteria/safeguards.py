@@ -12,10 +12,12 @@ from math import isfinite
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.criteria.criteria import (
+    CAUTIOUS,
     FAIL,
     INCONCLUSIVE,
     LONGEST_UNSEEN,
     PASS,
+    TREND,
     CriteriaSet,
     DataDemand,
     Value,
@@ -26,6 +28,7 @@ from ugv_acceptance.type_aliases import Json
 
 SAFEGUARDS = {
     'tipping': 'the robot is never past its tipping point',
+    'ground': 'on uneven ground and stairs tip-over is judged by a rule that the criteria accept',
     'torque_limit': 'no joint needs more torque than its limit',
     'unseen_stretches': f'no stretch of over {LONGEST_UNSEEN:g} s is without margins',
     'chassis_acceleration': 'no acceleration of the chassis tips the robot or lifts its tracks',
@@ -49,7 +52,7 @@ _SAID_BY = {
     'torque_margin': 'torque_limit',
 }
 # Safeguards that need an IMU.
-_OF_TILT = ('tipping', 'chassis_acceleration', 'imu')
+_OF_TILT = ('tipping', 'ground', 'chassis_acceleration', 'imu')
 # Stretches named in the reason.
 _MOST_NAMED = 3
 
@@ -179,5 +182,12 @@ def with_objection(result: Json, objection: Objection) -> Json:
 
 
 def waived_words(criteria: CriteriaSet) -> str:
-    """Return which safeguards the criteria waive and why, as one sentence; '' if none."""
-    return ', '.join(f'{name} waived ({reason})' for name, reason in criteria.waive)
+    """Return which safeguards the criteria waive and why, as one sentence; '' if none.
+
+    Also the rule that they accept where the ground is not flat.
+    """
+    waived = [f'{name} waived ({reason})' for name, reason in criteria.waive]
+    if criteria.ground is not None:
+        rule = {TREND: 'the trend', CAUTIOUS: 'the cautious margin'}[criteria.ground.rule]
+        waived.append(f'{rule} accepted on ground that is not flat ({criteria.ground.reason})')
+    return ', '.join(waived)

@@ -39,7 +39,7 @@ from ugv_acceptance.evaluation.criteria.messages import (
     violation_words,
 )
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
-from ugv_acceptance.evaluation.criteria.quantities import measured_of, shown, unit_of
+from ugv_acceptance.evaluation.criteria.quantities import OF_TIPPING, measured_of, shown, unit_of
 from ugv_acceptance.evaluation.criteria.safeguards import (
     Safeguarded,
     reasons_of,
@@ -68,6 +68,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
         return Outcome(
             FAIL, violation_words(measure, findings.settings, measured), measured, evidence
         )
+    short = short or _only_a_bound(measure, findings)
     if short:
         return Outcome(INCONCLUSIVE, short, measured, evidence)
     if measure.demand.always and measured['inside_bound'] and _decides(criterion, findings):
@@ -78,6 +79,21 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
         )
         return Outcome(INCONCLUSIVE, text.replace(' ,', ',').strip(), measured, evidence)
     return Outcome(PASS, demand_words(criterion, findings.settings), measured, evidence)
+
+
+def _only_a_bound(measure: ValueMeasure, findings: Findings) -> str | None:
+    """Return why a tip-over margin that was kept shows nothing; None if it does.
+
+    On ground that is not flat it is an upper bound, unless the criteria accept a rule for that.
+    """
+    demand, criteria = measure.demand, findings.measurement.criteria
+    ground, span = findings.settings.ground, [findings.seconds(t) for t in measure.span]
+    if demand.below or demand.signal not in OF_TIPPING or criteria.ground is not None:
+        return None
+    if not ground.rough_within(*span):
+        return None
+    said = findings.data.get('ground', {}).get('objections', ())
+    return said[0] if said else f'{measure.criterion.name}: the ground was not flat'
 
 
 def _decides(criterion: Criterion, findings: Findings) -> bool:

@@ -10,6 +10,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.effort.facts import NONE, TORQUE, UNKNOWN
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests
 from ugv_acceptance.evaluation.effort.understanding import understand
+from ugv_acceptance.evaluation.ground import ground_words
 from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
 from ugv_acceptance.evaluation.inputs.joint_words import position_words
 from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
@@ -58,6 +59,10 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
     yield Finding(OK, 'configuration', f'{config.name} from {config.path}')
     for warning in config.warnings:
         yield Finding(WARN, 'configuration', warning, 'see docs/robot_configuration.md')
+    if config.settings.hears_imu:
+        kind = config.settings.ground.kind
+        do = '' if kind else 'set ground.kind: flat, uneven or stairs'
+        yield Finding(OK, 'ground', f'taken as {ground_words(kind)}', do)
     if len(around.monitors) > 1:
         text = f'{len(around.monitors)} monitors of the same name run'
         yield Finding(WARN, 'monitor', text, 'stop all but one, or give them namespaces')

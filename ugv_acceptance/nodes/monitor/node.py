@@ -45,7 +45,7 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
     operate,
 )
 from ugv_acceptance.nodes.monitor.parameters import (
-    FREE,
+    LOAD,
     TunableParameter,
     changed,
     check_at_rest,
@@ -312,7 +312,7 @@ class Monitor(LifecycleNode):
             return
         self._settings = self._in_force(self._settings)
         told = [
-            Parameter(k.name, value=k.get(self._settings)) for k in self.tunables if k.name in FREE
+            Parameter(k.name, value=k.get(self._settings)) for k in self.tunables if k.name in LOAD
         ]
         self.set_parameters_atomically(told)
 

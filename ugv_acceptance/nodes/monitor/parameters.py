@@ -14,6 +14,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.evaluation.ground import KINDS
 from ugv_acceptance.evaluation.permitted_limits import (
     RANGES,
     UNSAFE,
@@ -71,8 +72,9 @@ def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
 
 # Parameters that are read on configuration or activation and stay as they are until the next.
 AT_REST = ('config', 'urdf', 'depth', 'black_box', 'lock_parameters')
-# What an operator declares: never locked.
-FREE = ('payload.mass_kg', 'payload.cog_m')
+# What an operator declares: never locked. The load is also declared by messages.
+LOAD = ('payload.mass_kg', 'payload.cog_m')
+FREE = (*LOAD, 'ground.kind')
 ALLOWED = 'allowed_publishers'
 
 
@@ -159,6 +161,12 @@ def _with_attitude(settings: Settings, value: str) -> Settings:
     return replace(settings, imu=replace(settings.imu, attitude=value))
 
 
+def _with_ground(settings: Settings, value: str) -> Settings:
+    if value and value not in KINDS:
+        raise BadConfig(f'ground.kind: expected one of {", ".join(KINDS)}, got {value!r}')
+    return replace(settings, ground=replace(settings.ground, kind=value or None))
+
+
 def _with_reason(settings: Settings, value: str) -> Settings:
     try:
         return replace(settings, unsafe=checked_reason(value) if value else '')
@@ -186,6 +194,12 @@ _CHOICES = (
         'centre of gravity of the load in the axes of the payload link, m',
         lambda s: list(s.robot.payload.cog),
         lambda s, v: _with_payload(s, s.robot.payload.mass, v),
+    ),
+    TunableParameter(
+        'ground.kind',
+        f'what the robot stands on: {", ".join(KINDS)}; empty: not entered, taken as flat',
+        lambda s: s.ground.kind or '',
+        _with_ground,
     ),
     TunableParameter(
         'imu.attitude',
