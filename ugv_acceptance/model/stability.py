@@ -23,6 +23,7 @@ from ugv_acceptance.model.mechanics import (
     mechanics_of,
     posture_of,
 )
+from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.row_selection import Rows, Values, groups, inner, pick
 from ugv_acceptance.model.support import Support, support_of, supports_of
@@ -238,7 +239,7 @@ def margins(
 ) -> Margins:
     """Return static torques and tip angles for postures `q` (..., j) under gravity (..., 3).
 
-    A payload left out is the robot's own; `workers` is threads.
+    Joints that carry the robot have the ground's reaction in theirs, evenly spread. A payload left out is the robot's own; `workers` is threads.
     """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
@@ -251,7 +252,8 @@ def margins(
             angle, state = tip_angles_of(stance, gravity)
             return (*angle, state)
 
-        return [*torque, *_table(mechanics, posture, columns[n:], values, 5)]
+        held = np.array([np.broadcast_to(tau, columns[n].shape) for tau in torque])
+        return [*held, *_table(mechanics, posture, columns[n:], values, 5, held)]
 
     found = in_blocks(block, n + 5, q, gravity, workers=workers)
     state = found[..., n + 4].astype(np.int8)
@@ -264,12 +266,19 @@ def _table(
     gravity: tuple[Floats, ...],
     values: Callable[[Stance, Any], Sequence[Number | State]],
     width: int,
+    held: Floats | None = None,
 ) -> list[Floats]:
-    """Return `values(stance, gravity)` of every sample: `width` arrays of one number a sample."""
+    """Return `values(stance, gravity)` of every sample: `width` arrays of one number a sample.
+
+    Adds the ground's reaction to the torques `held` (j, n) of hanging joints.
+    """
     gx, *_ = gravity
     table = np.empty((width, len(gx)))
     for rows, stance in stances_of(mechanics, posture, len(gx)):
-        found = values(stance, pick(gravity, rows))
+        down = pick(gravity, rows)
+        if held is not None:
+            carry(held, rows, posture, rows, mechanics, stance.support.polygon, down)
+        found = values(stance, down)
         for k, value in enumerate(found):
             table[k, rows] = value
     return list(table)
