@@ -201,6 +201,7 @@ def _total(values: Sequence[Scalar]) -> Scalar:
     return found
 
 
+@np.errstate(divide='ignore', invalid='ignore', over='ignore')
 def _even_shares(count: int, flat: tuple[Number, ...]) -> Sequence[Number]:
     """Return the share (of 1) that each of `count` points carries, evenly spread."""
     if not any(isinstance(x, np.ndarray) for x in flat):

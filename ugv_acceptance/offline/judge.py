@@ -9,6 +9,7 @@ from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.carrying import CarryingJoints
 from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -125,6 +126,7 @@ def _examinations(
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
+        CarryingJoints(settings, limits.payloads.at, lambda: evaluator.carrying),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
     )
 

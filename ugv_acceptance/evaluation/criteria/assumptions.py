@@ -34,6 +34,7 @@ def assumptions(
     """
     found = [
         NotChecked('ground', 'it is taken as flat, firm, and reaching under every contact point'),
+        *(NotChecked('contact points', words) for words in settings.moved_contacts),
         *_load(settings, first_payload),
         *not_judged(settings),
         *_demands(measurement),
