@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, nnls
 
-from test.robots import DOWN, tracked
+from robots import DOWN, tracked
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import (
     carrying_joints,

@@ -82,7 +82,7 @@ def figure_of(robot: Robot) -> Figure:
         return found
 
     kernel = compile_kernel(formula, [*robot.joint_names, 'x', 'y', 'z'])
-    joints = tuple(tree.bodies[body].joint for body, _ in tips)
+    joints = tuple(robot.joint_names[drives[body - 1].joint] for body, _ in tips)
     return Figure(mechanics, joints, kernel, _box(robot, tree))
 
 

@@ -63,7 +63,7 @@ def sources_for(robot: Robot, configured: Sequence[Source]) -> tuple[Source, ...
         if body.mass > 0.0 and not any((x.name, 'cog') in told for x in mine):
             reach = COG * body.mass / heaviest.mass
             found += [Source('', heaviest.name, 'cog', reach, axis) for axis in range(3)]
-        if (body.joint, 'offset') not in told:
+        if body.joint in robot.joint_names and (body.joint, 'offset') not in told:
             found.append(Source('', body.joint, 'offset', SLIDE if body.prismatic else TURN))
     return tuple(found)
 
