@@ -24,7 +24,7 @@ from ugv_acceptance.model.stability import stance_of
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, vehicle_of
 from ugv_acceptance.type_aliases import Floats
 
-ROBOTS = Path(__file__).parents[2] / 'shared' / 'robots'
+ROBOTS = Path(__file__).resolve().parents[2] / 'shared' / 'robots'
 # Time (s) to come to rest on dampers (N s/m, N m s/rad), and then without.
 CALM, SETTLE, DAMPER = 1.5, 1.0, 300.0
 # Friction of feet that slip without force, and of rubber.

@@ -36,6 +36,21 @@ def reactions_at(
     return reactions_of(mechanics, posture, points, gravity)
 
 
+def judged_by_effort(data: Json) -> set[str]:
+    """Return the joints that carried the robot and are judged by their measured torque.
+
+    `data` is the part of a result that `CarryingJoints` states.
+    """
+    return {name for name, told in data.get('carrying', {}).items() if told['by_effort']}
+
+
+def name_measured(data: Json, statements: Sequence[Statement]) -> None:
+    """Say in `data` which joints that carried have a measured effort known to be their torque."""
+    known = frozenset().union(*(statement.torques for statement in statements))
+    for name, told in data.get('carrying', {}).items():
+        told['by_effort'] = name in known
+
+
 @dataclass(frozen=True, slots=True)
 class _Moment:
     """One row: time of receipt (ns), posture (j,), gravity (m/s2), and when its posture came."""
@@ -98,6 +113,7 @@ class CarryingJoints:
             'even': even,
             'least': least,
             'most': most,
+            'by_effort': False,
         }
 
     def _not_checked(self, carrying: dict[str, Json]) -> Iterator[NotChecked]:

@@ -9,7 +9,7 @@ from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.carrying import CarryingJoints
+from ugv_acceptance.evaluation.carrying import CarryingJoints, name_measured
 from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -103,6 +103,7 @@ def judge(
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
+    name_measured(data, statements)
     findings = Findings(
         asked, ordered(log), data, Bounds(settings, sources), statements, reading.held.doubtful
     )

@@ -169,6 +169,21 @@ def _unchecked(one: Json) -> str:
     return f'{one["what"]}{seconds}: {one["why"]}'
 
 
+def carrying_lines(result: Json) -> list[str]:
+    """Return what each joint held that carried the robot, at its worst moment, one line each."""
+    return [_carried(name, told) for name, told in result.get('carrying', {}).items()]
+
+
+def _carried(name: str, told: Json) -> str:
+    unit, numbers = told['unit'], {k: number_text(told[k]) for k in ('hanging', 'even')}
+    ends = f'{number_text(told["least"])} to {number_text(told["most"])}'
+    return (
+        f'{name} carried the robot: {numbers["even"]} {unit} at {told["time_s"]:.1f} s with the '
+        f'weight spread evenly, {ends} {unit} cannot be excluded (hanging in the air: '
+        f'{numbers["hanging"]} {unit})'
+    )
+
+
 def interval_text(found: Json | None, unit: str = '') -> str:
     """Return a fitted number with its 95 % confidence interval."""
     if found is None:

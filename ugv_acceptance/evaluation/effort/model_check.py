@@ -82,7 +82,8 @@ class ModelCheck:
         other_unit = [x for x in found.joints if in_another_unit(x, found.joints)]
         no_torque = [x.joint for x in other_unit if x.ratio and x.ratio.spread <= SURE_UNIT]
         unfounded = frozenset(('ENCODER_FROZEN', name) for name in no_torque)
-        return Statement(result, objections, tuple(_not_checked(found)), unfounded)
+        known = frozenset(joint.joint for joint in found.joints if joint.sign is not None)
+        return Statement(result, objections, tuple(_not_checked(found)), unfounded, known)
 
     def result(self, found: Understanding, start: int) -> Json:
         """Return the comparison for JSON: joints, loads, contacts, share of slow samples."""

@@ -15,8 +15,11 @@ from ugv_acceptance.evaluation.criteria.uncertainty import (
     Source,
     torque_effects,
 )
-from ugv_acceptance.model.mechanics import mechanics_of
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.reactions import reactions_of
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.row_selection import pick
+from ugv_acceptance.model.stability import stances_of
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.type_aliases import Floats
 
@@ -126,3 +129,26 @@ def model_errors(
     effects = torque_effects(robot, sources, q, gravity, Payload(load, robot.payload.cog))
     found: Floats = effects[np.abs(effects).max(axis=(1, 2), initial=0.0) > 0.0]
     return found
+
+
+def spread_errors(robot: Robot, q: Floats, gravity: Floats, load: float) -> Floats:
+    """Return how far (s, P, j) joints that carry the robot may be off the even spread of its weight.
+
+    Evenly distributed over what balance leaves open, in each of P postures (P, j) by itself.
+    """
+    mechanics, count = mechanics_of(robot), len(q)
+    if not mechanics.carried or not count:
+        return np.zeros((0, *q.shape))
+    posture = posture_of(mechanics, list(q.T), load, robot.payload.cog)
+    wide = np.zeros(q.shape)
+    for rows, stance in stances_of(mechanics, posture, count):
+        fields = posture.torque_gradients, posture.mass, posture.cog, posture.contacts
+        some = type(posture)(*pick((*fields, posture.loads, posture.laws), rows))
+        x, y, z = pick(tuple(gravity.T), rows)
+        found = reactions_of(mechanics, some, stance.support.polygon, (x, y, z))
+        for j in found.carrying:
+            wide[rows, j] = (found.most[j] - found.least[j]) / np.sqrt(12.0)
+    postures, joints = np.nonzero(wide)
+    errors = np.zeros((len(postures), *q.shape))
+    errors[np.arange(len(postures)), postures, joints] = wide[postures, joints]
+    return errors
