@@ -23,6 +23,8 @@ from ugv_acceptance.type_aliases import Json
 
 # Ends of an interval this close (share of the larger one, and N m; N) are one.
 SHARE, SLACK = 0.01, 0.05
+# So many joints are named in a sentence.
+FEW = 4
 Gravity = tuple[float, float, float]
 
 
@@ -122,14 +124,19 @@ class CarryingJoints:
             worst = max(open_ended, key=lambda name: _use(carrying[name]))
             told = carrying[worst]
             even, most = abs(told['even']), max(abs(told['least']), abs(told['most']))
-            limit = '' if told['limit'] is None else f'; its limit is {told["limit"]:.1f}'
+            unit, known = told['unit'], told['limit'] is not None
+            limit = f'; its limit is {told["limit"]:.1f} {unit}' if known else ''
             why = (
-                f'it is taken as even, which puts {even:.1f} {told["unit"]} on {worst} at '
-                f'{told["time_s"]:.1f} s; {most:.1f} {told["unit"]} cannot be excluded{limit}'
+                f'it is taken as even, which puts {even:.1f} {unit} on {worst} at '
+                f'{told["time_s"]:.1f} s; {most:.1f} {unit} cannot be excluded{limit}'
             )
             yield NotChecked('how the contact points share the weight', why)
-        names = ', '.join(carrying)
-        why = f'feet, flippers and tracks brace against each other: it may add to the torque of {names}'
+        named, more = list(carrying)[:FEW], len(carrying) - FEW
+        names = ', '.join(named) + (f' and {more} more joints' if more > 0 else '')
+        why = (
+            'feet, flippers and tracks brace against each other: friction may add to the torque of '
+            f'{names}'
+        )
         yield NotChecked('friction on the ground', why)
 
 

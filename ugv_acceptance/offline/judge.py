@@ -122,7 +122,7 @@ def _examinations(
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
     return (
-        ModelCheck(settings, sources),
+        ModelCheck(settings, sources, lambda: evaluator.carrying),
         ImuExamination(evaluator.imu),
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),

@@ -8,6 +8,8 @@ DASH = '\N{EN DASH}'
 MISSING = 0.05
 # From here on the digits of a number are counted, not read, and no column holds them.
 LONG = 1e6
+# Lines about joints that carried the robot.
+_MOST_CARRYING = 4
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
@@ -170,8 +172,12 @@ def _unchecked(one: Json) -> str:
 
 
 def carrying_lines(result: Json) -> list[str]:
-    """Return what each joint held that carried the robot, at its worst moment, one line each."""
-    return [_carried(name, told) for name, told in result.get('carrying', {}).items()]
+    """Return what joints held that carried the robot, at their worst moments: the most used few."""
+    told = result.get('carrying', {})
+    order = sorted(told, key=lambda name: -abs(told[name]['even']) / (told[name]['limit'] or 1e9))
+    lines = [_carried(name, told[name]) for name in order[:_MOST_CARRYING]]
+    more = len(order) - len(lines)
+    return [*lines, *([f'and {more} more joints carried it (--json FILE lists all)'] * (more > 0))]
 
 
 def _carried(name: str, told: Json) -> str:
