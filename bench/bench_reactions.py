@@ -20,7 +20,6 @@ from ugv_acceptance.config import load
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.reactions import Reactions, reactions_of
 from ugv_acceptance.model.robot import Matrix, Payload, Robot
-from ugv_acceptance.model.stability import stance_of
 from ugv_acceptance.simulation.vehicle import Build, Vehicle, vehicle_of
 from ugv_acceptance.type_aliases import Floats
 
@@ -55,7 +54,7 @@ def _anymal() -> Legged:
     """Return ANYmal C with all knees inwards."""
     names = ('LF', 'RF', 'LH', 'RH')
     feet = tuple((f'{leg}_FOOT', (0.0, 0.0, 0.0)) for leg in names)
-    legs = {}
+    legs: dict[str, float] = {}
     for leg in names:
         bent = 1.0 if leg.endswith('F') else -1.0
         legs |= {f'{leg}_HAA': 0.0, f'{leg}_HFE': 0.4 * bent, f'{leg}_KFE': -0.8 * bent}
@@ -77,15 +76,9 @@ def yaml_of(legged: Legged, folder: Path = ROBOTS, extra: str = '') -> str:
         for k, (link, place) in enumerate(legged.feet)
     )
     return (
-        f'robot: {{name: r}}\nurdf: {folder / legged.urdf}\njoints:\n{joints}\ncontacts:\n{feet}\n'
-        f'ground: {{height_m: {height_of(legged):g}}}\n{extra}'
+        f'robot: {{name: r}}\nurdf: {folder / legged.urdf}\n'
+        f'joints:\n{joints}\ncontacts:\n{feet}\n{extra}'
     )
-
-
-def height_of(legged: Legged) -> float:
-    """Return a height (m) below all feet is not needed: they stand as the lowest hull does."""
-    del legged
-    return 0.0
 
 
 def legged_robot(name: str, folder: Path = ROBOTS) -> tuple[Robot, Floats]:

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robots import DOWN, tracked
 from scipy.optimize import linprog, nnls
 
-from robots import DOWN, tracked
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import (
     carrying_joints,
@@ -98,8 +98,8 @@ def test_the_interval_is_what_all_loads_that_balance_can_do(legs: int, seed: int
         ends = []
         for sign in (1.0, -1.0):
             best = linprog(sign * effect[joint], A_eq=system, b_eq=weight, bounds=(0, None))
-            assert best.status == 0
-            ends.append(found.hanging[joint] + sign * best.fun)
+            assert (best.status, best.fun is None) == (0, False)
+            ends.append(found.hanging[joint] + sign * float(best.fun or 0.0))
         # The torque a kg takes off is minus the work of gravity on the point it presses on.
         low, high = sorted(ends)
         assert found.least[joint] == pytest.approx(low, abs=2e-5)
@@ -120,8 +120,8 @@ def test_the_even_spread_has_the_least_sum_of_squares(legs: int, seed: int) -> N
     stiff = np.vstack((1e4 * system, np.eye(legs)))
     expected, _ = nnls(stiff, np.concatenate((1e4 * weight, np.zeros(legs))))
     np.testing.assert_allclose(loads, expected, atol=1e-4)
-    even = reactions_of(mechanics, posture, tuple(range(legs)), gravity).even
-    hanging = torque_of(posture, gravity)
+    even = np.array(reactions_of(mechanics, posture, tuple(range(legs)), gravity).even)
+    hanging = np.array(torque_of(posture, gravity))
     np.testing.assert_allclose(even, hanging + effect @ loads, atol=1e-5)
 
 
@@ -172,7 +172,7 @@ def test_a_flipper_pressed_down_carries_what_the_lever_says() -> None:
 
 
 def test_past_the_tipping_point_the_edge_carries_all() -> None:
-    """The torque goes on from what it was on the edge; it is neither unknown nor that of hanging."""
+    """The torque goes on from what it was on the edge; it is neither unknown nor of hanging."""
     robot, q = legged(4, 9)
     mechanics, posture = put(robot, q)
     points = (0, 1, 2, 3)
@@ -241,7 +241,7 @@ def test_a_mimic_joint_moves_by_its_law_in_every_formula() -> None:
     gravity = (1.0, 2.0, -9.0)
     q, qd, qdd = 0.4, 0.9, -2.0
     both = np.array([[q, 1.5 * q + 0.2], [qd, 1.5 * qd], [qdd, 1.5 * qdd]])
-    apart = inverse_dynamics(free, *both, gravity)
+    apart = inverse_dynamics(free, both[0], both[1], both[2], gravity)
     one = inverse_dynamics(robot, [q], [qd], [qdd], gravity)
     assert one[0] == pytest.approx(apart[0] + 1.5 * apart[1], abs=1e-12)
     assert put(robot, np.array([q]))[1].cog == pytest.approx(put(free, both[0])[1].cog)

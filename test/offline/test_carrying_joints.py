@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from offline.joint_runs import EPOCH, FOLDED, Run, judged
 
 import ugv_acceptance as ugv

@@ -163,7 +163,7 @@ def _limit(limit: Element | None, key: str, where: str) -> float:
 
 
 def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[Mimic]:
-    """Yield the joints that follow others; BadConfig where one follows none, or itself in the end."""
+    """Yield the joints that follow others; BadConfig where one follows none, or itself."""
     follows = {}
     movable = {joint.name for joint in joints if joint.kind != 'fixed'}
     for element in root.findall('joint'):

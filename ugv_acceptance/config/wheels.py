@@ -1,4 +1,4 @@
-"""Contact points on wheels: a wheel turns without end, but the point it stands on stays below it."""
+"""Contact points on wheels: a wheel turns without end, the point it stands on stays below it."""
 
 import math
 from collections.abc import Callable
@@ -77,8 +77,9 @@ def _fixed(
     if -arm[2] < math.cos(BELOW) * radius:
         raise refuse(
             ('contacts', contact.name, 'position'),
-            f'expected a point straight below the axle of {contact.link}, a wheel that {name} turns '
-            'without end, or a point on the link that carries the wheel; got one that would go round',
+            f'expected a point straight below the axle of {contact.link}, a wheel that {name} '
+            'turns without end, or one on the link that carries the wheel; got one that would go '
+            'round',
         )
     parent = robot.joint(name).parent
     owner, rotation, _ = tree.frames[parent]

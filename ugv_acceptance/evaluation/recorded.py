@@ -309,11 +309,11 @@ class RecordedEvaluator:
             for line, torque_gradient in zip(table, posture.torque_gradients, strict=False):
                 line[rows] = _product(torque_gradient, j, gravity)
             for line, law in zip(table, posture.laws, strict=False):
-                line[rows] -= pick(law, j)
+                line[rows] = line[rows] - pick(law, j)
         for some, stance in self._stances(posture, len(q), j):
             place = inner(rows, some)
             at, down = (posture, j[some], self._mechanics), pick(gravity, some)
-            self.carrying |= carry(table, place, *at, stance.support.polygon, down)
+            self.carrying.update(carry(table, place, *at, stance.support.polygon, down))
             if not self.settings.hears_imu:
                 continue
             found = self._stability(stance, down)

@@ -204,9 +204,7 @@ def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
         motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
         forces = joint_forces(tree, pose, motion, loads)
         laws = laws_of(robot, inputs[:n]) or (0.0,) * n
-        return [
-            force - law for force, law in zip(folded(drives, forces, n), laws, strict=True)
-        ]
+        return [force - law for force, law in zip(folded(drives, forces, n), laws, strict=True)]
 
     return formula
 

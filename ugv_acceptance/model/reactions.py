@@ -153,7 +153,7 @@ def _seen(posture: Posture, points: tuple[int, ...], gravity: Triple) -> tuple[N
 
 @lru_cache(maxsize=16)
 def _seen_kernel(count: int) -> Kernel:
-    """Return the kernel of `_seen` of so many points; inputs: points, centre of gravity, gravity."""
+    """Return the kernel of `_seen`; inputs: so many points, centre of gravity, gravity."""
 
     def formula(*inputs: Scalar) -> list[Scalar]:
         *flat, cx, cy, cz, gx, gy, gz = inputs
@@ -237,7 +237,7 @@ def _balanced(shares: Sequence[Any], flat: Sequence[Any]) -> Any:  # noqa: ANN40
 
 
 def _all(conditions: Any) -> NDArray[np.bool_]:  # noqa: ANN401 - booleans or arrays of them
-    found = np.bool_(True)
+    found = np.bool_(1)
     for condition in conditions:
         found = found & condition
     return np.asarray(found)
@@ -297,9 +297,7 @@ def _searched_shares(x: Floats, y: Floats) -> Floats:
     return found
 
 
-def _lines(
-    x: Floats, y: Floats, way: Floats, pushing: NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
+def _lines(x: Floats, y: Floats, way: Floats, pushing: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     """Return the shares (m, n) as start + slope * part of the way, given which points push.
 
     As in `_shares_kernel`, but balance is as soft as _SOFT, so that two points settle theirs too.
@@ -311,9 +309,7 @@ def _lines(
     c00, c01, c02 = xx * yy - xy * xy, xy * sy - sx * yy, sx * xy - xx * sy
     c11, c12, c22 = n * yy - sy * sy, sx * sy - n * xy, n * xx - sx * sx
     scale = 1.0 / (n * c00 + sx * c01 + sy * c02)[:, None]
-    one, along, across = (
-        a * way[0] + b * way[1] for a, b in ((c01, c02), (c11, c12), (c12, c22))
-    )
+    one, along, across = (a * way[0] + b * way[1] for a, b in ((c01, c02), (c11, c12), (c12, c22)))
     start = (c00[:, None] + c01[:, None] * x + c02[:, None] * y) * scale
     slope = (one[:, None] + along[:, None] * x + across[:, None] * y) * scale
     return start, slope
@@ -347,7 +343,8 @@ def _ends(
 
     def ends(joint: int) -> tuple[Floats, Floats]:
         of = felt[joint]
-        most, least = np.float64(-np.inf), np.float64(np.inf)
+        most: Any = -np.inf
+        least: Any = np.inf
         for three, loads, good in weights:
             taken = sum(x * of.get(k, 0.0) for k, x in zip(three, loads, strict=True))
             most = np.fmax(most, np.where(good, taken, -np.inf))

@@ -239,7 +239,8 @@ def margins(
 ) -> Margins:
     """Return static torques and tip angles for postures `q` (..., j) under gravity (..., 3).
 
-    Joints that carry the robot have the ground's reaction in theirs, evenly spread. A payload left out is the robot's own; `workers` is threads.
+    Joints that carry the robot have the ground's reaction in theirs, evenly spread. A payload left
+    out is the robot's own; `workers` is threads.
     """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)

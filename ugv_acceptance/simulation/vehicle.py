@@ -1,7 +1,8 @@
 """A robot as a MuJoCo model: its bodies, joints and motors on a ground it can tip over on.
 
 The model is made from the links and joints of the Robot, not from the compiled mechanics, so that
-MuJoCo checks those. The constant part of a joint's law is left out. Every link is a body with the link's own axes; a point-like link gets the least
+MuJoCo checks those. The constant part of a joint's law is left out. Every link is a body with
+the link's own axes; a point-like link gets the least
 inertia MuJoCo takes. Ground slopes come from the direction of gravity: see `gravity_on_slope`.
 """
 
@@ -178,7 +179,7 @@ def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
 
 
 def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> ET.Element:
-    """Add the child link of `joint`; one that is not measured and follows none is rigid, as held."""
+    """Add the child link of `joint`; one neither measured nor a follower is held."""
     moving = joint.name in robot.joint_names or joint.name in {m.joint for m in robot.mimics}
     held = 0.0 if moving else dict(robot.held).get(joint.name, 0.0)
     rotation, shift = np.array(joint.rotation), np.array(joint.xyz)

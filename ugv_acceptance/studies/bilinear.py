@@ -83,7 +83,7 @@ def basis(robot: Robot, joint: int, values: Floats) -> Floats:
 
 
 def check_alone(robot: Robot, joint: str) -> None:
-    """Raise BadConfig for a joint whose torques are no sinusoid of it: with a spring or followers."""
+    """Raise BadConfig for a joint of which torques are no sinusoid: with a spring or followers."""
     follows = [mimic.joint for mimic in robot.mimics if mimic.follows == joint]
     sprung = any(law.joint == joint and law.stiffness for law in robot.laws)
     if follows or sprung:

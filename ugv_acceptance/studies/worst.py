@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.studies.intervals import TURN, Intervals, intersect, where_cosine_between
 from ugv_acceptance.studies.bilinear import check_alone
+from ugv_acceptance.studies.intervals import TURN, Intervals, intersect, where_cosine_between
 from ugv_acceptance.type_aliases import Floats
 
 # An amplitude below this (N m) counts as none: the moved joint does not load the other.

@@ -140,10 +140,10 @@ class ValueMeasure:
     def _name_violators(self, rows: MarginRows) -> None:
         kind, of = SIGNALS[self.demand.signal], self.demand.of
         names = subjects_of(kind, self.settings)
-        bad = self._bad(kind.of(rows, self.settings)).any(axis=0)
-        self.violators |= {
+        bad = np.asarray(self._bad(kind.of(rows, self.settings)).any(axis=0))
+        self.violators.update(
             name for name, any_bad in zip(names, bad, strict=True) if any_bad and of in (ANY, name)
-        }
+        )
 
     def _moment(self, rows: MarginRows, k: int, value: float) -> Moment:
         j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])

@@ -17,6 +17,7 @@ from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, 
 from ugv_acceptance.evaluation.criteria.quantities import shown
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
+from ugv_acceptance.model.reactions import standing_torque
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.model.stability import SIDES, stance_of, tip_angles_of
 from ugv_acceptance.model.statics import torque_of
@@ -136,7 +137,8 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
 
     def margins(at: _Point) -> Floats:
         posture: Any = _posture(at)
-        torque = torque_of(posture, at.gravity)
+        hanging = torque_of(posture, at.gravity)
+        torque = standing_torque(mechanics, posture, polygon, at.gravity, hanging)
         if stance.edges is None:
             return np.array([*torque, *(math.nan for _ in SIDES)])
         # The kernel has the base's corners as constants: shift everything else the other way.

@@ -5,6 +5,7 @@ than the bound of its uncertainty.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
@@ -64,15 +65,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     if not measure.samples:
         return Outcome(INCONCLUSIVE, f'{criterion.name}: {NO_VALUE}', measured)
     if not _met(measure):
-        if measure.demand.dwell is not None and short:
-            return Outcome(INCONCLUSIVE, short, measured, evidence)
-        words = violation_words(measure, findings.settings, measured)
-        if not _by_effort(measure, findings):
-            return Outcome(FAIL, words, measured, evidence)
-        if measure.demand.of == ANY:
-            return Outcome(INCONCLUSIVE, f'{words}; {ONE_BY_ONE}', measured, evidence)
-        if not short:
-            return Outcome(PASS, f'{criterion.name}: {BY_EFFORT}', measured, evidence)
+        return _violated(measure, findings, short, Outcome(FAIL, '', measured, evidence))
     if short:
         return Outcome(INCONCLUSIVE, short, measured, evidence)
     if measure.demand.always and measured['inside_bound'] and _decides(criterion, findings):
@@ -85,10 +78,25 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     return Outcome(PASS, demand_words(criterion, findings.settings), measured, evidence)
 
 
+def _violated(
+    measure: ValueMeasure, findings: Findings, short: str | None, found: Outcome
+) -> Outcome:
+    """Return the outcome `found`, with its reason, of a value that was beyond its limit."""
+    if measure.demand.dwell is not None and short:
+        return replace(found, verdict=INCONCLUSIVE, reason=short)
+    words = violation_words(measure, findings.settings, found.measured)
+    if not _by_effort(measure, findings):
+        return replace(found, reason=words)
+    if measure.demand.of == ANY or short:
+        reason = short or f'{words}; {ONE_BY_ONE}'
+        return replace(found, verdict=INCONCLUSIVE, reason=reason)
+    return replace(found, verdict=PASS, reason=f'{measure.criterion.name}: {BY_EFFORT}')
+
+
 # Why a joint that carries the robot passes although the even spread is beyond its limit.
 BY_EFFORT = 'it carries the robot, so its measured torque is judged, not the evenly spread weight'
 ONE_BY_ONE = (
-    'but it carries the robot and its measured torque is judged: demand this of each joint by itself'
+    'but it carries the robot and has a measured torque: demand this of each joint by itself'
 )
 
 
@@ -96,7 +104,9 @@ def _by_effort(measure: ValueMeasure, findings: Findings) -> bool:
     """Return whether all joints in violation carry the robot and have a measured torque."""
     of_torque = _ALERT_OF.get(measure.demand.signal) == 'TORQUE_LIMIT'
     return (
-        of_torque and bool(measure.violators) and measure.violators <= judged_by_effort(findings.data)
+        of_torque
+        and bool(measure.violators)
+        and measure.violators <= judged_by_effort(findings.data)
     )
 
 

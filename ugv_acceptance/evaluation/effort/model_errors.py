@@ -132,7 +132,7 @@ def model_errors(
 
 
 def spread_errors(robot: Robot, q: Floats, gravity: Floats, load: float) -> Floats:
-    """Return how far (s, P, j) joints that carry the robot may be off the even spread of its weight.
+    """Return how far (s, P, j) joints that carry may be off the even spread of the weight.
 
     Evenly distributed over what balance leaves open, in each of P postures (P, j) by itself.
     """
