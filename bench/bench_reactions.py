@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -30,6 +31,8 @@ CALM, SETTLE, DAMPER = 1.5, 1.0, 300.0
 SLIPPERY, RUBBER = 1e-5, 0.6
 # Joints are held stiffly (N m/rad) on heavy rotors (kg m2), so that the posture asked for stands.
 SERVO, ROTOR = 2e4, 0.5
+# Postures a little off the usual one, lines shown of each case, lean (rad) on three feet.
+SWAYED, SHOWN, LEAN = 4, 2, 0.07
 # Inertia (m2, times a link's mass): at rest it does not matter, and public files have wrong ones.
 ROUND = ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01))
 
@@ -199,12 +202,26 @@ def packbot(mass: float) -> tuple[Robot, Floats]:
 
 
 def lifted(robot: Robot, q: Floats, foot: int) -> tuple[Robot, Floats]:
-    """Return a legged robot without one of its feet, its legs set so that the other three carry.
+    """Return a legged robot without one of its feet: it stands on three, if its weight is there.
 
-    The body shifts away from the foot in the air: the legs lean.
+    The hips lean by LEAN, which moves the body away from the foot in the air.
     """
     contacts = tuple(c for k, c in enumerate(robot.contacts) if k != foot)
-    return replace(robot, contacts=contacts), q
+    axles = [k for k, name in enumerate(robot.joint_names) if 'hip' in name or 'HAA' in name]
+    leaning, (y, *_) = q.copy(), np.sign([robot_foot(robot, q, foot)[1]])
+    leaning[axles] += LEAN * y
+    return replace(robot, contacts=contacts), leaning
+
+
+def robot_foot(robot: Robot, q: Floats, foot: int) -> Floats:
+    """Return where a foot is in `base_link` (m)."""
+    posture = posture_of(mechanics_of(robot), q.tolist(), 0.0, (0.0, 0.0, 0.0))
+    return np.array(posture.contacts[foot], dtype=np.float64)
+
+
+def swayed(q: Floats, seed: int) -> Floats:
+    """Return a posture in which every leg stands a little otherwise (0.1 rad)."""
+    return q + np.random.default_rng(seed).uniform(-0.1, 0.1, len(q))
 
 
 def cases(folder: Path = ROBOTS) -> Iterator[Case]:
@@ -219,31 +236,68 @@ def cases(folder: Path = ROBOTS) -> Iterator[Case]:
         for foot in range(2):
             three, at = lifted(robot, q, foot)
             yield Case(f'{name} without foot {foot}', three, at, SLIPPERY)
+        for seed in range(SWAYED):
+            yield Case(f'{name} swayed {seed}', robot, swayed(q, seed), RUBBER)
 
 
-def lines(case: Case) -> Iterator[str]:
-    """Yield a case's lines of the table: the joints that carry most."""
+@dataclass(frozen=True)
+class Compared:
+    """One joint's torques (N m): the model's, and MuJoCo's beside what friction may add to it."""
+
+    joint: str
+    hanging: float
+    even: float
+    least: float
+    most: float
+    friction: float
+    truth: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether MuJoCo's lies in the interval widened by friction and 1 %."""
+        slack = 0.01 * abs(self.truth) + 0.05 + self.friction
+        return self.least - slack <= self.truth <= self.most + slack
+
+
+def compared(case: Case) -> tuple[Truth, list[Compared]]:
+    """Return the robot at rest in MuJoCo and each joint that carries, the most loaded first."""
     truth = at_rest(case.robot, case.q, case.friction)
     found = model_of(case.robot, truth)
     more = friction_of(case.robot, truth, case.friction)
-    order = sorted(found.carrying, key=lambda j: -abs(truth.torque[j]))
-    for j in order[:3]:
-        low, high = found.least[j] - more[j], found.most[j] + more[j]
-        inside = low - 0.01 * abs(truth.torque[j]) - 0.05 <= truth.torque[j]
-        inside &= truth.torque[j] <= high + 0.01 * abs(truth.torque[j]) + 0.05
-        yield (
-            f'{case.name:26} {case.friction:5.1f} {len(truth.points)} '
-            f'{case.robot.joint_names[j]:16} {found.hanging[j]:8.2f} {found.even[j]:8.2f} '
-            f'[{found.least[j]:8.2f}, {found.most[j]:8.2f}] {truth.torque[j]:8.2f} '
-            f'{"inside" if inside else "OUTSIDE"}'
+    of: Any = found
+    rows = [
+        Compared(
+            case.robot.joint_names[j],
+            *(float(part[j]) for part in (of.hanging, of.even, of.least, of.most)),
+            float(more[j]) if case.friction > SLIPPERY else 0.0,
+            float(truth.torque[j]),
         )
+        for j in found.carrying
+    ]
+    return truth, sorted(rows, key=lambda row: -abs(row.truth))
+
+
+def lines(case: Case) -> Iterator[str]:
+    """Yield a case's lines of the table: the joints that carry most, and whether all are inside."""
+    truth, rows = compared(case)
+    outside = sum(not row.inside for row in rows)
+    for row in rows[:SHOWN]:
+        yield (
+            f'{case.name:26} {case.friction:5.1f} {len(truth.points)} {row.joint:16} '
+            f'{row.hanging:8.2f} {row.even:8.2f} [{row.least:7.2f}, {row.most:7.2f}] '
+            f'{row.truth:8.2f} {"inside" if row.inside else "OUTSIDE"}'
+        )
+    if not rows:
+        yield f'{case.name:26} {case.friction:5.1f} {len(truth.points)} does not stand'
+    elif outside:
+        yield f'{case.name:26} {outside} of {len(rows)} joints outside'
 
 
 def main(arguments: Sequence[str]) -> None:
     """Print the table."""
     folder = Path(arguments[0]) if arguments else ROBOTS
     head = ('robot', 'fric.', 'n', 'joint', 'hanging', 'even', '[least, most]', 'MuJoCo')
-    print('{:26} {:>5} {} {:16} {:>8} {:>8} {:>20} {:>8}'.format(*head))
+    print('{:26} {:>5} {} {:16} {:>8} {:>8} {:>18} {:>8}'.format(*head))
     for case in cases(folder):
         for line in lines(case):
             print(line)
