@@ -1,7 +1,9 @@
 """Recordings of robots that stand on their joints: overloaded legs do not pass, standing does."""
 
+import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from offline.joint_runs import EPOCH, FOLDED, Run, judged
@@ -41,7 +43,9 @@ def standing(folder: Path, name: str, load: str = '') -> ugv.Evaluation:
 
 
 @LEGGED_ROBOTS
-def test_a_standing_robot_passes_and_says_what_cannot_be_excluded(tmp_path: Path) -> None:
+def test_a_standing_robot_passes_and_says_what_cannot_be_excluded(
+    tmp_path: Path, repository: Path
+) -> None:
     """ANYmal's knees hold 27 N m of 80 evenly spread; what else balances is told, and no FAIL."""
     found = standing(tmp_path, 'anymal_c')
     assert found.verdict == 'PASS', found.result['reasons']
@@ -49,6 +53,9 @@ def test_a_standing_robot_passes_and_says_what_cannot_be_excluded(tmp_path: Path
     assert abs(knee['hanging']) < 1.0
     assert abs(knee['even']) == pytest.approx(27.0, abs=2.0)
     assert knee['most'] - knee['least'] > 40.0
+    schema = json.loads((repository / 'schema' / 'result.schema.json').read_text('utf-8'))
+    described = schema['$defs']['result']['properties']['carrying']
+    jsonschema.Draft202012Validator(described).validate(found.result['carrying'])
     unchecked = {one['what']: one['why'] for one in found.result['not_checked']}
     assert 'cannot be excluded' in unchecked['how the contact points share the weight']
     assert 'LF_KFE' in unchecked['friction on the ground']
