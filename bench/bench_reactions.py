@@ -268,7 +268,10 @@ def compared(case: Case) -> tuple[Truth, list[Compared]]:
     rows = [
         Compared(
             case.robot.joint_names[j],
-            *(float(part[j]) for part in (of.hanging, of.even, of.least, of.most)),
+            float(of.hanging[j]),
+            float(of.even[j]),
+            float(of.least[j]),
+            float(of.most[j]),
             float(more[j]) if case.friction > SLIPPERY else 0.0,
             float(truth.torque[j]),
         )

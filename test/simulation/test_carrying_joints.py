@@ -1,4 +1,4 @@
-"""Joints that carry the robot, beside MuJoCo at rest: the model's torques are what its motors do."""
+"""Joints that carry the robot, beside MuJoCo at rest: the model holds what its motors hold."""
 
 import pytest
 
