@@ -11,6 +11,7 @@ from config.robot_files import URDF, YAML, write_robot
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, load
+from ugv_acceptance.model.robot import Mimic
 
 
 def config_of(folder: Path, yaml: str = YAML, urdf: str = URDF) -> Config:
@@ -216,14 +217,19 @@ def test_a_limit_said_to_be_unknown_is_not_asked_for(tmp_path: Path) -> None:
     assert (config.settings.limits.torque[0], config.warnings) == (math.inf, ())
 
 
-def test_a_mimic_joint_is_held_at_its_offset(tmp_path: Path) -> None:
-    """Its leader's motion is not followed, and that is warned of."""
+def test_a_mimic_joint_follows_its_leader(tmp_path: Path) -> None:
+    """It is in the model, though no message tells it; a leader that is held holds it as well."""
     yaml = swap('  slide:\n    limit_n: 100\n', '')
     mimic = '<limit lower="-0.1" upper="0.3" effort="100" velocity="1"/>'
     urdf = URDF.replace(mimic, mimic + '<mimic joint="lift" offset="0.1"/>')
     config = config_of(tmp_path, yaml, urdf)
-    assert config.settings.robot.held == (('slide', 0.1),)
-    assert 'joint slide mimics another: held at its offset 0.1' in config.warnings[0]
+    assert config.settings.robot.mimics == (Mimic('slide', 'lift', 1.0, 0.1),)
+    assert (config.settings.robot.held, config.warnings) == ((), ())
+    still = swap('joints:\n  lift:\n    limit_nm: 30\n  slide:\n    limit_n: 100\n', '')
+    still += 'held: {lift: 90 deg}\ntopics: {joint_states: null}\n'
+    held = config_of(tmp_path, still, urdf).settings.robot
+    assert dict(held.held) == pytest.approx({'lift': math.pi / 2, 'slide': math.pi / 2 + 0.1})
+    assert held.mimics == ()
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from config.robot_files import URDF
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.urdf import Urdf, read_urdf, rotation_from_rpy
+from ugv_acceptance.model.robot import Mimic
 
 INERTIA = '<inertia ixx="1" iyy="2" izz="2.5" ixy="0.1" ixz="0.2" iyz="0.3"/>'
 
@@ -82,10 +83,23 @@ def test_a_continuous_joint_has_no_range() -> None:
     assert (found.lower, found.upper, found.effort) == (-math.inf, math.inf, 5.0)
 
 
-def test_a_mimic_joint_is_noted_with_its_offset() -> None:
-    """The offset is where the configuration holds it."""
-    text = robot(joint(inside='<mimic joint="k" multiplier="2" offset="0.3"/>'))
-    assert read(text).mimics == (('j', 0.3),)
+def test_a_mimic_joint_is_read_with_its_law() -> None:
+    """Position = multiplier * that of the other joint + offset; by default 1 and 0."""
+    other = joint(ends='b c', name='k')
+    law = '<mimic joint="k" multiplier="2" offset="0.3"/>'
+    text = robot(joint(inside=law) + other, 'a b c')
+    assert read(text).mimics == (Mimic('j', 'k', 2.0, 0.3),)
+    plain = text.replace(' multiplier="2" offset="0.3"', '')
+    assert read(plain).mimics == (Mimic('j', 'k', 1.0, 0.0),)
+
+
+@pytest.mark.parametrize(
+    ('of', 'says'), [('j', 'follow each other'), ('x', 'expected a movable joint, got "x"')]
+)
+def test_a_mimic_joint_must_follow_another_one(of: str, says: str) -> None:
+    """One that follows itself, or a joint that is not there, is refused by name."""
+    with pytest.raises(BadConfig, match=f'joint j/mimic.*{says}'):
+        read(robot(joint(inside=f'<mimic joint="{of}"/>')))
 
 
 def test_meshes_are_ignored() -> None:

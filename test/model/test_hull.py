@@ -9,6 +9,7 @@ from ugv_acceptance.model.hull import (
     THIN,
     Cycle,
     Point,
+    drawn_in,
     hull,
     hulls,
     pairs,
@@ -146,3 +147,29 @@ def test_a_sample_of_arrays_is_its_floats() -> None:
     found = sample(((np.array((1.0, 2.0)), 3.0), (np.array((4.0, 5.0)),)), 1)
     assert found == ((2.0, 3.0), (5.0,))
     assert all(type(x) is float for part in found for x in part)
+
+
+@pytest.mark.parametrize('first', range(5))
+@pytest.mark.parametrize('shift', [(0.0, 0.0), (3.0, -2.0)])
+def test_a_place_outside_is_drawn_towards_the_middle(
+    first: int, shift: tuple[float, float]
+) -> None:
+    """To the hull's edge or corner, and a billionth of the way inside, whatever the order."""
+    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.5, 0.0), (1.0, 1.0), (-1.0, 1.0)]) + shift
+    points: list[Point] = [(x, y, 0.0) for x, y in np.roll(corners, first, axis=0).tolist()]
+    middle = corners.mean(axis=0)
+    edge = [(0.5 * (a + b), a, b) for a, b in zip(corners, np.roll(corners, 1, 0), strict=True)]
+    for target in (*corners, *(at for at, _, _ in edge)):
+        for beyond in (1.001, 1.5, 8.0):
+            x, y = (middle + beyond * (target - middle)).tolist()
+            found = np.array(drawn_in(points, (x, y, 0.3)))
+            np.testing.assert_allclose(found, target, atol=1e-8)
+            assert np.linalg.norm(found - middle) < np.linalg.norm(target - middle)
+
+
+def test_many_places_are_drawn_each_its_own_way() -> None:
+    """Over a square about the origin: to x = 1 and to y = -1."""
+    points: list[Point] = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
+    x, y = drawn_in(points, (np.array((3.0, 0.5)), np.array((0.5, -2.0)), 0.0))
+    np.testing.assert_allclose(x, (1.0, 0.25), atol=1e-8)
+    np.testing.assert_allclose(y, (0.5 / 3.0, -1.0), atol=1e-8)

@@ -26,6 +26,7 @@ def print_tables(description: Values) -> None:
     _head(console, description)
     console.print(_links(description))
     console.print(_joints(description))
+    _print_carrying(console, description)
     _print_payload(console, description)
     console.print(_contacts(description))
     _print_stability(console, description)
@@ -74,13 +75,38 @@ def _joints(d: Values) -> Table:
 
 def _torque(joint: Values) -> tuple[str, str, str]:
     if joint['topic_name'] is None:
-        return 'held', '', ''
+        follows = joint['follows']
+        return f'follows {escape(follows)}' if follows else 'held', '', ''
     unit, limit, used = joint['torque_unit'], joint['limit'], joint['utilisation']
     torque = f'{number_text(joint["torque"])} {unit}'
     if limit is None:
-        return torque, 'not judged', ''
+        return torque, 'passive' if joint['passive'] else 'not judged', ''
     colour = 'red' if used > 1.0 else 'green'
     return torque, f'{limit:g} {unit}', f'[{colour}]{_share(used)}[/]'
+
+
+def _print_carrying(console: Console, d: Values) -> None:
+    """Print what is known of joints between the ground and the body; nothing if none carries."""
+    carrying = [joint for joint in d['joints'] if joint.get('carrying')]
+    if not carrying:
+        return
+    table = _table(
+        'Joints that carry the robot: above is the even spread of its weight',
+        *('joint', 'hanging', 'even spread', 'least', 'most', 'limit'),
+    )
+    for joint in carrying:
+        of, unit, limit = joint['carrying'], joint['torque_unit'], joint['limit']
+        numbers = (of['hanging'], joint['torque'], of['least'], of['most'])
+        texts = [f'{number_text(number)} {unit}' for number in numbers]
+        texts.append('' if limit is None else f'{limit:g} {unit}')
+        table.add_row(escape(joint['name']), *texts)
+    console.print(table)
+    console.print(
+        'How the contact points share the weight is not measured: torques from least to most '
+        'cannot be excluded.\nFriction comes on top where feet, flippers and tracks brace '
+        'against each other.\n',
+        soft_wrap=True,
+    )
 
 
 def _share(used: float) -> str:

@@ -14,6 +14,7 @@ from rich.table import Table
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.report.format import (
     assumed_line,
+    carrying_lines,
     doubts_of,
     ground_line,
     is_bound,
@@ -91,6 +92,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
     if result['criteria']['path'] is not None:
         _print_criteria(result['criteria']['results'], console)
     console.print(_margins(result))
+    for line in carrying_lines(result):
+        console.print(escape(line), soft_wrap=True)
     _print_data(result, console)
     _print_alerts(result, console)
     if 'effort' in result:

@@ -141,14 +141,7 @@ def nominal(robot: Robot, key: str) -> float:
 
 
 def _moves_contact(robot: Robot, joint: str) -> bool:
-    tree = mechanics_of(robot).tree
-    for contact in robot.contacts:
-        body = tree.frames[contact.link][0]
-        while body > 0:
-            if tree.bodies[body].joint == joint:
-                return True
-            body = tree.bodies[body].parent
-    return False
+    return joint in {robot.joint_names[k] for k, _ in mechanics_of(robot).carried}
 
 
 def spread_from(robot: Robot, text: str) -> tuple[str, Spread]:

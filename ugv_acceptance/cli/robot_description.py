@@ -13,6 +13,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
+from ugv_acceptance.model.reactions import Reactions, reactions_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import (
     RAISED,
@@ -24,7 +25,7 @@ from ugv_acceptance.model.stability import (
     stances_of,
     standing,
 )
-from ugv_acceptance.model.statics import payload_capacity, torque_of
+from ugv_acceptance.model.statics import payload_capacity
 from ugv_acceptance.report.format import number_text
 
 VERSION = 1
@@ -46,6 +47,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     mechanics = mechanics_of(robot)
     found = posture_of(mechanics, q, load.mass, load.cog)
     stance = standing(stances_of(mechanics, found), gravity)
+    points = stance.points
     return {
         'version': VERSION,
         'robot': {'name': config.name, 'serial': config.serial},
@@ -56,7 +58,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         },
         'links': [_link(config, k) for k in range(len(robot.links))],
         'tilt': {'roll_deg': math.degrees(roll), 'pitch_deg': math.degrees(pitch)},
-        'joints': _joints(config, q, torque_of(found, gravity)),
+        'joints': _joints(config, q, reactions_of(mechanics, found, points, gravity)),
         'payload': _payload(config, q, gravity, load),
         'total_mass_kg': found.mass,
         'centre_of_gravity_m': list(found.cog),
@@ -132,12 +134,13 @@ def _link(config: Config, k: int) -> Values:
     return {'name': link.name, 'mass_kg': link.mass, 'centre_of_gravity_m': list(link.cog)}
 
 
-def _joints(config: Config, q: list[float], torque: tuple[Any, ...]) -> list[Values]:
-    """Return the measured joints in their order, then those that are held."""
+def _joints(config: Config, q: list[float], found: Reactions) -> list[Values]:
+    """Return the measured joints in their order, then those that are held or follow another."""
     settings, robot = config.settings, config.settings.robot
     rows = []
-    for name, given, position, limit, value in zip(
-        robot.joint_names, settings.joints, q, settings.limits.torque, torque, strict=True
+    torque: Any = found.even
+    for k, (name, given, position, limit, value) in enumerate(
+        zip(robot.joint_names, settings.joints, q, settings.limits.torque, torque, strict=True)
     ):
         rows.append(
             _joint(robot.joint(name), position)
@@ -147,11 +150,30 @@ def _joints(config: Config, q: list[float], torque: tuple[Any, ...]) -> list[Val
                 'torque': float(value),
                 'margin': _finite(limit - abs(value)),
                 'utilisation': abs(value) / limit if math.isfinite(limit) else None,
+                'carrying': _carrying(found, k),
+                'passive': name in settings.passive,
             }
         )
-    held = dict(robot.held)
+    places = dict(robot.held)
+    places |= {
+        m.joint: m.multiplier * q[robot.joint_names.index(m.follows)] + m.offset
+        for m in robot.mimics
+    }
+    follows = {m.joint: m.follows for m in robot.mimics}
     still = (j for j in robot.joints if j.kind != 'fixed' and j.name not in robot.joint_names)
-    return rows + [_joint(j, held.get(j.name, 0.0)) | {'topic_name': None} for j in still]
+    return rows + [
+        _joint(j, places.get(j.name, 0.0)) | {'topic_name': None, 'follows': follows.get(j.name)}
+        for j in still
+    ]
+
+
+def _carrying(found: Reactions, k: int) -> Values | None:
+    """Return what is known of the torque of a joint that carries the robot; None: it does not."""
+    if k not in found.carrying:
+        return None
+    ends: Any = (found.hanging[k], found.least[k], found.most[k])
+    hanging, least, most = map(float, ends)
+    return {'hanging': hanging, 'least': least, 'most': most}
 
 
 def _joint(joint: Joint, position: float) -> Values:

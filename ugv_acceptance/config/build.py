@@ -13,14 +13,21 @@ from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
-from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
+from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Mimic, Payload, Robot
 
 T = TypeVar('T')
 M = TypeVar('M', bound=BaseModel)
+# Keys of joints.NAME.law in order of Law, with their quantities: of a rotary joint, of a slide.
+_LAW_KINDS = {
+    'constant': ('torque', 'force'),
+    'spring': ('stiffness', 'linear stiffness'),
+    'rest': ('angle', 'length'),
+}
 # Lighter robots are mistakes of unit.
 LEAST_MASS = 1e-6
 
@@ -74,7 +81,8 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
 def settings_from(build: Build) -> Settings:
     """Return the settings of an evaluation; BadConfig if file and URDF do not fit each other."""
     measured = _measured(build)
-    robot = _robot(build, tuple(measured))
+    stands = on_axles(robot := _robot(build, measured), build.refuse)
+    robot = replace(robot, contacts=stands.contacts)
     joints = {name: robot.joint(name) for name in measured}
     settings = Settings(
         robot,
@@ -85,6 +93,8 @@ def settings_from(build: Build) -> Settings:
         build.file.unsafe_limits or '',
         build.file.payload is not None and build.file.payload.known,
         Ground(build.file.ground.kind, build.file.ground.pitch),
+        tuple(name for name, section in measured.items() if section.passive),
+        stands.moved,
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)
@@ -154,7 +164,7 @@ def _measured(build: Build) -> dict[str, JointSection]:
     if named is None and build.file.topics.joint_states is None:
         return {}
     if named is None:
-        mimics = dict(build.urdf.mimics)
+        mimics = {mimic.joint for mimic in build.urdf.mimics}
         rest = (n for n in movable if n not in build.file.held and n not in mimics)
         return {name: JointSection() for name in rest}
     for name in named:
@@ -203,7 +213,8 @@ def _list(names: Sequence[str]) -> str:
     return ', '.join(names[:8]) + (', ...' if len(names) > 8 else '') if names else 'none'
 
 
-def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
+def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
+    measured = tuple(sections)
     file, links = build.file, [link.name for link in build.urdf.links]
     for name, contact in file.contacts.items():
         _known(build, ('contacts', name, 'link'), contact.link, links, 'link')
@@ -229,7 +240,46 @@ def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
         file.gravity,
         file.ground.height,
         file.ground.tolerance,
+        tuple(m for m in _followed(build, measured) if m.follows in measured),
+        tuple(_laws(build, sections)),
     )
+
+
+def _followed(build: Build, measured: tuple[str, ...]) -> Iterable[Mimic]:
+    """Yield each joint that follows another, and which measured or held one it follows in the end.
+
+    One that is measured or held itself does not follow.
+    """
+    stays = {*measured, *build.file.held}
+    of = {mimic.joint: mimic for mimic in build.urdf.mimics if mimic.joint not in stays}
+    for mimic in of.values():
+        found = mimic
+        while found.follows in of:
+            next_one = of[found.follows]
+            factor = found.multiplier * next_one.multiplier
+            offset = found.multiplier * next_one.offset + found.offset
+            found = Mimic(mimic.joint, next_one.follows, factor, offset)
+        yield found
+
+
+def _laws(build: Build, sections: dict[str, JointSection]) -> Iterable[Law]:
+    """Yield what springs and constant torques put on measured joints."""
+    joints = {joint.name: joint for joint in build.urdf.joints}
+    for name, section in sections.items():
+        law, path = section.law, ('joints', name, 'law')
+        if section.passive and section.limit is not None:
+            raise build.refuse(
+                ('joints', name, 'passive'), 'expected no limit on a passive joint: none is judged'
+            )
+        if law is None:
+            continue
+        if not {'constant', 'spring'} & law.model_fields_set:
+            raise build.refuse(path, 'expected constant or spring, got neither')
+        numbers = [
+            _of_joint(build, (*path, key), joints[name], getattr(law, key), *kinds)
+            for key, kinds in _LAW_KINDS.items()
+        ]
+        yield Law(name, *numbers)
 
 
 def _links(build: Build, names: list[str]) -> Iterable[Link]:
@@ -245,7 +295,8 @@ def _links(build: Build, names: list[str]) -> Iterable[Link]:
 
 def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]]:
     """Yield every movable joint without messages with the position at which it is held."""
-    held, mimics, silent = build.file.held, dict(build.urdf.mimics), []
+    held, silent = build.file.held, []
+    follows = {mimic.joint: mimic for mimic in _followed(build, measured)}
     movable = {joint.name: joint for joint in build.urdf.joints if joint.kind != 'fixed'}
     for name in held:
         _known(build, ('held', name), name, list(movable), 'movable joint')
@@ -254,11 +305,12 @@ def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]
     for name, joint in movable.items():
         if name in held:
             yield name, _of_joint(build, ('held', name), joint, held[name], 'angle', 'length')
-        elif name in mimics and name not in measured:
-            build.warn(
-                ('urdf',), f'joint {name} mimics another: held at its offset {mimics[name]:g}'
-            )
-            yield name, mimics[name]
+        elif name in follows:
+            of = follows[name]
+            if of.follows in measured:
+                continue
+            at = held.get(of.follows)
+            yield name, of.multiplier * (at.value if at else 0.0) + of.offset
         elif name not in measured:
             silent.append(name)
     if silent:
@@ -323,6 +375,8 @@ def _limit(build: Build, joint: Joint, section: JointSection) -> float:
         if value <= 0.0:
             raise build.refuse(path, f'expected a limit above 0, got {value:g}')
         return value
+    if section.passive:
+        return math.inf
     if 'limit' not in section.model_fields_set and math.isinf(joint.effort):
         build.warn(path[:2], 'no limit here and no effort in the URDF: its torque is not judged')
     return math.inf if 'limit' in section.model_fields_set else joint.effort

@@ -14,7 +14,15 @@ from ugv_acceptance.model.feet import ROCKING, feet_of, radius_of
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Contact, Matrix, Robot, Vector
 from ugv_acceptance.model.support import footings_of
-from ugv_acceptance.model.tree import Pose, Tree, in_body, pose_of, tree_of
+from ugv_acceptance.model.tree import (
+    Pose,
+    Tree,
+    body_positions,
+    drives_of,
+    in_body,
+    pose_of,
+    tree_of,
+)
 from ugv_acceptance.type_aliases import Floats
 
 # How far (m) a contact point may lie outside: tracks and tyres are often drawn without treads.
@@ -88,7 +96,8 @@ def uneven_tracks(robot: Robot) -> Uneven | None:
 def compared(robot: Robot, shapes: Sequence[Shape]) -> Compared:
     """Compare each contact point with the collision geometry of the body that it is part of."""
     tree = tree_of(robot)
-    pose = pose_of(tree, [0.0] * (len(tree.bodies) - 1))
+    zero = body_positions(drives_of(robot, tree), [0.0] * len(robot.joint_names))
+    pose = pose_of(tree, zero)
     outside, unknown = [], []
     for contact in robot.contacts:
         body, point = in_body(tree, contact.link, contact.position)

@@ -138,8 +138,16 @@ class TopicsSection(Section):
     payload: TopicSection = TopicSection(name='payload')
 
 
+class LawSection(Section):
+    """What a spring or a constant torque puts on a joint beside its motor, along its axis."""
+
+    constant: Annotated[Given, _given('torque', 'force')] = Given(0.0)
+    spring: Annotated[Given, _given('stiffness', 'linear stiffness')] = Given(0.0)
+    rest: Place = Given(0.0)
+
+
 class JointSection(Section):
-    """How one joint is found in messages, and its limits."""
+    """How one joint is found in messages, its limits, and what holds it beside a motor."""
 
     topic_name: Name | None = None
     sign: Sign = 1.0
@@ -148,6 +156,8 @@ class JointSection(Section):
     effort_scale: Annotated[Positive, _number()] = 1.0
     limit: Effort = None
     static_speed: Rate = None
+    passive: Annotated[bool, Field(strict=True)] = False
+    law: LawSection | None = None
 
 
 class LinkSection(Section):

@@ -38,6 +38,9 @@ UNITS: dict[str, tuple[str, float]] = {
     'm/s': ('rate', 1.0),
     'mm/s': ('rate', 1e-3),
     'm/s2': ('acceleration', 1.0),
+    'nm/rad': ('stiffness', 1.0),
+    'nm/deg': ('stiffness', 1.0 / _DEG),
+    'n/m': ('linear stiffness', 1.0),
 }
 KEY_ENDINGS = {
     **{u: u for u in UNITS if u.isalpha()},
@@ -45,6 +48,9 @@ KEY_ENDINGS = {
     'degps': 'deg/s',
     'mps': 'm/s',
     'mps2': 'm/s2',
+    'nmprad': 'nm/rad',
+    'nmpdeg': 'nm/deg',
+    'npm': 'n/m',
 }
 # Kind of quantity -> an example of it, for errors.
 EXAMPLES = {
@@ -57,6 +63,8 @@ EXAMPLES = {
     'angular rate': 'an angular rate such as 0.6 (rad/s) or "36 deg/s"',
     'rate': 'a speed such as 0.1 (m/s)',
     'acceleration': 'an acceleration such as 9.81 (m/s2)',
+    'stiffness': 'a stiffness such as 20 (N m/rad)',
+    'linear stiffness': 'a stiffness such as 500 (N/m)',
 }
 # Kinds for which the command line requires a unit, because a bare number would be misunderstood:
 # name, the unit people think in, the SI unit.

@@ -15,14 +15,23 @@ from defusedxml.ElementTree import fromstring
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.contact_check import Shape
 from ugv_acceptance.config.units import LARGEST, shown
-from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Link, Matrix, Vector
+from ugv_acceptance.model.robot import (
+    IDENTITY,
+    NO_INERTIA,
+    ZERO,
+    Joint,
+    Link,
+    Matrix,
+    Mimic,
+    Vector,
+)
 
 KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
 
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
-    """The links and joints of a URDF; `mimics` pairs a mimic joint with its offset (rad or m).
+    """The links and joints of a URDF; `mimics` are the joints that follow others.
 
     `shapes` is the collision geometry of all links.
     """
@@ -30,7 +39,7 @@ class Urdf:
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
-    mimics: tuple[tuple[str, float], ...]
+    mimics: tuple[Mimic, ...]
     warnings: tuple[str, ...]
     shapes: tuple[Shape, ...] = ()
 
@@ -47,7 +56,7 @@ def read_urdf(text: bytes, source: str) -> Urdf:
     _check_unique('link', [link.name for link in links], source)
     _check_unique('joint', [joint.name for joint in joints], source)
     _check_tree(links, joints, source)
-    mimics = tuple(_mimics(root, source))
+    mimics = tuple(_mimics(root, joints, source))
     shapes = tuple(_shapes(root))
     return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings), shapes)
 
@@ -153,12 +162,26 @@ def _limit(limit: Element | None, key: str, where: str) -> float:
     return value or math.inf
 
 
-def _mimics(root: Element, source: str) -> Iterable[tuple[str, float]]:
+def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[Mimic]:
+    """Yield the joints that follow others; BadConfig where one follows none, or itself."""
+    follows = {}
+    movable = {joint.name for joint in joints if joint.kind != 'fixed'}
     for element in root.findall('joint'):
-        mimic = element.find('mimic')
-        if mimic is not None:
-            name = element.get('name', '')
-            yield name, _number(mimic, 'offset', f'{source}: joint {name}/mimic', 0.0)
+        mimic, name = element.find('mimic'), element.get('name', '')
+        if mimic is None or name not in movable:
+            continue
+        where, of = f'{source}: joint {name}/mimic', mimic.get('joint', '')
+        if of not in movable:
+            raise BadConfig(f'{where}: expected a movable joint, got {shown(of)}')
+        factor = _number(mimic, 'multiplier', where, 1.0)
+        follows[name] = Mimic(name, of, factor, _number(mimic, 'offset', where, 0.0))
+    for name in follows:
+        seen = [name]
+        while (at := seen[-1]) in follows:
+            if follows[at].follows in seen:
+                raise BadConfig(f'{source}: joint {name}/mimic: the joints follow each other')
+            seen.append(follows[at].follows)
+    return tuple(follows.values())
 
 
 def _shapes(root: Element) -> Iterable[Shape]:

@@ -26,6 +26,7 @@ from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.reactions import standing_torque
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.shortened_tracks import has_tracks
 from ugv_acceptance.model.sliding import slides_first
@@ -47,7 +48,8 @@ class Margins:
     """The margins of the newest joint positions and gravity at one message.
 
     `time` is that of receipt, `stamp` that of the header (ns). `q` (j,) rad or m, `gravity` (3,)
-    m/s2 in `base_link`, `torque` (j,) static (N m; N), `stability` the tip-over margins.
+    m/s2 in `base_link`, `torque` (j,) static (N m; N), with the ground's reaction spread evenly on
+    joints that carry the robot, `stability` the tip-over margins.
     """
 
     time: int
@@ -333,10 +335,10 @@ class LiveEvaluator:
         if posture is None or unknown or now > until:
             return None
         self._known_until = until
-        torque: Any = torque_of(posture, gravity)
-        stability = NOT_KNOWN
-        if not self._level:
-            stability = stability_of(standing(self._stances, gravity), gravity)
+        stance = standing(self._stances, gravity)
+        hanging, points = torque_of(posture, gravity), stance.points
+        torque: Any = standing_torque(self._mechanics, posture, points, gravity, hanging)
+        stability = NOT_KNOWN if self._level else stability_of(stance, gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)

@@ -32,8 +32,9 @@ from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joi
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
+from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.row_selection import ALL, Rows, pick
+from ugv_acceptance.model.row_selection import ALL, Rows, inner, pick
 from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
     NO_CONTACT,
@@ -74,7 +75,7 @@ class RecordedEvaluator:
 
     Moments, energies and ZMP are computed only with `detail`. `fresh` are the timeouts and `gaps`
     the periods of silence (ns) of joint states and IMU, `first_payload` is the first payload that
-    was declared, and when (ns).
+    was declared, and when (ns), `carrying` are the joints (numbers) that carried the robot.
     """
 
     settings: Settings
@@ -89,6 +90,7 @@ class RecordedEvaluator:
     _payload: PayloadHistory = field(init=False)
     gaps: tuple[list[Gap], list[Gap]] = field(default_factory=lambda: ([], []))
     first_payload: tuple[int, Payload] | None = None
+    carrying: set[int] = field(default_factory=set)
     _known_until: int | None = None
     _began: int = 0
 
@@ -310,12 +312,16 @@ class RecordedEvaluator:
         with np.errstate(over='ignore', invalid='ignore'):
             for line, torque_gradient in zip(table, posture.torque_gradients, strict=False):
                 line[rows] = _product(torque_gradient, j, gravity)
-        if not self.settings.hears_imu:
-            return table, state
+            for line, law in zip(table, posture.laws, strict=False):
+                line[rows] = line[rows] - pick(law, j)
         stances = many_stances(self._mechanics, posture, len(q))
         for some, stance in many_standing(stances, len(q), j, gravity):
-            found = self._stability(stance, pick(gravity, some))
-            place = some if isinstance(rows, slice) else rows[some]
+            place = inner(rows, some)
+            at, down = (posture, j[some], self._mechanics), pick(gravity, some)
+            self.carrying.update(carry(table, place, *at, stance.points, down))
+            if not self.settings.hears_imu:
+                continue
+            found = self._stability(stance, down)
             for line, value in zip(table[n:], found, strict=False):
                 line[place] = value
             state[place] = found[-1]

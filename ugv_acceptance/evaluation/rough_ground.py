@@ -13,7 +13,7 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of, with_contacts
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.shortened_tracks import shortened
-from ugv_acceptance.model.stability import margins, stability_of, stance_of
+from ugv_acceptance.model.stability import margins, stability_of, stances_of, standing
 from ugv_acceptance.type_aliases import Floats
 
 
@@ -34,7 +34,8 @@ def cautious_angles(
     `q` (j) rad or m, `gravity` m/s2 in `base_link`; infinite without an edge, NaN where not known.
     """
     posture = posture_of(mechanics, q, load.mass, load.cog)
-    angle: Any = stability_of(stance_of(mechanics, posture), gravity).angle
+    stance = standing(stances_of(mechanics, posture), gravity)
+    angle: Any = stability_of(stance, gravity).angle
     return tuple(map(float, angle))
 
 

@@ -104,7 +104,9 @@ class Settings:
 
     `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is. With
     `payload_known` the robot's payload is that carried until another is declared; without it, it is
-    only assumed. `ground` is what the ground is taken for.
+    only assumed. `ground` is what the ground is taken for. `passive` are joints that only a spring
+    or a stop holds: their limits are infinite. `moved_contacts` says of contact points that the
+    file puts on a wheel what they are taken for.
     """
 
     robot: Robot
@@ -115,6 +117,8 @@ class Settings:
     unsafe: str = ''
     payload_known: bool = False
     ground: Ground = NOT_ENTERED
+    passive: tuple[str, ...] = ()
+    moved_contacts: tuple[str, ...] = ()
 
     @property
     def hears_joints(self) -> bool:

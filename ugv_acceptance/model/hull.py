@@ -18,6 +18,8 @@ Cycle = tuple[int, ...]
 
 # A polygon thinner than this (m) counts as a line: nothing can stand on it.
 THIN = 1e-6
+# A place outside the hull is moved to its border, and by this share of the way further inside.
+_INWARD = 1e-9
 # Three points count as being in one line if twice the area of their triangle is below this (m2).
 _SLACK = 1e-12
 # Number of hulls tried on all samples; those still without one are then treated one by one.
@@ -119,3 +121,20 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
                 left = _turn(points[i], points[j], points[k])
                 good = good & ((left > _SLACK) if k in cycle else (left >= -_SLACK))
     return good
+
+
+def drawn_in(points: Values, place: Values) -> tuple[Values, Values]:
+    """Return x, y (m) where the line from the points' mean to an outside place exits the hull."""
+    middle = [sum(p[k] for p in points) / len(points) for k in range(2)]
+    way = [place[k] - middle[k] for k in range(2)]
+    furthest: Any = 0.0
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        for a, b in combinations(points, 2):
+            edge, start = ([b[k] - a[k] for k in range(2)], [a[k] - middle[k] for k in range(2)])
+            across = np.float64(1.0) * (way[0] * edge[1] - way[1] * edge[0])
+            part = (start[0] * way[1] - start[1] * way[0]) / across
+            reach = (start[0] * edge[1] - start[1] * edge[0]) / across
+            hit = abs(part - 0.5) < 0.5 + _INWARD
+            furthest = np.maximum(furthest, np.where(hit, reach, 0.0))
+    x, y = (middle[k] + (1.0 - _INWARD) * furthest * way[k] for k in range(2))
+    return x, y

@@ -14,8 +14,26 @@ from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
 from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.robot import Contact, Robot
-from ugv_acceptance.model.torque_gradients import PointLoad, carried_by, in_base, steps_of
-from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
+from ugv_acceptance.model.torque_gradients import (
+    PointLoad,
+    Step,
+    carried_by,
+    in_base,
+    loads_on_joints,
+    steps_of,
+)
+from ugv_acceptance.model.tree import (
+    Drive,
+    Pose,
+    Tree,
+    body_positions,
+    drives_of,
+    folded,
+    in_body,
+    point_of,
+    pose_of,
+    tree_of,
+)
 
 Triple = tuple[Number, Number, Number]
 
@@ -27,13 +45,17 @@ class Posture:
     Each number is a float (one sample) or an array (many). `torque_gradients[j]` is the derivative
     of joint j's static torque by gravity (N m per m/s2; N per m/s2 if prismatic), `mass` (kg) and
     `cog` (m, `base_link`) are of the whole robot with its payload, `contacts` are the contact
-    points (m, `base_link`).
+    points (m, `base_link`). `loads[p]` is the torque gradient of one kg at a contact point on a
+    joint that carries it (m; 1 if prismatic), for each of `Mechanics.carried`. `laws` is what
+    springs put on each joint (N m; N); empty without any.
     """
 
     torque_gradients: tuple[Triple, ...]
     mass: Number
     cog: Triple
     contacts: tuple[Triple, ...]
+    loads: tuple[Triple, ...] = ()
+    laws: tuple[Number, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,11 +65,13 @@ class Mechanics:
     `posture` takes joint positions, payload mass and centre of gravity (3), and returns the fields
     of Posture. `holding` takes gravity (3) as well and returns static torques in place of the
     torque gradients. `forces` takes positions, rates, accelerations, gravity (3), payload mass and
-    centre of gravity (3), and returns the dynamic joint torques.
+    centre of gravity (3), and returns the dynamic joint torques. `carried` pairs joints (numbers)
+    with the contact points that hang on them.
     """
 
     robot: Robot
     tree: Tree
+    carried: tuple[tuple[int, int], ...]
     posture: Kernel
     holding: Kernel
     forces: Kernel
@@ -68,6 +92,7 @@ def mechanics_of(robot: Robot) -> Mechanics:
     return Mechanics(
         robot,
         tree,
+        _carried_contacts(robot, tree),
         compile_kernel(_posture_formula(robot, tree), [*names, *load]),
         compile_kernel(_holding_formula(robot, tree), [*names, *load, *gravity]),
         compile_kernel(_force_formula(robot, tree), [*names * 3, *gravity, *load]),
@@ -86,25 +111,36 @@ def with_contacts(mechanics: Mechanics, contacts: Sequence[Contact]) -> Mechanic
     return replace(mechanics, robot=robot, posture=kernel)
 
 
-def _to_tree(robot: Robot, tree: Tree) -> list[int]:
-    """Return, for each moving body, the index of its joint in `robot.joint_names`."""
-    return [robot.joint_names.index(body.joint) for body in tree.bodies[1:]]
+def _carried_contacts(robot: Robot, tree: Tree) -> tuple[tuple[int, int], ...]:
+    """Return (joint, contact) for every joint between the base and a contact point."""
+    drives, found = drives_of(robot, tree), set[tuple[int, int]]()
+    for number, contact in enumerate(robot.contacts):
+        body = tree.frames[contact.link][0]
+        while body:
+            found.add((drives[body - 1].joint, number))
+            body = tree.bodies[body].parent
+    return tuple(sorted(found))
+
+
+def _vectors(drives: Sequence[Drive], values: Sequence[Vec], joints: int) -> list[Vec]:
+    """Return what joints carry, given the vectors of the bodies that they move."""
+    x, y, z = (folded(drives, [v[k] for v in values], joints) for k in range(3))
+    return list(zip(x, y, z, strict=True))
 
 
 def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
-    order = _to_tree(robot, tree)
+    drives, n = drives_of(robot, tree), len(robot.joint_names)
+    pairs = _carried_contacts(robot, tree)
 
     def formula(*inputs: Scalar) -> tuple[Any, ...]:
         q, (mass, *at) = inputs[:-4], inputs[-4:]
-        steps = steps_of(tree, [q[k] for k in order])
+        steps = steps_of(tree, body_positions(drives, q))
         loads = []
         if robot.payload_link is not None:
             body, point = in_body(tree, robot.payload_link, (at[0], at[1], at[2]))
             loads = [PointLoad(body, mass, point)]
         carried = carried_by(tree, steps, loads)
-        torque_gradients = tuple(
-            carried.torque_gradients[order.index(j)] for j in range(len(order))
-        )
+        torque_gradients = tuple(_vectors(drives, carried.torque_gradients, n))
         cog = scale(carried.moment, 1.0 / carried.mass)
         feet = [in_body(tree, c.link, c.position) for c in robot.contacts]
         return (
@@ -112,9 +148,38 @@ def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]
             carried.mass,
             cog,
             tuple(in_base(tree, steps, *foot) for foot in feet),
+            _loads_of_contacts(tree, drives, steps, feet, pairs),
+            laws_of(robot, q),
         )
 
     return formula
+
+
+def _loads_of_contacts(
+    tree: Tree,
+    drives: Sequence[Drive],
+    steps: Sequence[Step],
+    feet: Sequence[tuple[int, Vec]],
+    pairs: Sequence[tuple[int, int]],
+) -> tuple[Vec, ...]:
+    """Return Posture.loads."""
+    felt = [loads_on_joints(tree, steps, *foot) for foot in feet]
+    joints = 1 + max((j for j, _ in pairs), default=0)
+    by_foot = [
+        _vectors([drives[k - 1] for k in found], list(found.values()), joints) for found in felt
+    ]
+    return tuple(by_foot[foot][joint] for joint, foot in pairs)
+
+
+def laws_of(robot: Robot, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """Return what springs put on each joint at positions `q` (N m; N); () without any."""
+    if not robot.laws:
+        return ()
+    found: list[Scalar] = [0.0] * len(robot.joint_names)
+    for law in robot.laws:
+        j = robot.joint_names.index(law.joint)
+        found[j] = found[j] + (law.constant + (law.rest - q[j]) * law.stiffness)
+    return tuple(found)
 
 
 def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
@@ -123,7 +188,9 @@ def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]
     def formula(*inputs: Scalar) -> tuple[Any, ...]:
         torque_gradients, *rest = posture(*inputs[:-3])
         gravity: Vec = (inputs[-3], inputs[-2], inputs[-1])
-        return tuple(dot(gravity, torque_gradient) for torque_gradient in torque_gradients), *rest
+        held = [dot(gravity, torque_gradient) for torque_gradient in torque_gradients]
+        laws = rest[-1] or (0.0,) * len(held)
+        return tuple(tau - law for tau, law in zip(held, laws, strict=True)), *rest
 
     return formula
 
@@ -136,17 +203,20 @@ def _loads(robot: Robot, tree: Tree, pose: Pose, mass: Scalar, cog: Vec) -> list
 
 
 def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
-    order = _to_tree(robot, tree)
-    n = len(order)
+    drives, n = drives_of(robot, tree), len(robot.joint_names)
 
     def formula(*inputs: Scalar) -> list[Scalar]:
-        q, qd, qdd = ([inputs[part * n + k] for k in order] for part in range(3))
+        q = body_positions(drives, inputs[:n])
+        qd, qdd = (
+            [inputs[part * n + d.joint] * d.multiplier for d in drives] for part in range(1, 3)
+        )
         gx, gy, gz, mass, x, y, z = inputs[3 * n :]
         pose = pose_of(tree, q)
         loads = _loads(robot, tree, pose, mass, (x, y, z))
         motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
         forces = joint_forces(tree, pose, motion, loads)
-        return [forces[order.index(j)] for j in range(n)]
+        laws = laws_of(robot, inputs[:n]) or (0.0,) * n
+        return [force - law for force, law in zip(folded(drives, forces, n), laws, strict=True)]
 
     return formula
 

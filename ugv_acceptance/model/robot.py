@@ -75,6 +75,32 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that moves with a measured one: its position is multiplier * that one's + offset.
+
+    `offset` in rad (m where `joint` is prismatic).
+    """
+
+    joint: str
+    follows: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """What a spring or a constant force puts on a joint beside its motor, positive along its axis.
+
+    `constant` - `stiffness` * (position - `rest`): N m, N m/rad, rad (N, N/m, m if prismatic).
+    """
+
+    joint: str
+    constant: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Contact:
     """A point (m, in the axes of `link`) with which the robot can stand on the ground."""
 
@@ -96,8 +122,8 @@ class Robot:
     """The physical model of a robot; the root link's frame is `base_link`.
 
     `joint_names` are the joints whose positions are given, in the order of every `q[..., j]`;
-    movable joints that are not among them are held at the value `held` pairs with their name, else
-    at 0.
+    movable joints that are not among them follow one of them (`mimics`), or are held at the value
+    `held` pairs with their name, else at 0. `laws` are of joints among them.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground.
     """
@@ -113,6 +139,8 @@ class Robot:
     gravity: float = 9.81
     ground: float = 0.0
     contact_tolerance: float = 0.001
+    mimics: tuple[Mimic, ...] = ()
+    laws: tuple[Law, ...] = ()
 
     @property
     def root(self) -> str:

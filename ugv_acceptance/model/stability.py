@@ -25,6 +25,7 @@ from ugv_acceptance.model.mechanics import (
     mechanics_of,
     posture_of,
 )
+from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.row_selection import Rows, Values, groups, inner, pick
 from ugv_acceptance.model.support import ALL, MOST, Footing, footings_of, many_footings
@@ -57,6 +58,11 @@ class Stance:
     mass: Number
     state: int
     edges: Edges | None
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """Numbers of the contacts that carry: none without a footing."""
+        return self.footing.points if self.footing else ()
 
     @property
     def rocking(self) -> Number:
@@ -338,7 +344,8 @@ def margins(
 ) -> Margins:
     """Return static torques and tip angles for postures `q` (..., j) under gravity (..., 3).
 
-    A payload left out is the robot's own; `workers` is threads.
+    Joints that carry the robot have the ground's reaction in theirs, evenly spread. A payload left
+    out is the robot's own; `workers` is threads.
     """
     mechanics, load = mechanics_of(robot), payload or robot.payload
     n = len(robot.joint_names)
@@ -351,7 +358,8 @@ def margins(
             angle, state = tip_angles_of(stance, gravity)
             return (*angle, state)
 
-        return [*torque, *_table(mechanics, posture, columns[n:], values, 5)]
+        held = np.array([np.broadcast_to(tau, columns[n].shape) for tau in torque])
+        return [*held, *_table(mechanics, posture, columns[n:], values, 5, held)]
 
     found = in_blocks(block, n + 5, q, gravity, workers=workers)
     state = found[..., n + 4].astype(np.int8)
@@ -364,13 +372,20 @@ def _table(
     gravity: Any,  # noqa: ANN401 - three arrays
     values: Callable[[Stance, Any], Sequence[Number | State]],
     width: int,
+    held: Floats | None = None,
 ) -> list[Floats]:
-    """Return `values(stance, gravity)` of every sample: `width` arrays of one number a sample."""
+    """Return `values(stance, gravity)` of every sample: `width` arrays of one number a sample.
+
+    Adds the ground's reaction to the torques `held` (j, n) of hanging joints.
+    """
     gx, *_ = gravity
     table, count = np.empty((width, len(gx))), len(gx)
     stances = many_stances(mechanics, posture, count)
     for rows, stance in many_standing(stances, count, np.arange(count), gravity):
-        found = values(stance, pick(gravity, rows))
+        down = pick(gravity, rows)
+        if held is not None:
+            carry(held, rows, posture, rows, mechanics, stance.points, down)
+        found = values(stance, down)
         for k, value in enumerate(found):
             table[k, rows] = value
     return list(table)

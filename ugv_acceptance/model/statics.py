@@ -16,9 +16,16 @@ from ugv_acceptance.type_aliases import Floats
 
 
 def torque_of(posture: Posture, gravity: tuple[Number, Number, Number]) -> tuple[Number, ...]:
-    """Return each joint's static torque (N m; N where prismatic) under `gravity` (m/s2)."""
+    """Return what each motor holds at rest under `gravity` (m/s2): N m; N where prismatic.
+
+    That is its weight less what its spring carries. Of a joint between base and ground it is the
+    torque with its feet in the air; reactions.py adds what the ground does.
+    """
     gx, gy, gz = gravity
-    return tuple([x * gx + y * gy + z * gz for x, y, z in posture.torque_gradients])
+    held = tuple([x * gx + y * gy + z * gz for x, y, z in posture.torque_gradients])
+    if posture.laws:
+        return tuple([tau - law for tau, law in zip(held, posture.laws, strict=True)])
+    return held
 
 
 def static_torque(

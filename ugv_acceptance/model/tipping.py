@@ -33,7 +33,7 @@ from ugv_acceptance.model.hull import pairs
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.robot import NO_INERTIA, Vector
-from ugv_acceptance.model.tree import Pose, point_of, pose_of
+from ugv_acceptance.model.tree import Pose, body_positions, drives_of, point_of, pose_of
 
 # A part of the robot: mass (kg), centre of gravity (m, `base_link`), its inertia (six numbers).
 _Part = tuple[Scalar, Vec, tuple[Scalar, ...]]
@@ -49,11 +49,11 @@ def inertia_of(mechanics: Mechanics) -> Kernel:
     and returns xx, yy, zz, xy, xz, yz in kg m2: the links' own inertias, the payload as a point.
     """
     robot, tree = mechanics.robot, mechanics.tree
-    order = [robot.joint_names.index(body.joint) for body in tree.bodies[1:]]
+    drives = drives_of(robot, tree)
 
     def formula(*inputs: Scalar) -> list[Scalar]:
         q, mass, at = inputs[:-4], inputs[-4], (inputs[-3], inputs[-2], inputs[-1])
-        pose = pose_of(tree, [q[k] for k in order])
+        pose = pose_of(tree, body_positions(drives, q))
         parts = [_part(mechanics, pose, k) for k in range(len(tree.bodies))]
         if robot.payload_link is not None:
             _, point = point_of(tree, pose, robot.payload_link, at)

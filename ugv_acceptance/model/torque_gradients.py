@@ -63,6 +63,23 @@ def in_base(tree: Tree, steps: Sequence[Step], body: int, point: Vec) -> Vec:
     return point
 
 
+def loads_on_joints(tree: Tree, steps: Sequence[Step], body: int, point: Vec) -> dict[int, Vec]:
+    """Return the torque gradient (m; 1 if prismatic) of one kg at a point of a body, by body.
+
+    `point` (m) is in the axes of body number `body`; the keys are the bodies on its way to the
+    base, whose joints feel it; the gradients are in base axes.
+    """
+    found: dict[int, Vec] = {}
+    while body:
+        step, moving = steps[body], tree.bodies[body]
+        arm = rotate(step.turn, point)
+        found = {k: rotate(step.turn, gradient) for k, gradient in found.items()}
+        found[body] = scale(moving.axis, -1.0) if moving.prismatic else cross(arm, moving.axis)
+        point = add(step.shift, arm)
+        body = moving.parent
+    return found
+
+
 def carried_by(tree: Tree, steps: Sequence[Step], loads: Sequence[PointLoad]) -> Carried:
     """Return torque gradients, total mass and its moment, with the point `loads` included."""
     masses: list[Scalar] = [body.mass for body in tree.bodies]

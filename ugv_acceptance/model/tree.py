@@ -56,6 +56,18 @@ class Tree:
 
 
 @dataclass(frozen=True, slots=True)
+class Drive:
+    """What moves a body: its position is multiplier * position of joint number `joint` + offset.
+
+    The number is an index into `robot.joint_names`; rad, or m if the body slides.
+    """
+
+    joint: int
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Pose:
     """Rotation, origin (m) and joint axis of every body, in `base_link`."""
 
@@ -103,6 +115,34 @@ def tree_of(robot: Robot) -> Tree:
     return Tree(tuple(bodies), {n: (f.body, f.rotation, f.xyz) for n, f in frames.items()})
 
 
+def drives_of(robot: Robot, tree: Tree) -> tuple[Drive, ...]:
+    """Return what moves each moving body: its own joint, or that which its joint mimics."""
+    number = {name: k for k, name in enumerate(robot.joint_names)}
+    found = {name: Drive(k) for name, k in number.items()}
+    found |= {
+        m.joint: Drive(number[m.follows], m.multiplier, m.offset)
+        for m in robot.mimics
+        if m.joint not in number
+    }
+    return tuple(found[body.joint] for body in tree.bodies[1:])
+
+
+def body_positions(drives: Sequence[Drive], q: Sequence[Scalar]) -> list[Scalar]:
+    """Return the position of every moving body for those of the joints, `q` (j) in rad or m."""
+    return [q[d.joint] * d.multiplier + d.offset for d in drives]
+
+
+def folded(drives: Sequence[Drive], values: Sequence[Scalar], joints: int) -> list[Scalar]:
+    """Return what `joints` joints carry, given what each body does, each by its multiplier.
+
+    By the principle of virtual work: a body that turns twice as far loads its joint twice as much.
+    """
+    found: list[Scalar] = [0.0] * joints
+    for drive, value in zip(drives, values, strict=True):
+        found[drive.joint] = found[drive.joint] + value * drive.multiplier
+    return found
+
+
 def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Frame]]]:
     """Return each link's frame, and the moving joints with their parents' frames, parents first.
 
@@ -113,13 +153,14 @@ def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Fr
         children.setdefault(joint.parent, []).append(joint)
     frames = {robot.root: _Frame(0, IDENTITY, ZERO)}
     moving = [(Joint('', 'fixed', '', robot.root), frames[robot.root])]
-    held = dict(robot.held)
+    held, moved = dict(robot.held), {*robot.joint_names, *(m.joint for m in robot.mimics)}
     waiting = list(children.get(robot.root, ()))
     while waiting:
         joint = waiting.pop(0)
         if joint.child in frames:
             raise BadConfig(f'joint {joint.name}: link {joint.child} has a parent already')
-        frames[joint.child] = _child_frame(robot, joint, frames, moving, held.get(joint.name, 0.0))
+        at = None if joint.name in moved else held.get(joint.name, 0.0)
+        frames[joint.child] = _child_frame(joint, frames, moving, at)
         waiting += children.get(joint.child, ())
     lost = [link.name for link in robot.links if link.name not in frames]
     if lost:
@@ -128,15 +169,15 @@ def _place_links(robot: Robot) -> tuple[dict[str, _Frame], list[tuple[Joint, _Fr
 
 
 def _child_frame(
-    robot: Robot,
     joint: Joint,
     frames: dict[str, _Frame],
     moving: list[tuple[Joint, _Frame]],
-    held: float,
+    held: float | None,
 ) -> _Frame:
+    """Return the frame of a joint's child, held at a position (rad, m) or moving (None)."""
     parent = frames[joint.parent]
     turned = _plain_matrix(matmul(parent.rotation, joint.rotation))
-    if joint.name in robot.joint_names:
+    if held is None:
         number = len(moving)
         moving.append((joint, parent))
         return _Frame(number, turned, ZERO)

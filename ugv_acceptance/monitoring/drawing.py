@@ -13,7 +13,7 @@ from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.stability import stances_of, standing
-from ugv_acceptance.model.tree import Tree, point_of, pose_of
+from ugv_acceptance.model.tree import Tree, body_positions, drives_of, point_of, pose_of
 
 # Points of one body closer together than this (m) are drawn as one.
 _SAME = 0.02
@@ -68,11 +68,11 @@ def figure_of(robot: Robot) -> Figure:
     mechanics = mechanics_of(robot)
     tree = mechanics.tree
     tips = _tips(robot, tree)
-    order = [robot.joint_names.index(body.joint) for body in tree.bodies[1:]]
+    drives = drives_of(robot, tree)
 
     def formula(*inputs: Any) -> list[Any]:  # noqa: ANN401 - floats, or the kernel's symbols
         *q, x, y, z = inputs
-        pose = pose_of(tree, [q[j] for j in order])
+        pose = pose_of(tree, body_positions(drives, q))
         found: list[Any] = [
             (pose.origin[body], add(pose.origin[body], rotate(pose.rotation[body], tip)))
             for body, tip in tips
@@ -82,7 +82,7 @@ def figure_of(robot: Robot) -> Figure:
         return found
 
     kernel = compile_kernel(formula, [*robot.joint_names, 'x', 'y', 'z'])
-    joints = tuple(tree.bodies[body].joint for body, _ in tips)
+    joints = tuple(robot.joint_names[drives[body - 1].joint] for body, _ in tips)
     return Figure(mechanics, joints, kernel, _box(robot, tree))
 
 

@@ -9,6 +9,7 @@ from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.carrying import CarryingJoints, name_measured
 from ugv_acceptance.evaluation.chassis.examination import ChassisExamination
 from ugv_acceptance.evaluation.criteria.assumptions import assumptions, unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -103,6 +104,7 @@ def judge(
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
+    name_measured(data, statements)
     findings = Findings(
         asked, ordered(log), data, Bounds(settings, sources), statements, reading.held.doubtful
     )
@@ -122,11 +124,12 @@ def _examinations(
 ) -> tuple[Examination, ...]:
     """Return what looks at a run beside its criteria."""
     return (
-        ModelCheck(settings, sources),
+        ModelCheck(settings, sources, lambda: evaluator.carrying),
         ImuExamination(evaluator.imu),
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
+        CarryingJoints(settings, limits.payloads.at, lambda: evaluator.carrying),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
         GroundExamination(settings, criteria, evaluator.watch.trend, evaluator.watch.log),
     )

@@ -9,6 +9,8 @@ DASH = '\N{EN DASH}'
 MISSING = 0.05
 # From here on the digits of a number are counted, not read, and no column holds them.
 LONG = 1e6
+# Lines about joints that carried the robot.
+_MOST_CARRYING = 4
 
 
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
@@ -191,6 +193,25 @@ def not_checked_lines(result: Json) -> list[str]:
 def _unchecked(one: Json) -> str:
     seconds = f' ({one["seconds"]:.1f} s)' if one['seconds'] is not None else ''
     return f'{one["what"]}{seconds}: {one["why"]}'
+
+
+def carrying_lines(result: Json) -> list[str]:
+    """Return what joints held that carried the robot, at their worst moments: the most used few."""
+    told = result.get('carrying', {})
+    order = sorted(told, key=lambda name: -abs(told[name]['even']) / (told[name]['limit'] or 1e9))
+    lines = [_carried(name, told[name]) for name in order[:_MOST_CARRYING]]
+    more = len(order) - len(lines)
+    return [*lines, *([f'and {more} more joints carried it (--json FILE lists all)'] * (more > 0))]
+
+
+def _carried(name: str, told: Json) -> str:
+    unit, numbers = told['unit'], {k: number_text(told[k]) for k in ('hanging', 'even')}
+    ends = f'{number_text(told["least"])} to {number_text(told["most"])}'
+    return (
+        f'{name} carried the robot: {numbers["even"]} {unit} at {told["time_s"]:.1f} s with the '
+        f'weight spread evenly, {ends} {unit} cannot be excluded (hanging in the air: '
+        f'{numbers["hanging"]} {unit})'
+    )
 
 
 def interval_text(found: Json | None, unit: str = '') -> str:

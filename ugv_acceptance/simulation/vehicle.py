@@ -1,7 +1,8 @@
 """A robot as a MuJoCo model: its bodies, joints and motors on a ground it can tip over on.
 
 The model is made from the links and joints of the Robot, not from the compiled mechanics, so that
-MuJoCo checks those. Every link is a body with the link's own axes; a point-like link gets the least
+MuJoCo checks those. The constant part of a joint's law is left out. Every link is a body with
+the link's own axes; a point-like link gets the least
 inertia MuJoCo takes. Ground slopes come from the direction of gravity: see `gravity_on_slope`.
 """
 
@@ -12,7 +13,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Payload, Robot, Vector
+from ugv_acceptance.model.robot import (
+    IDENTITY,
+    Contact,
+    Joint,
+    Law,
+    Link,
+    Payload,
+    Robot,
+    Vector,
+)
 from ugv_acceptance.simulation import shape
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.shape import numbers
@@ -135,6 +145,7 @@ def mjcf_of(robot: Robot, build: Build) -> str:
     if build.wheels:
         wheels, blocks = _wheels(robot, build), len(build.blocks)
         shape.add_pairs(root, robot, wheels, blocks, build.friction, build.contact_time)
+    _add_mimics(root, robot)
     _add_motors(root, robot, build)
     _add_sensors(root, robot)
     return ET.tostring(root, encoding='unicode')
@@ -168,8 +179,8 @@ def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
 
 
 def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> ET.Element:
-    """Add the child link of `joint`; a joint that no message reports is rigid, as held."""
-    moving = joint.name in robot.joint_names
+    """Add the child link of `joint`; one neither measured nor a follower is held."""
+    moving = joint.name in robot.joint_names or joint.name in {m.joint for m in robot.mimics}
     held = 0.0 if moving else dict(robot.held).get(joint.name, 0.0)
     rotation, shift = np.array(joint.rotation), np.array(joint.xyz)
     axis = np.array(joint.axis)
@@ -184,6 +195,7 @@ def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> E
     ET.SubElement(body, 'site', name=f'joint:{joint.name}')
     if moving:
         kind = 'slide' if joint.slides else 'hinge'
+        law = next((law for law in robot.laws if law.joint == joint.name), Law(joint.name))
         ET.SubElement(
             body,
             'joint',
@@ -191,6 +203,8 @@ def _add_body(parent: ET.Element, robot: Robot, joint: Joint, build: Build) -> E
             type=kind,
             axis=numbers(joint.axis),
             armature=repr(build.armature),
+            stiffness=repr(law.stiffness),
+            springref=repr(law.rest),
         )
     return body
 
@@ -212,6 +226,16 @@ def _add_mass(body: ET.Element, link: Link) -> None:
         mass=numbers([max(link.mass, LEAST)]),
         fullinertia=numbers((*diagonal, xy, xz, yz)),
     )
+
+
+def _add_mimics(root: ET.Element, robot: Robot) -> None:
+    """Tie each joint that follows another to it."""
+    if not robot.mimics:
+        return
+    ties = ET.SubElement(root, 'equality')
+    for mimic in robot.mimics:
+        law = numbers((mimic.offset, mimic.multiplier, 0.0, 0.0, 0.0))
+        ET.SubElement(ties, 'joint', joint1=mimic.joint, joint2=mimic.follows, polycoef=law)
 
 
 def _add_motors(root: ET.Element, robot: Robot, build: Build) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.type_aliases import Floats
 
@@ -81,8 +82,22 @@ def basis(robot: Robot, joint: int, values: Floats) -> Floats:
     return _basis(values, prismatic=_prismatic(robot, joint))
 
 
+def check_alone(robot: Robot, joint: str) -> None:
+    """Raise BadConfig for a joint of which torques are no sinusoid: with a spring or followers."""
+    follows = [mimic.joint for mimic in robot.mimics if mimic.follows == joint]
+    sprung = any(law.joint == joint and law.stiffness for law in robot.laws)
+    if follows or sprung:
+        why = 'a spring acts on it' if sprung else f'{", ".join(follows)} moves with it'
+        raise BadConfig(f'joint {joint}: expected one that moves alone and without a spring: {why}')
+
+
 def form_of(robot: Robot, grid: Grid, function: Callable[[Floats], Floats]) -> Floats:
-    """Return the forms K (k, 3, 3) of the k quantities that `function` returns for postures."""
+    """Return the forms K (k, 3, 3) of the k quantities that `function` returns for postures.
+
+    Raises BadConfig for a joint with a spring, or that others follow: then there is no such form.
+    """
+    for k in (grid.first, grid.second):
+        check_alone(robot, robot.joint_names[k])
     few = Grid(grid.first, grid.second, _NODES, _NODES, grid.q)
     left, right = (_INVERSE[_prismatic(robot, k)] for k in (grid.first, grid.second))
     values = function(few.postures())

@@ -197,13 +197,8 @@ def _affine(cog: Floats, start: Floats, direction: Floats) -> Floats:
 def _fixed_contacts(robot: Robot, grid: Grid) -> list[Floats] | None:
     """Return the contact points (m, `base_link`); None if one moves with a joint of the grid."""
     mechanics = mechanics_of(robot)
-    names = {robot.joint_names[k] for k in (grid.first, grid.second)}
-    for contact in robot.contacts:
-        body = mechanics.tree.frames[contact.link][0]
-        while body > 0:
-            if mechanics.tree.bodies[body].joint in names:
-                return None
-            body = mechanics.tree.bodies[body].parent
+    if {grid.first, grid.second} & {joint for joint, _ in mechanics.carried}:
+        return None
     posture = posture_of(mechanics, [float(x) for x in grid.q], 0.0, (0.0, 0.0, 0.0))
     return [np.array(point, dtype=np.float64) for point in posture.contacts]
 

@@ -27,10 +27,19 @@ from ugv_acceptance.model.expressions import (
     transpose,
 )
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
-from ugv_acceptance.model.mechanics import mechanics_of
+from ugv_acceptance.model.mechanics import laws_of, mechanics_of
 from ugv_acceptance.model.robot import NO_INERTIA, Link, Robot
 from ugv_acceptance.model.support import flat_polygon, pairs
-from ugv_acceptance.model.tree import Pose, Tree, point_of, pose_of, tree_of
+from ugv_acceptance.model.tree import (
+    Pose,
+    Tree,
+    body_positions,
+    drives_of,
+    folded,
+    point_of,
+    pose_of,
+    tree_of,
+)
 
 AXES = ('x', 'y', 'z')
 
@@ -135,16 +144,17 @@ def _outputs(
     judged: Sequence[str],
 ) -> tuple[list[Scalar], _Stand]:
     tree = _moved(tree, values)
-    joints = [body.joint for body in tree.bodies[1:]]
-    place = {name: float(fixed[k]) for k, name in enumerate(robot.joint_names)}
-    q = [values.get(f'{name}.position', place[name]) for name in joints]
-    rates = [values.get(f'{name}.rate', 0.0) for name in joints]
-    pose = pose_of(tree, q)
+    names, drives = robot.joint_names, drives_of(robot, tree)
+    q = [values.get(f'{name}.position', float(fixed[k])) for k, name in enumerate(names)]
+    own = [values.get(f'{name}.rate', 0.0) for name in names]
+    rates = [own[d.joint] * d.multiplier for d in drives]
+    pose = pose_of(tree, body_positions(drives, q))
     gravity = _gravity(robot.gravity, values)
     loads = _loads(robot, tree, pose, values)
-    motion = motion_of(tree, pose, rates, [0.0] * len(q), gravity)
-    forces = joint_forces(tree, pose, motion, loads)
-    torques = [forces[joints.index(name)] for name in judged]
+    motion = motion_of(tree, pose, rates, [0.0] * len(rates), gravity)
+    forces = folded(drives, joint_forces(tree, pose, motion, loads), len(names))
+    laws = laws_of(robot, q) or (0.0,) * len(names)
+    torques = [forces[k] - laws[k] for k in (names.index(name) for name in judged)]
     contacts = [point_of(tree, pose, c.link, c.position)[1] for c in robot.contacts]
     mass, x, y, z = _weight(tree, pose, loads)
     return torques, _Stand(mass, (x, y, z), gravity, contacts)

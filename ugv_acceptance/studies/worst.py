@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
+from ugv_acceptance.studies.bilinear import check_alone
 from ugv_acceptance.studies.intervals import TURN, Intervals, intersect, where_cosine_between
 from ugv_acceptance.type_aliases import Floats
 
@@ -40,6 +41,7 @@ def torque_waves(
     """
     if robot.joint(joint).slides:
         raise BadConfig(f'joint {joint}: expected a turning joint, it slides')
+    check_alone(robot, joint)
     nodes = np.array([0.0, TURN / 3.0, -TURN / 3.0])
     postures = np.tile(np.asarray(q, dtype=np.float64), (3, 1))
     postures[:, robot.joint_names.index(joint)] = nodes

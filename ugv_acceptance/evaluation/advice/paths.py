@@ -14,7 +14,7 @@ from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import STANDING, stability
-from ugv_acceptance.model.tree import point_of, pose_of
+from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of
 from ugv_acceptance.type_aliases import Floats
 
 # Duration of a path (s) and its number of steps; a joint that moves contact points takes finer
@@ -120,13 +120,13 @@ def _arm_heights(mechanics: Mechanics) -> Kernel:
     Joints that carry contact points, such as flippers, do not belong to the arm.
     """
     robot, tree = mechanics.robot, mechanics.tree
-    names = [body.joint for body in tree.bodies]
+    names, drives = [body.joint for body in tree.bodies], drives_of(robot, tree)
     arm = [
         k for k in range(1, len(names)) if not _moves_contacts(robot, robot.joint(names[k]).child)
     ]
 
     def formula(*q: Scalar) -> tuple[Any, ...]:
-        pose = pose_of(tree, [q[robot.joint_names.index(name)] for name in names[1:]])
+        pose = pose_of(tree, body_positions(drives, q))
         found = [pose.origin[k] for k in arm]
         if robot.payload_link is not None:
             found.append(point_of(tree, pose, robot.payload_link, robot.payload.cog)[1])

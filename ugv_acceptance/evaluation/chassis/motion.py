@@ -19,7 +19,7 @@ from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import IDENTITY, Payload, Vector
 from ugv_acceptance.model.stability import Stance, standing
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
-from ugv_acceptance.model.tree import point_of, pose_of
+from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of
 
 Four = tuple[float, ...]
 
@@ -293,9 +293,10 @@ def witnessed(rate: Sequence[Any], gravity: Sequence[Any], before: Sequence[Any]
 
 def reach_of(mechanics: Mechanics, imu: Vector) -> float:
     """Return the distance (m) from the IMU to the furthest contact, all joints at zero."""
-    tree = mechanics.tree
-    pose = pose_of(tree, [0.0] * (len(tree.bodies) - 1))
-    feet: Any = [point_of(tree, pose, c.link, c.position)[1] for c in mechanics.robot.contacts]
+    robot, tree = mechanics.robot, mechanics.tree
+    zero = body_positions(drives_of(robot, tree), [0.0] * len(robot.joint_names))
+    pose = pose_of(tree, zero)
+    feet: Any = [point_of(tree, pose, c.link, c.position)[1] for c in robot.contacts]
     return max((math.dist(foot, imu) for foot in feet), default=0.0)
 
 

@@ -35,6 +35,7 @@ def assumptions(
     """
     found = [
         *_ground(settings),
+        *(NotChecked('contact points', words) for words in settings.moved_contacts),
         *_load(settings, first_payload),
         *not_judged(settings),
         *_demands(measurement),

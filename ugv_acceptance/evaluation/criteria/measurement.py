@@ -45,7 +45,8 @@ class ValueMeasure:
 
     `worst` holds the worst rows, at most one per part of the recording, the worst first; `first`
     is the first row in violation. `evaluated` (ns) is the time with a known value, `violation`
-    the spans in violation, `kept` those without (for `dwell` only).
+    the spans in violation, `kept` those without (for `dwell` only), `violators` the joints or sides
+    that were in violation.
     """
 
     criterion: Criterion
@@ -58,6 +59,7 @@ class ValueMeasure:
     first: Moment | None = None
     violation: Spans = field(default_factory=Spans)
     kept: Spans = field(default_factory=Spans)
+    violators: set[str] = field(default_factory=set)
     _last: tuple[int, int, float] | None = None
 
     @property
@@ -128,10 +130,20 @@ class ValueMeasure:
         if self.first is None and self._bad(values[[k]])[0]:
             at = int(self._bad(values).argmax())
             self.first = self._moment(rows, at, float(values[at]))
+        if self._bad(values[[k]])[0]:
+            self._name_violators(rows)
         if len(self.worst) == CANDIDATES and order[k] >= sign * self.worst[-1].value:
             return
         moments = [*self.worst, self._moment(rows, k, float(values[k]))]
         self.worst = nsmallest(CANDIDATES, moments, key=lambda m: sign * m.value)
+
+    def _name_violators(self, rows: MarginRows) -> None:
+        kind, of = SIGNALS[self.demand.signal], self.demand.of
+        names = subjects_of(kind, self.settings)
+        bad = np.asarray(self._bad(kind.of(rows, self.settings)).any(axis=0))
+        self.violators.update(
+            name for name, any_bad in zip(names, bad, strict=True) if any_bad and of in (ANY, name)
+        )
 
     def _moment(self, rows: MarginRows, k: int, value: float) -> Moment:
         j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])

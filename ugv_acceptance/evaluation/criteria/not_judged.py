@@ -52,6 +52,9 @@ def kept_words(settings: Settings, *, rough: bool = False) -> str:
 def not_judged(settings: Settings) -> Iterator[NotChecked]:
     """Yield what no recording of this robot can tell by its configuration."""
     yield from not_judged_joints(settings)
+    if settings.passive:
+        why = 'declared as passive: a spring, a damper or a stop holds it, no motor'
+        yield NotChecked(f'torque of {", ".join(settings.passive)}', why)
     if not settings.hears_imu:
         yield NotChecked('tip-over', 'no IMU: the base was declared level')
     if not settings.hears_joints:
@@ -61,7 +64,11 @@ def not_judged(settings: Settings) -> Iterator[NotChecked]:
 def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
     """Yield the joints that carry torque (force where prismatic) and have no limit."""
     robot, limits = settings.robot, settings.limits.torque
-    names = [n for n, limit in zip(robot.joint_names, limits, strict=True) if math.isinf(limit)]
+    names = [
+        name
+        for name, limit in zip(robot.joint_names, limits, strict=True)
+        if math.isinf(limit) and name not in settings.passive
+    ]
     if not names:
         return
     heavy = carried(robot) if len(robot.joint_names) <= MOST_JOINTS else {}

@@ -11,6 +11,7 @@ from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
+from ugv_acceptance.evaluation.carrying import judged_by_effort
 from ugv_acceptance.evaluation.criteria.criteria import (
     CAUTIOUS,
     FAIL,
@@ -100,6 +101,8 @@ def _from_margins(data: Json) -> Iterator[Objection]:
         yield Objection('tipping', FAIL, reason)
     for name, joint in data['torque'].items():
         most, unit = joint['max_abs'], joint['unit']
+        if name in judged_by_effort(data):  # by the safeguard measured_effort
+            continue
         if most is not None and most >= joint['limit']:
             reason = (
                 f'at {joint["time_of_min_s"]:.2f} s: {name} needs {most:.1f} {unit}; its limit is '

@@ -42,13 +42,15 @@ class Statement:
     """What an examination found: its part of the `result` by key, objections, what is unchecked.
 
     `unfounded` are alerts (code, subject) that rest on what turned out to be no measurement: they
-    stay in the log, but are no objections.
+    stay in the log, but are no objections. `torques` are the joints whose measured effort is known
+    to be their torque.
     """
 
     result: Mapping[str, object] = field(default_factory=dict)
     objections: tuple[Objection, ...] = ()
     not_checked: tuple[NotChecked, ...] = ()
     unfounded: frozenset[tuple[str, str]] = frozenset()
+    torques: frozenset[str] = frozenset()
 
 
 class Examination(Protocol):

@@ -18,6 +18,7 @@ from ugv_acceptance.evaluation.criteria.quantities import shown
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.edges import corners_of, edges_of
 from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
+from ugv_acceptance.model.reactions import standing_torque
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.model.stability import SIDES, stances_of, standing, tip_angles_of
 from ugv_acceptance.model.statics import torque_of
@@ -167,6 +168,8 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
 
     def margins(at: _Point) -> Floats:
         posture: Any = _posture(at)
+        hanging = torque_of(posture, at.gravity)
+        torque = standing_torque(mechanics, posture, footing.points, at.gravity, hanging)
         terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]
         near = footings_of(mechanics, posture.contacts, moved=True)
         rocking = [f.rocking for f in near if f.polygon == footing.polygon] or [footing.rocking]
@@ -178,7 +181,7 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
             edges=edges,
         )
         angle, _ = tip_angles_of(moved, at.gravity)
-        return np.array([*torque_of(posture, at.gravity), *angle], dtype=np.float64)
+        return np.array([*torque, *angle], dtype=np.float64)
 
     return margins
 

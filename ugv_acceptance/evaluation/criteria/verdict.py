@@ -5,9 +5,11 @@ than the bound of its uncertainty.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
+from ugv_acceptance.evaluation.carrying import judged_by_effort
 from ugv_acceptance.evaluation.criteria.criteria import (
     ANY,
     FAIL,
@@ -63,11 +65,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     if not measure.samples:
         return Outcome(INCONCLUSIVE, f'{criterion.name}: {NO_VALUE}', measured)
     if not _met(measure):
-        if measure.demand.dwell is not None and short:
-            return Outcome(INCONCLUSIVE, short, measured, evidence)
-        return Outcome(
-            FAIL, violation_words(measure, findings.settings, measured), measured, evidence
-        )
+        return _violated(measure, findings, short, Outcome(FAIL, '', measured, evidence))
     short = short or _only_a_bound(measure, findings)
     if short:
         return Outcome(INCONCLUSIVE, short, measured, evidence)
@@ -94,6 +92,38 @@ def _only_a_bound(measure: ValueMeasure, findings: Findings) -> str | None:
         return None
     said = findings.data.get('ground', {}).get('objections', ())
     return said[0] if said else f'{measure.criterion.name}: the ground was not flat'
+
+
+def _violated(
+    measure: ValueMeasure, findings: Findings, short: str | None, found: Outcome
+) -> Outcome:
+    """Return the outcome `found`, with its reason, of a value that was beyond its limit."""
+    if measure.demand.dwell is not None and short:
+        return replace(found, verdict=INCONCLUSIVE, reason=short)
+    words = violation_words(measure, findings.settings, found.measured)
+    if not _by_effort(measure, findings):
+        return replace(found, reason=words)
+    if measure.demand.of == ANY or short:
+        reason = short or f'{words}; {ONE_BY_ONE}'
+        return replace(found, verdict=INCONCLUSIVE, reason=reason)
+    return replace(found, verdict=PASS, reason=f'{measure.criterion.name}: {BY_EFFORT}')
+
+
+# Why a joint that carries the robot passes although the even spread is beyond its limit.
+BY_EFFORT = 'it carries the robot, so its measured torque is judged, not the evenly spread weight'
+ONE_BY_ONE = (
+    'but it carries the robot and has a measured torque: demand this of each joint by itself'
+)
+
+
+def _by_effort(measure: ValueMeasure, findings: Findings) -> bool:
+    """Return whether all joints in violation carry the robot and have a measured torque."""
+    of_torque = _ALERT_OF.get(measure.demand.signal) == 'TORQUE_LIMIT'
+    return (
+        of_torque
+        and bool(measure.violators)
+        and measure.violators <= judged_by_effort(findings.data)
+    )
 
 
 def _decides(criterion: Criterion, findings: Findings) -> bool:

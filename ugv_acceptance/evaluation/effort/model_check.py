@@ -5,7 +5,7 @@ meaning allows: bias, scale and friction of torques, what was carried, measured 
 differences from the model larger than the margin that was left.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,11 +37,13 @@ class ModelCheck:
     """Gathers samples of a run (at most ten a second) and compares them with the model.
 
     It is an examination: its statement is `model_check` of the result, objections, and which
-    efforts could not be used. `sources` are the uncertainty of the model, as configured.
+    efforts could not be used. `sources` are the uncertainty of the model, as configured, `carrying`
+    the numbers of the joints that carried the robot so far.
     """
 
     settings: Settings
     sources: tuple[Source, ...] = ()
+    carrying: Callable[[], Collection[int]] = tuple
     _samples: Sampler = field(default_factory=lambda: Sampler(SPACING))
     _limits: MeasuredLimits = field(init=False)
 
@@ -75,14 +77,16 @@ class ModelCheck:
         del end
         found = self.understanding()
         loads = tuple(_load_objections(found, start))
-        objections = (*self._limits.objections(found.joints, start), *loads)
+        told = self._limits.objections(found.joints, start, self.carrying())
+        objections = (*told, *loads)
         result = {'model_check': self.result(found, start)}
         # An encoder is called frozen because the effort changed: not by an effort in another unit.
         # But an effort that hardly follows the torque may look like one because the encoder is.
         other_unit = [x for x in found.joints if in_another_unit(x, found.joints)]
         no_torque = [x.joint for x in other_unit if x.ratio and x.ratio.spread <= SURE_UNIT]
         unfounded = frozenset(('ENCODER_FROZEN', name) for name in no_torque)
-        return Statement(result, objections, tuple(_not_checked(found)), unfounded)
+        known = frozenset(joint.joint for joint in found.joints if joint.sign is not None)
+        return Statement(result, objections, tuple(_not_checked(found)), unfounded, known)
 
     def result(self, found: Understanding, start: int) -> Json:
         """Return the comparison for JSON: joints, loads, contacts, share of slow samples."""

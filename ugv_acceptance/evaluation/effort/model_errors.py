@@ -7,6 +7,7 @@ independent such errors look like loads that nobody carries.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -15,8 +16,11 @@ from ugv_acceptance.evaluation.criteria.uncertainty import (
     Source,
     torque_effects,
 )
-from ugv_acceptance.model.mechanics import mechanics_of
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.reactions import reactions_of
 from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.row_selection import pick
+from ugv_acceptance.model.stability import many_stances, many_standing
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.type_aliases import Floats
 
@@ -63,7 +67,7 @@ def sources_for(robot: Robot, configured: Sequence[Source]) -> tuple[Source, ...
         if body.mass > 0.0 and not any((x.name, 'cog') in told for x in mine):
             reach = COG * body.mass / heaviest.mass
             found += [Source('', heaviest.name, 'cog', reach, axis) for axis in range(3)]
-        if (body.joint, 'offset') not in told:
+        if body.joint in robot.joint_names and (body.joint, 'offset') not in told:
             found.append(Source('', body.joint, 'offset', SLIDE if body.prismatic else TURN))
     return tuple(found)
 
@@ -126,3 +130,27 @@ def model_errors(
     effects = torque_effects(robot, sources, q, gravity, Payload(load, robot.payload.cog))
     found: Floats = effects[np.abs(effects).max(axis=(1, 2), initial=0.0) > 0.0]
     return found
+
+
+def spread_errors(robot: Robot, q: Floats, gravity: Floats, load: float) -> Floats:
+    """Return how far (s, P, j) joints that carry may be off the even spread of the weight.
+
+    Evenly distributed over what balance leaves open, in each of P postures (P, j) by itself.
+    """
+    mechanics, count = mechanics_of(robot), len(q)
+    if not mechanics.carried or not count:
+        return np.zeros((0, *q.shape))
+    posture = posture_of(mechanics, list(q.T), load, robot.payload.cog)
+    wide = np.zeros(q.shape)
+    down: Any = tuple(gravity.T)
+    stances = many_stances(mechanics, posture, count)
+    for rows, stance in many_standing(stances, count, np.arange(count), down):
+        fields = posture.torque_gradients, posture.mass, posture.cog, posture.contacts
+        some = type(posture)(*pick((*fields, posture.loads, posture.laws), rows))
+        found = reactions_of(mechanics, some, stance.points, pick(down, rows))
+        for j in found.carrying:
+            wide[rows, j] = (found.most[j] - found.least[j]) / np.sqrt(12.0)
+    postures, joints = np.nonzero(wide)
+    errors = np.zeros((len(postures), *q.shape))
+    errors[np.arange(len(postures)), postures, joints] = wide[postures, joints]
+    return errors

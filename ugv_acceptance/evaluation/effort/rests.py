@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.effort.model_errors import (
     model_errors,
     sizes_of,
     sources_for,
+    spread_errors,
 )
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
@@ -188,6 +189,7 @@ def arm_of(
         declared = np.where(power > 0.0, felt / np.where(power > 0.0, power, 1.0), 0.0)
     load = float(declared.mean()) if len(declared) else 0.0
     known = sources_for(robot, sources)
-    errors = model_errors(robot, known, rests.q, rests.gravity, max(load, 0.0))
+    at = (rests.q, rests.gravity, max(load, 0.0))
+    errors = np.concatenate((model_errors(robot, known, *at), spread_errors(robot, *at)))
     arm = Arm(rests.effort, rests.torque, lever, declared, errors, sizes.torque, sizes.most)
     return arm, sizes
