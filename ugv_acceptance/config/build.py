@@ -16,6 +16,7 @@ from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.model.clearance import arm_links
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 
 T = TypeVar('T')
@@ -215,7 +216,7 @@ def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
     load = Payload() if file.payload is None else Payload(file.payload.mass, file.payload.cog)
     if (total := math.fsum(link.mass for link in bodies)) < LEAST_MASS:
         raise build.refuse(('urdf',), f'expected a robot with mass, got {total:g} kg in all links')
-    return Robot(
+    robot = Robot(
         file.robot.name,
         bodies,
         build.urdf.joints,
@@ -228,6 +229,8 @@ def _robot(build: Build, measured: tuple[str, ...]) -> Robot:
         file.ground.height,
         file.ground.tolerance,
     )
+    arm = arm_links(robot)
+    return replace(robot, shapes=tuple(s for s in build.urdf.shapes if s.link in arm))
 
 
 def _links(build: Build, names: list[str]) -> Iterable[Link]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ugv_acceptance.model.robot import Contact, Matrix, Robot, Vector
+from ugv_acceptance.model.robot import Contact, Robot, Shape
 from ugv_acceptance.model.tree import Pose, Tree, in_body, pose_of, tree_of
 from ugv_acceptance.type_aliases import Floats
 
@@ -19,20 +19,6 @@ SLACK = 0.05
 AS_LARGE = 0.75
 # Lowest and highest corner (3,) of an extent along the axes, m.
 Box = tuple[Floats, Floats]
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """One collision geometry of a link: `size` is its half extent (m) along its own axes.
-
-    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None).
-    """
-
-    link: str
-    kind: str
-    xyz: Vector
-    rotation: Matrix
-    size: Vector | None
 
 
 @dataclass(frozen=True, slots=True)

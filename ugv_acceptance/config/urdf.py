@@ -13,9 +13,17 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.contact_check import Shape
 from ugv_acceptance.config.units import LARGEST, shown
-from ugv_acceptance.model.robot import IDENTITY, NO_INERTIA, ZERO, Joint, Link, Matrix, Vector
+from ugv_acceptance.model.robot import (
+    IDENTITY,
+    NO_INERTIA,
+    ZERO,
+    Joint,
+    Link,
+    Matrix,
+    Shape,
+    Vector,
+)
 
 KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
 

@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
     WITNESSED,
     ChassisMotion,
 )
+from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
@@ -24,6 +25,7 @@ from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.clearance import Face, face_of
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.sliding import slides_first
@@ -60,7 +62,8 @@ class LiveEvaluator:
 
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
-    newest that could be used; while not `load_known`, the newest declared could not.
+    newest that could be used; while not `load_known`, the newest declared could not. `ground` says
+    whether the arm touches the ground.
     """
 
     settings: Settings
@@ -73,6 +76,7 @@ class LiveEvaluator:
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisMotion = field(init=False)
+    ground: GroundContact = field(init=False)
     _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
     _stance: Stance | None = None
@@ -88,6 +92,7 @@ class LiveEvaluator:
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
         self._chassis = ChassisMotion(self.settings, self.watch.chassis)
+        self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
         self._level = not self.settings.hears_imu
@@ -102,7 +107,7 @@ class LiveEvaluator:
         """Begin to listen at `now` (ns): an input of which no message comes will become stale."""
         for fresh in self._fresh:
             fresh.started = now
-        self._began = now
+        self._began = self.ground.start = now
 
     def joint_state(
         self,
@@ -158,6 +163,7 @@ class LiveEvaluator:
         self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
         self._stance = stance_of(self._mechanics, self._posture)
         self._chassis.stands = self._stance, tuple(self._joints.q), load
+        self.ground.stands(self._joints.q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -227,7 +233,7 @@ class LiveEvaluator:
         carried = settings.robot.payload
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
-        self.settings = self.watch.settings = settings
+        self.settings = self.watch.settings = self.ground.settings = settings
         self._imu.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
@@ -307,12 +313,17 @@ class LiveEvaluator:
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
         posture, gravity, until = self._posture, self._gravity, self._alive_until()
         unknown = posture is None or self._stance is None or gravity[0] != gravity[0]
-        if unknown or now > until or (self._known_until is not None and now > self._known_until):
+        unknown = unknown or now > until
+        touch = FREE if unknown else self.ground.step(now, self._face)
+        unknown = unknown or touch == UNSUPPORTED
+        if unknown or (self._known_until is not None and now > self._known_until):
             self._lose(now)
-        if posture is None or self._stance is None or unknown or now > until:
+        if posture is None or self._stance is None or unknown:
             return None
         self._known_until = until
         torque: Any = torque_of(posture, gravity)
+        if touch == PERMITTED:
+            torque = (math.nan,) * len(torque)
         stability = NOT_KNOWN if self._level else stability_of(self._stance, gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)
@@ -323,12 +334,21 @@ class LiveEvaluator:
             prediction.keep(now, stability.angle, torque, self._joints.effort, q)
         return self.margins
 
+    @property
+    def _face(self) -> Face:
+        """The contact points whose plane is the ground; None: the tracks' plane."""
+        if self._level or self._stance is None:
+            return None
+        support = self._stance.support
+        return face_of(support.polygon, raised=support.raised)
+
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:
         watch = self.watch
         angles: Any = stability.angle
         for (warn, error), tau in zip(watch.torque, torque, strict=True):
             value = abs(tau)
             if value >= warn.on or not (warn.quiet and error.quiet):
+                value = -math.inf if math.isnan(value) else value  # not known is not too much
                 warn.step(now, value)
                 error.step(now, value)
         if self._level:

@@ -10,6 +10,8 @@ from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
 LEVEL = 'level'
+# The times in which the hand may touch the ground, if it always may.
+ALWAYS = ((0.0, float('inf')),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +105,8 @@ class Settings:
 
     `unsafe` is the reason for limits beyond the ranges of permitted_limits.py; '' if none is. With
     `payload_known` the robot's payload is that carried until another is declared; without it, it is
-    only assumed.
+    only assumed. `hand_may_touch` are the times (from, to in s since the start) in which the arm
+    may touch the ground, to pick something up: torques are not known while it does.
     """
 
     robot: Robot
@@ -113,6 +116,7 @@ class Settings:
     delays: Delays = Delays()
     unsafe: str = ''
     payload_known: bool = False
+    hand_may_touch: tuple[tuple[float, float], ...] = ()
 
     @property
     def hears_joints(self) -> bool:

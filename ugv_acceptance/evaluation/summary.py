@@ -258,6 +258,8 @@ def alert_record(
 def _peak(alert: Alert) -> float | None:
     if alert.rule.code == 'TIP_OVER':
         return float(np.degrees(-alert.peak))
+    if alert.rule.code == 'ARM_ON_GROUND':
+        return -float(alert.peak)
     return float(alert.peak) if np.isfinite(alert.peak) else None
 
 

@@ -84,6 +84,20 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class Shape:
+    """One collision geometry of a link: `size` is its half extent (m) along its own axes.
+
+    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None).
+    """
+
+    link: str
+    kind: str
+    xyz: Vector
+    rotation: Matrix
+    size: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
 class Payload:
     """A load carried by the payload link: mass (kg) and centre of gravity in its axes (m)."""
 
@@ -99,7 +113,8 @@ class Robot:
     movable joints that are not among them are held at the value `held` pairs with their name, else
     at 0.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
-    how far from it a point still stands on the ground.
+    how far from it a point still stands on the ground. `shapes` is the collision geometry of what
+    is held above the ground (clearance.py).
     """
 
     name: str
@@ -113,6 +128,7 @@ class Robot:
     gravity: float = 9.81
     ground: float = 0.0
     contact_tolerance: float = 0.001
+    shapes: tuple[Shape, ...] = ()
 
     @property
     def root(self) -> str:

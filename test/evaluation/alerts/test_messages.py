@@ -5,7 +5,8 @@ import math
 import pytest
 from evaluation.streams import T0, settings
 
-from ugv_acceptance.evaluation.alerts.messages import advice, describe, tilt_left
+from ugv_acceptance.evaluation.alerts.messages import advice, describe
+from ugv_acceptance.evaluation.alerts.robot_words import tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.settings import Limits
 

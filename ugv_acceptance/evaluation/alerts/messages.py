@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
+from ugv_acceptance.evaluation.alerts.robot_words import height, moving, tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
@@ -81,6 +82,14 @@ ALERTS = {
         'stop; check that the robot stands on its tracks',
         FailureSource.INTERACTION,
         'The robot does not stand on its contact points: it is tipping or hanging.',
+    ),
+    'ARM_ON_GROUND': AlertText(
+        'the arm stands on the ground, or so it seems: {height} the plane on which the robot'
+        ' stands, so no margin is valid',
+        'lift the arm; if it is to touch the ground, say so (hand_may_touch); if it does not,'
+        ' check the zeros of its joints and the contact points',
+        FailureSource.INTERACTION,
+        'The arm touches the ground, which then carries a part of the robot: no margin is valid.',
     ),
     'STATIC_MODEL': AlertText(
         '{subject} moves at {peak:.2f} {rate}; margins are valid only up to {limit:.2f} {rate}',
@@ -345,7 +354,8 @@ def describe(alert: Alert, settings: Settings) -> str:
         unit=units.effort,
         rate=units.rate,
         tilt=tilt_left(peak),
-        moving=_moving(math.degrees(-alert.peak)),
+        moving=moving(math.degrees(-alert.peak)),
+        height=height(-alert.peak),
         degrees=math.degrees(alert.peak),
         slope=max(math.degrees(-alert.peak), 0.0),
         seconds=-rule.on,
@@ -371,20 +381,6 @@ def _torque(subject: str, settings: Settings) -> float:
     """Return the limit (N m; N) of a joint; infinite for a subject that is not a joint."""
     names = settings.robot.joint_names
     return settings.limits.torque[names.index(subject)] if subject in names else math.inf
-
-
-def tilt_left(degrees: float) -> str:
-    """Return in words how much tilt is left, or how far the robot is past its tipping point."""
-    if degrees >= 0.0:
-        return f'{degrees:.1f} degrees of tilt left before the robot tips'
-    return f'the robot is {-degrees:.1f} degrees past its tipping point'
-
-
-def _moving(degrees: float) -> str:
-    """Return in words what the turn of a robot leaves of its tilt."""
-    if degrees >= 0.0:
-        return f'at the rate it turns, {degrees:.1f} degrees of tilt are left before it tips'
-    return 'the robot turns so fast that it will tip over'
 
 
 def advice(code: str) -> str:

@@ -1,0 +1,21 @@
+"""What the numbers of alerts about the robot mean in words: tilt left, motion, clearance."""
+
+
+def tilt_left(degrees: float) -> str:
+    """Return in words how much tilt is left, or how far the robot is past its tipping point."""
+    if degrees >= 0.0:
+        return f'{degrees:.1f} degrees of tilt left before the robot tips'
+    return f'the robot is {-degrees:.1f} degrees past its tipping point'
+
+
+def height(clearance: float) -> str:
+    """Return in words how high (m) the arm was at least."""
+    where = 'above' if clearance > 0.0 else 'below'
+    return f'it came to {abs(clearance):.2f} m {where}'
+
+
+def moving(degrees: float) -> str:
+    """Return in words what the turn of a robot leaves of its tilt."""
+    if degrees >= 0.0:
+        return f'at the rate it turns, {degrees:.1f} degrees of tilt are left before it tips'
+    return 'the robot turns so fast that it will tip over'
