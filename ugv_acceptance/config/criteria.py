@@ -27,7 +27,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 )
 from ugv_acceptance.evaluation.criteria.quantities import DATA, INPUTS, SIGNALS, subjects_of
 from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import ALWAYS, Settings
 from ugv_acceptance.model.robot import Joint
 
 
@@ -54,6 +54,19 @@ def _window(value: object) -> tuple[float, float]:
     if not 0.0 <= start < end:
         raise ValueError(f'expected a start from 0 on and an end after it, got {shown(items)}')
     return start, end
+
+
+def _windows(value: object) -> tuple[tuple[float, float], ...]:
+    """Return the windows of `hand_may_touch`: true, false, or a list of them."""
+    if isinstance(value, bool):
+        return ALWAYS if value else ()
+    unit = value.unit if isinstance(value, Measure) else None
+    items = value.value if isinstance(value, Measure) else value
+    if not isinstance(items, list):
+        raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
+            f'expected true, or a list of windows such as [[2, 20]], got {shown(items)}'
+        )
+    return tuple(_window(Measure(item, unit) if unit else item) for item in items)
 
 
 Limit = Annotated[Given, BeforeValidator(_limit)]
@@ -94,6 +107,7 @@ class CriteriaFile(Section):
     uncertainty: Method = 'rss'
     coverage: Share = 0.95
     waive: dict[str, Reason] = Field(default={})
+    hand_may_touch: Annotated[tuple[tuple[float, float], ...], BeforeValidator(_windows)] = ()
     criteria: dict[str, CriterionSection]
 
 
@@ -168,6 +182,7 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
         file.coverage,
         file.uncertainty,
         tuple(file.waive.items()),
+        file.hand_may_touch,
     )
 
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Rule, Signal, feed, runs
+from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
+from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.clearance import Face, clearance, is_fixed, lowest_part, nearness_of
 from ugv_acceptance.model.mechanics import Mechanics, Triple
@@ -139,6 +141,38 @@ class GroundContact:
     def words(self, q: Sequence[float], load: Triple) -> str:
         """Return which part of the arm is lowest in a posture."""
         return f'the lowest part is {lowest_part(self.mechanics, None, q, load)}'
+
+
+@dataclass(slots=True)
+class TouchExamination:
+    """States for how long nobody knew torques because the hand might stand on the ground."""
+
+    touched: int = 0
+    _open: tuple[int, int] | None = None
+
+    def add(self, rows: MarginRows) -> None:
+        """Take the margins of the next part of the recording."""
+        if not len(rows.time):
+            return
+        self._close(int(rows.time[0]))
+        if rows.touches.any():
+            held = (rows.until - rows.time)[:-1]
+            self.touched += int(held[rows.touches[:-1]].sum())
+            if rows.touches[-1]:
+                self._open = int(rows.time[-1]), int(rows.until[-1])
+
+    def _close(self, now: int) -> None:
+        if self._open is not None:
+            self.touched += max(0, min(now, self._open[1]) - self._open[0])
+        self._open = None
+
+    def statement(self, start: int, end: int) -> Statement:  # noqa: ARG002 - an Examination
+        """Return what was found in the recording that ends at `end` (ns)."""
+        self._close(end)
+        if not self.touched:
+            return Statement()
+        why = 'the hand may touch the ground, which then carries a part of the arm'
+        return Statement(not_checked=(NotChecked('torques', why, self.touched / 1e9),))
 
 
 def blanked(

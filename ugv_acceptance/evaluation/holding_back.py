@@ -51,6 +51,8 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
         moment=_blank(rows.moment, doubtful),
         energy=_blank(rows.energy, doubtful),
         zmp=_blank(rows.zmp, doubtful),
+        clearance=_blank(rows.clearance, doubtful),
+        touches=rows.touches & ~doubtful if len(rows.touches) else rows.touches,
     )
 
 

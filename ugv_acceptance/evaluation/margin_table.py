@@ -79,6 +79,11 @@ class MarginRows:
     touches: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     @property
+    def weighed(self) -> NDArray[np.bool_]:
+        """Which rows have torques (n,): all that are known but where the hand may stand."""
+        return self.known & ~self.touches if self.touches.any() else self.known
+
+    @property
     def q(self) -> Floats:
         """Joint positions (n, j), rad or m."""
         return self.pairs.joints.q[self.pairs.of_joints]

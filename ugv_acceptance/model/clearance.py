@@ -37,6 +37,8 @@ Face = tuple[int, int, int] | None
 # Encoder zeros are set to about a degree (rad), contact points and lengths to some millimetres (m):
 # so far from the ground the arm may touch it all the same.
 ZERO_ERROR, LENGTH_ERROR = math.radians(1.0), 0.005
+# Clearance (m) that is kept wherever the arm is sent: hand and load have a size.
+CLEARANCE = 0.06
 # Postures tried, and half the travel (m) of a slide without limits.
 POSTURES, HALF_SLIDE = 64, 0.5
 # Contact points a robot needs to stand on the ground: with fewer nobody knows where it is.

@@ -30,6 +30,10 @@ class Status:
     values: dict[str, object] = field(default_factory=dict)
 
 
+# What stands in place of torques while the arm touches the ground with permission.
+TORQUE_NOT_JUDGED = 'torque not judged: the hand may touch the ground'
+
+
 def _tilt_words(side: str, angle: float) -> str:
     return f'{math.degrees(angle):.1f} deg of tilt left ({side})'
 
@@ -63,6 +67,8 @@ def verdict_of(session: Session) -> Status:
 def _left(margins: Margins, settings: Settings) -> str:
     side, angle = least_tilt(margins.stability.angle)
     tilt = _tilt_words(side, angle) if side else 'no tilt margin'
+    if any(map(math.isnan, margins.torque)):
+        return f'{tilt if settings.hears_imu else TILT_NOT_CHECKED}, {TORQUE_NOT_JUDGED}'
     if not settings.hears_imu:
         return with_most_used('', margins.torque, settings)
     return with_most_used(tilt, margins.torque, settings)
@@ -89,12 +95,14 @@ def _worst(
 
 
 def _limits(session: Session) -> dict[str, object]:
-    """Return the hash of the limits in force, and which are wider than permitted, and why."""
+    """Return the hash of the limits in force, what is wider than permitted, and if the hand may."""
     values: dict[str, object] = {'limits_hash': session.limits_hash}
     found = relaxed(session.settings)
     if found:
         names = ', '.join(breach.name for breach in found)
         values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
+    if session.settings.hand_may_touch:
+        values['hand_may_touch'] = True
     return values
 
 
@@ -185,6 +193,7 @@ def margin_statuses(
             level = _level(active, 'TORQUE_LIMIT', name, margins)
             use = abs(torque) / limit
             text = f'{use:.0%} of its limit' if margins else 'not known'
+            text = TORQUE_NOT_JUDGED if margins and math.isnan(use) else text
             numbers: dict[str, object] = {
                 'torque': torque,
                 'limit': limit,

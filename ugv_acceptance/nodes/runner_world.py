@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Inertia, InertiaStamped, Twist, Vector3
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -50,6 +50,7 @@ class RosCommands:
         self._trajectory = publish(JointTrajectory, 'arm_controller/joint_trajectory', 10)
         self._velocity = publish(Twist, 'cmd_vel', 10)
         self._payload = publish(InertiaStamped, config.topics.payload.name, QoSProfile(depth=10))
+        self._operator = publish(DiagnosticStatus, f'{MONITOR}/operator', 10)
         self._ground = publish(Vector3, f'{SIMULATOR}/ground', 10)
         self._pull = publish(Vector3, f'{SIMULATOR}/pull', 10)
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
@@ -60,7 +61,7 @@ class RosCommands:
 
         A command sent before a subscriber is matched is lost without notice.
         """
-        needed = [self._payload]
+        needed = [self._payload, self._operator]
         if mode != OPERATOR:
             needed.append(self._trajectory)
         if mode == SIM:
@@ -99,6 +100,12 @@ class RosCommands:
         message.header.frame_id = self._config.topics.payload.frame_id or ''
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._payload.publish(message)
+
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the monitor whether the arm may touch the ground from now on."""
+        value = KeyValue(key='allowed', value='true' if allowed else 'false')
+        told = DiagnosticStatus(name='hand_may_touch', hardware_id='run', values=[value])
+        self._operator.publish(told)
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""

@@ -87,6 +87,8 @@ def evaluate(
     opened = recording if isinstance(recording, Recording) else open_recording(recording)
     opened = replace(opened, names=opened.names or robot.topics.names)
     demanded = _criteria(criteria, settings)
+    if demanded is not None and demanded.hand_may_touch:
+        settings = replace(settings, hand_may_touch=demanded.hand_may_touch)
     effort = EffortComparison(settings)
     if options.compare_effort:
         options = replace(options, takers=(effort.add, *options.takers))

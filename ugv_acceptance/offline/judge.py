@@ -24,6 +24,7 @@ from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margi
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.ground_contact import TouchExamination
 from ugv_acceptance.evaluation.holding_back import HeldMargins
 from ugv_acceptance.evaluation.input_times import InputTimes
 from ugv_acceptance.evaluation.margin_table import MarginRows
@@ -125,6 +126,7 @@ def _examinations(
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
+        TouchExamination(),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
     )
 

@@ -5,7 +5,7 @@ same recordings, bit for bit, and the same verdicts. Steps are judged as over RO
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ugv_acceptance import BadSample
@@ -22,6 +22,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.plan.motions import HITCH
 from ugv_acceptance.run.simulated_robot import VirtualRobot
@@ -181,6 +182,11 @@ class OfflineCommands:
     def declare(self, mass: float) -> None:
         """Declare to the evaluation what is carried (kg)."""
         self.world.declare(mass)
+
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the evaluation whether the arm may touch the ground from now on."""
+        evaluator = self.world.evaluator
+        evaluator.adopt(replace(evaluator.settings, hand_may_touch=ALWAYS if allowed else ()))
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""

@@ -102,6 +102,9 @@ class Commands(Protocol):
     def declare(self, mass: float) -> None:
         """Declare to the monitor what is carried (kg)."""
 
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the monitor whether the arm may touch the ground from now on."""
+
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
 

@@ -121,7 +121,8 @@ class CriteriaSet:
     """A set of criteria judged together; `sha256` is of its file, or of the defaults as JSON.
 
     `coverage` is the share of each window that must be evaluated for a PASS, `waive` the names of
-    safeguards that are not to hold, with the reason.
+    safeguards that are not to hold, with the reason. `hand_may_touch` are the windows in which the
+    arm may touch the ground.
     """
 
     name: str
@@ -132,6 +133,7 @@ class CriteriaSet:
     coverage: float = LEAST_COVERAGE
     uncertainty: str = RSS
     waive: tuple[tuple[str, str], ...] = ()
+    hand_may_touch: tuple[Window, ...] = ()
 
     def uncertainty_of(self, criterion: Criterion) -> str:
         """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""

@@ -9,6 +9,8 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.clearance import unread_links
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
 
@@ -47,6 +49,10 @@ def kept_words(settings: Settings) -> str:
 def not_judged(settings: Settings) -> Iterator[NotChecked]:
     """Yield what no recording of this robot can tell by its configuration."""
     yield from not_judged_joints(settings)
+    unread = unread_links(mechanics_of(settings.robot))
+    if unread:
+        what = f'shape of {", ".join(unread)}'
+        yield NotChecked(what, 'meshes are not read: only its joints are held above the ground')
     if not settings.hears_imu:
         yield NotChecked('tip-over', 'no IMU: the base was declared level')
     if not settings.hears_joints:

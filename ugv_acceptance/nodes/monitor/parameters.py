@@ -22,7 +22,7 @@ from ugv_acceptance.evaluation.permitted_limits import (
     refused,
     torque_name,
 )
-from ugv_acceptance.evaluation.settings import LEVEL, Settings
+from ugv_acceptance.evaluation.settings import ALWAYS, LEVEL, Settings
 from ugv_acceptance.model.robot import Payload
 
 ATTITUDES = ('auto', 'orientation', 'accelerometer')
@@ -72,7 +72,7 @@ def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
 # Parameters that are read on configuration or activation and stay as they are until the next.
 AT_REST = ('config', 'urdf', 'depth', 'black_box', 'lock_parameters')
 # What an operator declares: never locked.
-FREE = ('payload.mass_kg', 'payload.cog_m')
+FREE = ('payload.mass_kg', 'payload.cog_m', 'hand_may_touch')
 ALLOWED = 'allowed_publishers'
 
 
@@ -186,6 +186,12 @@ _CHOICES = (
         'centre of gravity of the load in the axes of the payload link, m',
         lambda s: list(s.robot.payload.cog),
         lambda s, v: _with_payload(s, s.robot.payload.mass, v),
+    ),
+    TunableParameter(
+        'hand_may_touch',
+        'the arm may touch the ground, to pick something up: torques are not known while it does',
+        lambda s: bool(s.hand_may_touch),
+        lambda s, v: replace(s, hand_may_touch=ALWAYS if v else ()),
     ),
     TunableParameter(
         'imu.attitude',
