@@ -45,8 +45,8 @@ POSTURES, HALF_SLIDE = 64, 0.5
 STANDS = 3
 # A part is of an arm if its height changes by more than MOVES (m) and it comes higher than LIFTED.
 MOVES, LIFTED = 1e-6, 0.05
-# The name of the part that is the point of the load; the normal of level ground.
-LOAD, LEVEL = 'load', (0.0, 0.0, 1.0)
+# The name of the part that is the point of the load; normals of level ground and of another.
+LOAD, LEVEL, SLOPING = 'load', (0.0, 0.0, 1.0), (0.36, 0.48, 0.8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,13 +171,14 @@ def _parts(mechanics: Mechanics) -> tuple[_Part, ...]:
         return ()
     random, names = np.random.default_rng(0), [body.joint for body in tree.bodies[1:]]
     q = [random.uniform(*robot.joint(name).travel(HALF_SLIDE), POSTURES) for name in names]
-    heights = _heights(found, pose_of(tree, q), LEVEL, robot.ground)  # type: ignore[arg-type]
-    lifted = [np.broadcast_to(np.asarray(h, dtype=np.float64), POSTURES) for h in heights]
-    return tuple(
-        part
-        for part, height in zip(found, lifted, strict=True)
-        if np.ptp(height) > MOVES and height.max() > LIFTED
+    pose = pose_of(tree, q)  # type: ignore[arg-type]
+    level, sloping = (
+        np.array([np.broadcast_to(h, POSTURES) for h in _heights(found, pose, n, robot.ground)])
+        for n in (LEVEL, SLOPING)
     )
+    moves = (np.ptp(level, axis=1) > MOVES) | (np.ptp(sloping, axis=1) > MOVES)
+    keep = moves & (level.max(axis=1) > LIFTED)
+    return tuple(part for part, kept in zip(found, keep.tolist(), strict=True) if kept)
 
 
 def _all_parts(robot: Robot, tree: Tree) -> Iterator[_Part]:
