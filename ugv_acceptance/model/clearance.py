@@ -163,7 +163,7 @@ def _parts(mechanics: Mechanics) -> tuple[_Part, ...]:
     """Return the parts of the arm that can be lifted off the ground.
 
     What cannot, in any of many postures, is a wheel or a skirt, which has no contact point of its
-    own because it stands on the ground; what always has one height never comes down.
+    own because it stands on the ground; what always is in one place is part of the body.
     """
     robot, tree = mechanics.robot, mechanics.tree
     found = tuple(_all_parts(robot, tree))

@@ -53,7 +53,7 @@ def test_a_signal_is_taken_from_its_column(signal: str, expected: tuple[float, .
 
 def test_every_signal_is_tried_and_three_need_what_is_computed_on_demand() -> None:
     """Moments, energies and the ZMP cost time that no other signal has to pay."""
-    assert len(SIGNALS) == 11
+    assert len(SIGNALS) == 12
     assert {name for name, k in SIGNALS.items() if k.detail} == {'tip_moment', 'tip_energy', 'zmp'}
 
 
