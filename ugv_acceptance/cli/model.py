@@ -142,6 +142,10 @@ def _print_stability(console: Console, d: Values) -> None:
     )
     names = ' '.join(d['support_polygon']) or 'none'
     console.print(f'Support polygon: {escape(names)} ({d["state"]})')
+    arm = d['clearance']
+    if arm['height_m'] is not None:
+        height = number_text(arm['height_m'], 2)
+        console.print(f'Arm: {escape(arm["lowest"])} is lowest, {height} m above the ground')
     table = _table('Tilt left before tipping', 'side', 'deg', 'restoring N m', 'energy J')
     for side, margin in d['sides'].items():
         angle = margin['tilt_left_deg']

@@ -11,7 +11,8 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
-from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
+from ugv_acceptance.model.clearance import clearance, face_of, lowest_part, nearness_of
+from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import (
     RAISED,
@@ -44,6 +45,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     mechanics = mechanics_of(robot)
     found = posture_of(mechanics, q, load.mass, load.cog)
     stance = stance_of(mechanics, found)
+    arm = _clearance(mechanics, stance, q, load)
     return {
         'version': VERSION,
         'robot': {'name': config.name, 'serial': config.serial},
@@ -59,11 +61,13 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'total_mass_kg': found.mass,
         'centre_of_gravity_m': list(found.cog),
         'contacts': _contacts(robot, found, stance),
-        **_stability(robot, stance, gravity),
+        'clearance': arm,
+        **_stability(robot, stance, gravity, on_ground=arm['on_ground']),
         'uncertainty': dict(config.uncertainty),
         'warnings': [
             *config.warnings,
             *_outside(robot, q),
+            *_grounded(arm),
             *_overload(config, load),
             *payload_doubts(robot, payload),
         ],
@@ -193,11 +197,33 @@ def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
     ]
 
 
-def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]) -> Values:
+def _clearance(mechanics: Mechanics, stance: Stance, q: list[float], load: Payload) -> Values:
+    """Return how high the arm is above the ground, and which part of it is lowest."""
+    face = face_of(stance.support.polygon, raised=stance.support.raised)
+    height = float(clearance(mechanics, face, q, load.cog))
+    return {
+        'height_m': _finite(height),
+        'lowest': lowest_part(mechanics, face, q, load.cog) or None,
+        'on_ground': height <= nearness_of(mechanics).touches,
+    }
+
+
+def _grounded(arm: Values) -> list[str]:
+    if not arm['on_ground']:
+        return []
+    height = arm['height_m']
+    where = f'{abs(height):.2f} m {"above" if height > 0.0 else "below"}'
+    words = 'so the arm stands on it: no margin is valid, and torques are those of one in the air'
+    return [f'--posture: {arm["lowest"]} is {where} the ground, {words}']
+
+
+def _stability(
+    robot: Robot, stance: Stance, gravity: tuple[float, float, float], *, on_ground: bool
+) -> Values:
     """Return the support polygon (names, counter-clockwise from above) and the margins."""
     margins = stability_of(stance, gravity)
-    # Upside down it does not stand on these points, so their edges say nothing.
-    stands = margins.state in (STANDING, RAISED)
+    # Upside down, or on its arm, it does not stand on these points: their edges say nothing.
+    stands = margins.state in (STANDING, RAISED) and not on_ground
     return {
         'support_polygon': [robot.contacts[k].name for k in stance.support.polygon],
         'state': STATES[int(margins.state)],
