@@ -92,7 +92,7 @@ def test_on_the_ground_no_margin_is_known() -> None:
 def test_a_robot_without_an_imu_is_judged_alike() -> None:
     """The torques of a base that was declared level are not known while the arm is down."""
     told = replace(settings(), imu=replace(settings().imu, attitude='level'))
-    run = [m for m in dips((2.0, ON), (4.0, OVER)) if isinstance(m, Joints)]
+    run: list[Message] = [m for m in dips((2.0, ON), (4.0, OVER)) if isinstance(m, Joints)]
     _, known, _, alerts = both(told, run, T0 + 6 * S)
     assert (~known).sum() == 100
     assert len(alerts) == 1
@@ -171,7 +171,8 @@ def test_an_operator_may_permit_it_while_the_robot_runs() -> None:
     run = dips((0.5, ON), seconds=2.0)
     for m in run[:150]:
         give(evaluator, m)
-    assert evaluator.margins is None
+    before = evaluator.margins
+    assert before is None
     evaluator.adopt(replace(settings(), hand_may_touch=ALWAYS))
     for m in run[150:]:
         give(evaluator, m)

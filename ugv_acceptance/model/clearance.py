@@ -31,6 +31,7 @@ from ugv_acceptance.model.mechanics import Mechanics, Triple
 from ugv_acceptance.model.robot import IDENTITY, Matrix, Robot, Shape, Vector
 from ugv_acceptance.model.row_selection import ALL, Rows, Values
 from ugv_acceptance.model.tree import Pose, Tree, in_body, point_of, pose_of, tree_of
+from ugv_acceptance.type_aliases import Floats
 
 # Three contact numbers whose plane is the ground; None: the tracks' ground plane.
 Face = tuple[int, int, int] | None
@@ -173,12 +174,16 @@ def _parts(mechanics: Mechanics) -> tuple[_Part, ...]:
     q = [random.uniform(*robot.joint(name).travel(HALF_SLIDE), POSTURES) for name in names]
     pose = pose_of(tree, q)  # type: ignore[arg-type]
     level, sloping = (
-        np.array([np.broadcast_to(h, POSTURES) for h in _heights(found, pose, n, robot.ground)])
-        for n in (LEVEL, SLOPING)
+        np.array([np.broadcast_to(_array(h), POSTURES) for h in heights])
+        for heights in (_heights(found, pose, n, robot.ground) for n in (LEVEL, SLOPING))
     )
     moves = (np.ptp(level, axis=1) > MOVES) | (np.ptp(sloping, axis=1) > MOVES)
     keep = moves & (level.max(axis=1) > LIFTED)
     return tuple(part for part, kept in zip(found, keep.tolist(), strict=True) if kept)
+
+
+def _array(height: Values) -> Floats:
+    return np.asarray(height, dtype=np.float64)
 
 
 def _all_parts(robot: Robot, tree: Tree) -> Iterator[_Part]:

@@ -120,12 +120,11 @@ class Arm:
         low, high = feet.min(axis=0) - AROUND, feet.max(axis=0) + AROUND
         deck = points[..., 0, 2, None]
         over = (points[..., :2] > low[:2]).all(axis=-1) & (points[..., :2] < high[:2]).all(axis=-1)
-        height = points[..., 2]
-        bad = over & (height < deck + CLEARANCE)
-        good: Mask = ~bad[..., 1:].any(axis=-1)
+        bad = over & (points[..., 2] < deck + CLEARANCE)
         columns = [np.asarray(x) for x in np.moveaxis(q, -1, 0)]
-        low = clearance(mechanics_of(self.robot), None, columns, self.robot.payload.cog) < CLEARANCE
-        return good & ~low
+        height = clearance(mechanics_of(self.robot), None, columns, self.robot.payload.cog)
+        good: Mask = ~bad[..., 1:].any(axis=-1) & (height >= CLEARANCE)
+        return good
 
     def chain(self, q: Floats) -> Floats:
         """Return the arm's joints and the load as points (k, 3) in m, `base_link`, for `q` (j,)."""

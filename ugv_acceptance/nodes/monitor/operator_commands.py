@@ -64,7 +64,7 @@ def hand_allowed(message: DiagnosticStatus) -> bool:
     value = {pair.key: pair.value for pair in message.values}.get('allowed', '')
     if value not in ('true', 'false'):
         raise BadSample(f'{HAND}: expected allowed: true or false, got {value[:80]!r}')
-    return value == 'true'
+    return bool(value == 'true')
 
 
 def by_service(session: Session) -> list[Change]:
