@@ -27,7 +27,8 @@ def made(
 ) -> MarginRows:
     """Return rows at times (ns); `columns` name the other tables (n, k) of rows and messages.
 
-    What is not given is 0 (torque, q, moment, energy, zmp), 1 (angle), unknown (qd, effort), level.
+    What is not given is 0 (torque, q, moment, energy, zmp), 1 (angle, clearance), unknown (qd,
+    effort), level.
     Messages of the joints stand in turned order, so that a row's number is no message's.
     """
     at, n = np.array(time, np.int64), len(time)
@@ -58,6 +59,8 @@ def made(
         energy=table('energy', 4, 0.0),
         zmp=table('zmp', 1, 0.0)[:, 0],
         pairs=pairs,
+        clearance=table('clearance', 1, 1.0)[:, 0],
+        touches=np.array(columns.pop('touches', [False] * n), np.bool_),
     )
     assert not columns, f'no such columns: {list(columns)}'
     return found

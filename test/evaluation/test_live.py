@@ -346,7 +346,7 @@ def test_the_margins_of_a_recording_are_those_of_the_model() -> None:
     messages: list[Message] = []
     for k in range(60):
         roll, pitch = rng.uniform(-0.3, 0.3, 2).tolist()
-        q = tuple(rng.uniform((-3, 0, -1, -0.5), (3, 1, 1, 3)).tolist())
+        q = tuple(rng.uniform((-3, 0.4, -0.4, -0.5), (3, 1, 1, 3)).tolist())
         lean = tilted(roll, pitch)
         messages += [
             Imu(T0 + 20 * k * MS, lean, acceleration=upright(lean)),

@@ -156,3 +156,21 @@ def test_an_interrupted_step_has_no_result(tmp_path: Path) -> None:
     lines = (tmp_path / 'out' / 'journal.jsonl').read_text().splitlines()
     assert json.loads(lines[-1])['event'] == 'interrupted'
     assert runner.folder.done(runner.folder.plan.steps[0]) is None
+
+
+# Behind the robot the hand is 2 cm above the ground: no further than a degree of encoder zeros.
+PICKS: dict[str, Any] = {
+    'id': 'picks', 'posture_deg': {**HOME, 'shoulder_joint': 130.0, 'elbow_joint': 115.5},
+}  # fmt: skip
+
+
+def test_a_step_may_let_the_hand_touch_the_ground(tmp_path: Path) -> None:
+    """With hand_may_touch it passes, and the next step begins at home; without, it is stopped."""
+    permitted = {**PICKS, 'id': 'may', 'hand_may_touch': True}
+    may, after, not_ = results(runner_of(tmp_path / 'out', plan_of(permitted, {}, PICKS)))
+    assert (may['verdict'], may['reasons']) == ('PASS', ['all alerts as expected'])
+    assert 'use' not in may['measured']
+    assert may['measured']['tilt_left_deg'] > 20.0
+    assert after['verdict'] == 'PASS'
+    assert not_['verdict'] in ('FAIL', 'INCONCLUSIVE')
+    assert 'ARM_ON_GROUND' in not_['reasons'][0]

@@ -170,6 +170,10 @@ def _print_stability(console: Console, d: Values) -> None:
     )
     names = ' '.join(d['support_polygon']) or 'none'
     console.print(f'Support polygon: {escape(names)} ({d["state"]})')
+    arm = d['clearance']
+    if arm['height_m'] is not None:
+        height = number_text(arm['height_m'], 2)
+        console.print(f'Arm: {escape(arm["lowest"])} is lowest, {height} m above the ground')
     cautious = _print_ground(console, d)
     title = 'Tilt left before tipping' + (f' ({UPPER_BOUND})' if cautious else '')
     table = _table(title, 'side', 'deg', 'restoring N m', 'energy J')

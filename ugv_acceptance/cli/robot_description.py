@@ -12,7 +12,8 @@ import typer
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
-from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_of
+from ugv_acceptance.model.clearance import clearance, lowest_part, nearness_of
+from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import Reactions, reactions_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
 from ugv_acceptance.model.stability import (
@@ -48,6 +49,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     found = posture_of(mechanics, q, load.mass, load.cog)
     stance = standing(stances_of(mechanics, found), gravity)
     points = stance.points
+    arm = _clearance(mechanics, stance, q, load)
     return {
         'version': VERSION,
         'robot': {'name': config.name, 'serial': config.serial},
@@ -63,12 +65,14 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'total_mass_kg': found.mass,
         'centre_of_gravity_m': list(found.cog),
         'contacts': _contacts(robot, found, stance),
-        **_stability(robot, stance, gravity),
+        'clearance': arm,
+        **_stability(robot, stance, gravity, on_ground=arm['on_ground']),
         'ground': _ground(config, q, gravity, load),
         'uncertainty': dict(config.uncertainty),
         'warnings': [
             *config.warnings,
             *_outside(robot, q),
+            *_grounded(arm),
             *_overload(config, load),
             *payload_doubts(robot, payload),
         ],
@@ -218,11 +222,33 @@ def _contacts(robot: Robot, found: Posture, stance: Stance) -> list[Values]:
     ]
 
 
-def _stability(robot: Robot, stance: Stance, gravity: tuple[float, float, float]) -> Values:
+def _clearance(mechanics: Mechanics, stance: Stance, q: list[float], load: Payload) -> Values:
+    """Return how high the arm is above the ground, and which part of it is lowest."""
+    face = stance.ground_face
+    height = float(clearance(mechanics, face, q, load.cog))
+    return {
+        'height_m': _finite(height),
+        'lowest': lowest_part(mechanics, face, q, load.cog) or None,
+        'on_ground': height <= nearness_of(mechanics).touches,
+    }
+
+
+def _grounded(arm: Values) -> list[str]:
+    if not arm['on_ground']:
+        return []
+    height = arm['height_m']
+    where = f'{abs(height):.2f} m {"above" if height > 0.0 else "below"}'
+    words = 'so the arm stands on it: no margin is valid, and torques are those of one in the air'
+    return [f'--posture: {arm["lowest"]} is {where} the ground, {words}']
+
+
+def _stability(
+    robot: Robot, stance: Stance, gravity: tuple[float, float, float], *, on_ground: bool
+) -> Values:
     """Return the support polygon (names, counter-clockwise from above) and the margins."""
     margins, footing = stability_of(stance, gravity), stance.footing
-    # Upside down it does not stand on these points, so their edges say nothing.
-    stands = margins.state in (STANDING, RAISED)
+    # Upside down, or on its arm, it does not stand on these points: their edges say nothing.
+    stands = margins.state in (STANDING, RAISED) and not on_ground
     return {
         'support_polygon': [robot.contacts[k].name for k in footing.polygon] if footing else [],
         'state': STATES[int(margins.state)],

@@ -18,6 +18,7 @@ from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.model.clearance import arm_links
 from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Mimic, Payload, Robot
 
 T = TypeVar('T')
@@ -228,7 +229,7 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
     load = Payload() if file.payload is None else Payload(file.payload.mass, file.payload.cog)
     if (total := math.fsum(link.mass for link in bodies)) < LEAST_MASS:
         raise build.refuse(('urdf',), f'expected a robot with mass, got {total:g} kg in all links')
-    return Robot(
+    robot = Robot(
         file.robot.name,
         bodies,
         build.urdf.joints,
@@ -243,6 +244,8 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         tuple(m for m in _followed(build, measured) if m.follows in measured),
         tuple(_laws(build, sections)),
     )
+    arm = arm_links(robot)
+    return replace(robot, shapes=tuple(s for s in build.urdf.shapes if s.link in arm))
 
 
 def _followed(build: Build, measured: tuple[str, ...]) -> Iterable[Mimic]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ugv_acceptance.model.feet import ROCKING, feet_of, radius_of
 from ugv_acceptance.model.mechanics import mechanics_of
-from ugv_acceptance.model.robot import Contact, Matrix, Robot, Vector
+from ugv_acceptance.model.robot import Contact, Robot, Shape
 from ugv_acceptance.model.support import footings_of
 from ugv_acceptance.model.tree import (
     Pose,
@@ -33,20 +33,6 @@ AS_LARGE = 0.75
 FLAT = 1e-4
 # Lowest and highest corner (3,) of an extent along the axes, m.
 Box = tuple[Floats, Floats]
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """One collision geometry of a link: `size` is its half extent (m) along its own axes.
-
-    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None).
-    """
-
-    link: str
-    kind: str
-    xyz: Vector
-    rotation: Matrix
-    size: Vector | None
 
 
 @dataclass(frozen=True, slots=True)

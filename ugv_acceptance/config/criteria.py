@@ -30,7 +30,7 @@ from ugv_acceptance.evaluation.criteria.ground_statement import SAFEGUARD as GRO
 from ugv_acceptance.evaluation.criteria.quantities import DATA, INPUTS, SIGNALS, subjects_of
 from ugv_acceptance.evaluation.criteria.safeguards import SAFEGUARDS
 from ugv_acceptance.evaluation.ground import GroundWindow
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import ALWAYS, Settings
 from ugv_acceptance.model.robot import Joint
 
 
@@ -57,6 +57,19 @@ def _window(value: object) -> tuple[float, float]:
     if not 0.0 <= start < end:
         raise ValueError(f'expected a start from 0 on and an end after it, got {shown(items)}')
     return start, end
+
+
+def _windows(value: object) -> tuple[tuple[float, float], ...]:
+    """Return the windows of `hand_may_touch`: true, false, or a list of them."""
+    if isinstance(value, bool):
+        return ALWAYS if value else ()
+    unit = value.unit if isinstance(value, Measure) else None
+    items = value.value if isinstance(value, Measure) else value
+    if not isinstance(items, list):
+        raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
+            f'expected true, or a list of windows such as [[2, 20]], got {shown(items)}'
+        )
+    return tuple(_window(Measure(item, unit) if unit else item) for item in items)
 
 
 Limit = Annotated[Given, BeforeValidator(_limit)]
@@ -114,6 +127,7 @@ class CriteriaFile(Section):
     coverage: Share = 0.95
     waive: dict[str, Reason] = Field(default={})
     ground: CriteriaGroundSection = CriteriaGroundSection()
+    hand_may_touch: Annotated[tuple[tuple[float, float], ...], BeforeValidator(_windows)] = ()
     criteria: dict[str, CriterionSection]
 
 
@@ -191,6 +205,7 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
         _accepted(document, file.ground),
         file.ground.kind,
         tuple(GroundWindow(w.kind, *w.between) for w in file.ground.windows),
+        file.hand_may_touch,
     )
 
 

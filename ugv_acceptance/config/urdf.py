@@ -13,7 +13,6 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.contact_check import Shape
 from ugv_acceptance.config.units import LARGEST, shown
 from ugv_acceptance.model.robot import (
     IDENTITY,
@@ -23,6 +22,7 @@ from ugv_acceptance.model.robot import (
     Link,
     Matrix,
     Mimic,
+    Shape,
     Vector,
 )
 

@@ -33,7 +33,7 @@ class Sampler:
         slots = rows.time // self.spacing
         picked = np.flatnonzero(np.diff(slots, prepend=self._slot))
         self._slot = int(slots[-1])
-        good = rows.known[picked]
+        good = rows.weighed[picked]
         if standing:
             with np.errstate(invalid='ignore'):
                 good &= ~(rows.angle[picked].min(axis=1) <= 0.0)

@@ -122,7 +122,7 @@ class DynamicBound:
         joints = rows.pairs.joints
         new = _Rows(
             joints.time[of[at]], joints.stamp[of[at]], joints.q[of[at]], rows.torque[at],
-            rows.known[at],
+            rows.weighed[at],
         )  # fmt: skip
         held = new.after(self._before)
         self._before = held.since(int(held.time[-1]) - KEPT)

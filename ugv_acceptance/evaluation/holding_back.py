@@ -52,6 +52,8 @@ def without(rows: MarginRows, spans: Sequence[Span]) -> MarginRows:
         energy=_blank(rows.energy, doubtful),
         zmp=_blank(rows.zmp, doubtful),
         ground=replace(rows.ground, cautious=_blank(rows.ground.cautious, doubtful)),
+        clearance=_blank(rows.clearance, doubtful),
+        touches=rows.touches & ~doubtful if len(rows.touches) else rows.touches,
     )
 
 

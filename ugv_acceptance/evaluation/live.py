@@ -17,6 +17,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
     WITNESSED,
     ChassisMotion,
 )
+from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
@@ -66,7 +67,8 @@ class LiveEvaluator:
 
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
-    newest that could be used; while not `load_known`, the newest declared could not.
+    newest that could be used; while not `load_known`, the newest declared could not. `ground` says
+    whether the arm touches the ground.
     """
 
     settings: Settings
@@ -79,6 +81,7 @@ class LiveEvaluator:
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisMotion = field(init=False)
+    ground: GroundContact = field(init=False)
     _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
     _stances: tuple[Stance, ...] = ()
@@ -94,6 +97,7 @@ class LiveEvaluator:
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
         self._imu = ImuTracker(self.settings, self.watch.attitude)
         self._chassis = ChassisMotion(self.settings, self.watch.chassis)
+        self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
         self._level = not self.settings.hears_imu
@@ -108,7 +112,7 @@ class LiveEvaluator:
         """Begin to listen at `now` (ns): an input of which no message comes will become stale."""
         for fresh in self._fresh:
             fresh.started = now
-        self._began = now
+        self._began = self.ground.start = now
 
     def joint_state(
         self,
@@ -164,6 +168,7 @@ class LiveEvaluator:
         self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
         self._stances = stances_of(self._mechanics, self._posture)
         self._chassis.stands = self._stances, tuple(self._joints.q), load
+        self.ground.stands(self._joints.q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -233,7 +238,7 @@ class LiveEvaluator:
         carried = settings.robot.payload
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
-        self.settings = self.watch.settings = settings
+        self.settings = self.watch.settings = self.ground.settings = settings
         self._imu.adopt(settings)
         self.watch.trend.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
@@ -329,15 +334,21 @@ class LiveEvaluator:
 
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
         posture, gravity, until = self._posture, self._gravity, self._alive_until()
-        unknown = posture is None or gravity[0] != gravity[0]
-        if unknown or now > until or (self._known_until is not None and now > self._known_until):
+        unknown = posture is None or gravity[0] != gravity[0] or now > until
+        stance = None if unknown else standing(self._stances, gravity)
+        touch = FREE
+        if stance is not None:
+            touch = self.ground.step(now, None if self._level else stance.ground_face)
+        unknown = unknown or touch == UNSUPPORTED
+        if unknown or (self._known_until is not None and now > self._known_until):
             self._lose(now)
-        if posture is None or unknown or now > until:
+        if posture is None or stance is None or unknown:
             return None
         self._known_until = until
-        stance = standing(self._stances, gravity)
         hanging, points = torque_of(posture, gravity), stance.points
         torque: Any = standing_torque(self._mechanics, posture, points, gravity, hanging)
+        if touch == PERMITTED:
+            torque = (math.nan,) * len(torque)
         stability = NOT_KNOWN if self._level else stability_of(stance, gravity)
         self._watch(now, torque, stability)
         q = tuple(self._joints.q)
@@ -357,6 +368,7 @@ class LiveEvaluator:
         for (warn, error), tau in zip(watch.torque, torque, strict=True):
             value = abs(tau)
             if value >= warn.on or not (warn.quiet and error.quiet):
+                value = -math.inf if math.isnan(value) else value  # not known is not too much
                 warn.step(now, value)
                 error.step(now, value)
         if self._level:

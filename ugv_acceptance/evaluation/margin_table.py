@@ -1,6 +1,6 @@
 """The margins of a part of a recording as columns, which summary, criteria and files work on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,8 @@ class MarginRows:
     message or until an input is stale. `known` says which rows have margins; the others are NaN and
     their `state` is UNKNOWN. Torques (n, j) in N m (N), angles (n, 4) rad to SIDES. Moments (n, 4)
     N m, energies (n, 4) J and ZMP distance (n,) m are empty unless the evaluator computes them.
+    `clearance` (n,) m is how high the arm is above the ground, also where it stands on it and
+    nothing else is known; `touches` (n,) says where it does so with permission: torques are NaN.
     """
 
     time: Times
@@ -89,6 +91,13 @@ class MarginRows:
     pairs: Pairs
     chassis: ChassisRows = NO_CHASSIS_ROWS
     ground: GroundRows = NO_GROUND_ROWS
+    clearance: Floats = field(default_factory=lambda: np.zeros(0))
+    touches: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+
+    @property
+    def weighed(self) -> NDArray[np.bool_]:
+        """Which rows have torques (n,): all that are known but where the hand may stand."""
+        return self.known & ~self.touches if self.touches.any() else self.known
 
     @property
     def q(self) -> Floats:

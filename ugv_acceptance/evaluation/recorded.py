@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
+from ugv_acceptance.evaluation.ground_contact import GroundContact, blanked
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
@@ -25,12 +26,13 @@ from ugv_acceptance.evaluation.inputs.payload import (
     payload_from,
 )
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
-from ugv_acceptance.evaluation.lost_margins import Lost, with_lost
+from ugv_acceptance.evaluation.lost_margins import Lost, lost_in, with_lost
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
 from ugv_acceptance.evaluation.rough_ground import ground_rows
 from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.clearance import Face, clearance_at
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload
@@ -85,6 +87,7 @@ class RecordedEvaluator:
     _joints: JointMerger = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisColumns = field(init=False)
+    _ground: GroundContact = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _carry: _Newest = field(init=False)
     _payload: PayloadHistory = field(init=False)
@@ -102,6 +105,7 @@ class RecordedEvaluator:
         self._imu = ImuTracker(self.settings, self.watch.attitude)
         self._chassis = ChassisColumns(ChassisMotion(self.settings, self.watch.chassis))
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
+        self._ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         self._payload = PayloadHistory(robot.payload)
         never = np.full(1, NEVER, np.int64)
         empty = np.full((1, len(robot.joint_names)), np.nan)
@@ -140,6 +144,7 @@ class RecordedEvaluator:
         self._began = now
         for fresh in self.fresh:
             fresh.started = now
+        self._ground.start = now
         self.watch.relax(now)
 
     def finish(self, now: int) -> None:
@@ -182,7 +187,7 @@ class RecordedEvaluator:
         load = self._payload.at(newest.joints.time)
         rows = self._margins(newest, load)
         rows = replace(rows, ground=ground_rows(self.settings, self._began, rows, load))
-        lost = self._lost(rows)
+        lost, self._known_until = lost_in(rows, self._known_until)
         self._watch_pairs(rows, lost)
         chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
@@ -268,8 +273,10 @@ class RecordedEvaluator:
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
         whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(load[0])
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
-        table, state = self._table(pairs, load, whole, known)
+        table, state, height = self._table(pairs, load, whole, known)
         n = len(self.settings.robot.joint_names)
+        touch = self._ground.columns(time, known, height, (joints.q, load, j))
+        known, permitted = blanked(known, (table, state), touch, n)
         return MarginRows(
             time=time,
             stamp=np.concatenate((joints.stamp[1:], imu.stamp[1:]))[order],
@@ -282,21 +289,23 @@ class RecordedEvaluator:
             energy=table[n + 8 : n + 12].T,
             zmp=table[n + 12 :].reshape(-1),
             pairs=pairs,
+            clearance=height,
+            touches=permitted,
         )
 
     def _table(
         self, pairs: Pairs, load: Load, whole: NDArray[np.bool_], known: NDArray[np.bool_]
-    ) -> tuple[Floats, NDArray[np.int8]]:
-        """Return torques, angles and what `detail` adds as rows of a table, and the states (n,).
+    ) -> tuple[Floats, NDArray[np.int8], Floats]:
+        """Return torques, angles and what `detail` adds as rows; states and clearances (n,), m.
 
         `load` is the payload (mass and place) of each joint row, `whole` says which joint rows have
-        all positions and a known load,
-        `known` which rows have margins.
+        all positions and a known load, `known` which rows have margins.
         """
         q = pairs.joints.q
         n = q.shape[1]
         table = np.empty((n + (13 if self.detail else 4), len(known)))
         state = np.full(len(known), UNKNOWN, np.int8)
+        height = np.full(len(known), np.nan)
         rows: Rows = ALL
         if not self.settings.hears_imu or not known.all():
             table.fill(np.nan)
@@ -304,7 +313,7 @@ class RecordedEvaluator:
             rows = np.flatnonzero(known)
         j, i = pairs.of_joints[rows], pairs.of_imu[rows]
         if not len(j):
-            return table, state
+            return table, state, height
         columns = list(q.T) if whole.all() else list(np.where(whole[:, None], q, 0.0).T)
         mass, x, y, z = (_known(number, whole) for number in load)
         posture = posture_of(self._mechanics, columns, mass, (x, y, z))
@@ -314,18 +323,24 @@ class RecordedEvaluator:
                 line[rows] = _product(torque_gradient, j, gravity)
             for line, law in zip(table, posture.laws, strict=False):
                 line[rows] = line[rows] - pick(law, j)
+        hangs, hears = (columns, (x, y, z)), self.settings.hears_imu
+        heights: dict[Face, Floats] = {}
         stances = many_stances(self._mechanics, posture, len(q))
         for some, stance in many_standing(stances, len(q), j, gravity):
             place = inner(rows, some)
             at, down = (posture, j[some], self._mechanics), pick(gravity, some)
             self.carrying.update(carry(table, place, *at, stance.points, down))
-            if not self.settings.hears_imu:
+            face = stance.ground_face if hears else None
+            if face not in heights:
+                heights[face] = clearance_at(self._mechanics, face, *hangs, ALL)
+            height[place] = heights[face][j[some]]
+            if not hears:
                 continue
             found = self._stability(stance, down)
             for line, value in zip(table[n:], found, strict=False):
                 line[place] = value
             state[place] = found[-1]
-        return table, state
+        return table, state, height
 
     def _stability(self, stance: Stance, gravity: Any) -> tuple[Any, ...]:  # noqa: ANN401 - arrays
         if not self.detail:
@@ -345,6 +360,8 @@ class RecordedEvaluator:
                 continue
             some = values if all_known else values[rows.known]
             worse = np.abs(some) if k < len(self.watch.torque) else -some
+            if rows.touches.any():
+                worse = np.where(np.isnan(worse), -np.inf, worse)
             worse = with_lost(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
@@ -361,20 +378,6 @@ class RecordedEvaluator:
             friction = self.settings.limits.friction
             slope = slides_first(tuple(gravity.T), least, friction)
             feed(self.watch.slide, time, with_lost(slope, lost))
-
-    def _lost(self, rows: MarginRows) -> Lost:
-        """Return when margins became unknown that were known before."""
-        if not len(rows.time):
-            return Lost(np.empty(0, np.intp), rows.time)
-        before, known, until = self._known_until, rows.known, rows.until
-        self._known_until = int(until[-1]) if known[-1] else None
-        ends = np.flatnonzero(known[:-1] & (~known[1:] | (until[:-1] < rows.time[1:])))
-        place = np.cumsum(known, dtype=np.intp)[ends]
-        time = until[ends]
-        if before is not None and (rows.time[0] > before or not known[0]):
-            first = min(before, int(rows.time[0]))
-            place, time = np.append(0, place), np.append(first, time)
-        return Lost(place, time)
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

@@ -11,6 +11,8 @@ from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
 LEVEL = 'level'
+# The times in which the hand may touch the ground, if it always may.
+ALWAYS = ((0.0, float('inf')),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +108,9 @@ class Settings:
     `payload_known` the robot's payload is that carried until another is declared; without it, it is
     only assumed. `ground` is what the ground is taken for. `passive` are joints that only a spring
     or a stop holds: their limits are infinite. `moved_contacts` says of contact points that the
-    file puts on a wheel what they are taken for.
+    file puts on a wheel what they are taken for. `hand_may_touch` are the times (from, to in s
+    since the start) in which the arm may touch the ground, to pick something up: torques are not
+    known while it does.
     """
 
     robot: Robot
@@ -119,6 +123,7 @@ class Settings:
     ground: Ground = NOT_ENTERED
     passive: tuple[str, ...] = ()
     moved_contacts: tuple[str, ...] = ()
+    hand_may_touch: tuple[tuple[float, float], ...] = ()
 
     @property
     def hears_joints(self) -> bool:

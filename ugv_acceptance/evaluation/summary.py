@@ -109,6 +109,7 @@ class Summary:
     `load` holds the largest |torque| of each joint (N m; N), `tip` the largest of minus the tilt
     left (rad) to each of SIDES, `*_violation` the time beyond the ERROR limit, `states` the number
     of messages in each stability state, `unseen` the stretches without margins since `start`.
+    `lowest` is the largest of minus the arm's clearance (m).
     """
 
     settings: Settings
@@ -121,6 +122,7 @@ class Summary:
     tip_violation: int = 0
     states: dict[str, int] = field(default_factory=dict)
     unseen: UnseenStretches = field(init=False)
+    lowest: Extreme = field(default_factory=Extreme)
     _open: tuple[int, int, list[bool], bool] | None = None
 
     def __post_init__(self) -> None:
@@ -151,6 +153,8 @@ class Summary:
                 self.load_violation[j] += int((held * over[j]).sum())
         for side, extreme in enumerate(self.tip):
             extreme.see(-rows.angle[:, side], rows.time)
+        if len(rows.clearance):
+            self.lowest.see(-rows.clearance, rows.time)
         counts = np.bincount(rows.state[known], minlength=len(STATES))
         for name, count in zip(STATES, counts.tolist(), strict=True):
             if count:
@@ -206,6 +210,7 @@ def result_of(
             if np.isfinite(settings.limits.torque[j])
         },
         'stability': _stability_result(summary, start),
+        'clearance': _clearance_result(summary, start),
         'alerts': [
             alert_result(alert, settings, start, (told or {}).get(id(alert)))
             for alert in ordered(alerts)
@@ -258,6 +263,8 @@ def alert_record(
 def _peak(alert: Alert) -> float | None:
     if alert.rule.code == 'TIP_OVER':
         return float(np.degrees(-alert.peak))
+    if alert.rule.code == 'ARM_ON_GROUND':
+        return -float(alert.peak)
     return float(alert.peak) if np.isfinite(alert.peak) else None
 
 
@@ -292,4 +299,16 @@ def _stability_result(summary: Summary, start: int) -> dict[str, Any]:
         'time_in_violation_s': summary.tip_violation / 1e9,
         'edges': edges,
         'states': summary.states,
+    }
+
+
+def _clearance_result(summary: Summary, start: int) -> dict[str, Any]:
+    lowest = summary.lowest
+    seen = bool(np.isfinite(lowest.value))
+    return {
+        'min_m': -lowest.value if seen else None,
+        'time_of_min_s': (lowest.time - start) / 1e9 if seen else None,
+        'may_touch_s': [
+            [a, b if np.isfinite(b) else None] for a, b in summary.settings.hand_may_touch
+        ],
     }

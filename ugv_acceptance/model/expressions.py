@@ -131,7 +131,9 @@ def cos(x: Scalar) -> Scalar:
 
 
 def sqrt(x: Scalar) -> Scalar:
-    """Return the square root of x."""
+    """Return the square root of x; of an array too."""
+    if isinstance(x, np.ndarray):
+        return np.sqrt(x)  # type: ignore[return-value]
     return math.sqrt(x) if isinstance(x, float) else _node('sqrt', x)
 
 
@@ -143,7 +145,9 @@ def atan2(y: Scalar, x: Scalar) -> Scalar:
 
 
 def copysign(x: Scalar, y: Scalar) -> Scalar:
-    """Return |x| with the sign of y."""
+    """Return |x| with the sign of y; of arrays too."""
+    if isinstance(x, np.ndarray):
+        return np.copysign(x, y)  # type: ignore[arg-type,return-value]
     if isinstance(y, float) and isinstance(x, float):
         return math.copysign(x, y)
     return _node('copysign', x, y)

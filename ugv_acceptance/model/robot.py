@@ -110,6 +110,20 @@ class Contact:
 
 
 @dataclass(frozen=True, slots=True)
+class Shape:
+    """One collision geometry of a link: `size` is its half extent (m) along its own axes.
+
+    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None).
+    """
+
+    link: str
+    kind: str
+    xyz: Vector
+    rotation: Matrix
+    size: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
 class Payload:
     """A load carried by the payload link: mass (kg) and centre of gravity in its axes (m)."""
 
@@ -125,7 +139,8 @@ class Robot:
     movable joints that are not among them follow one of them (`mimics`), or are held at the value
     `held` pairs with their name, else at 0. `laws` are of joints among them.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
-    how far from it a point still stands on the ground.
+    how far from it a point still stands on the ground. `shapes` is the collision geometry of what
+    is held above the ground (clearance.py).
     """
 
     name: str
@@ -141,6 +156,7 @@ class Robot:
     contact_tolerance: float = 0.001
     mimics: tuple[Mimic, ...] = ()
     laws: tuple[Law, ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
     @property
     def root(self) -> str:

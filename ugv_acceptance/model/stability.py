@@ -65,6 +65,11 @@ class Stance:
         return self.footing.points if self.footing else ()
 
     @property
+    def ground_face(self) -> tuple[int, int, int] | None:
+        """Numbers of three contacts in whose plane the ground is; None: the tracks' plane."""
+        return self.footing.face if self.footing and self.footing.raised else None
+
+    @property
     def rocking(self) -> Number:
         """Rocking of its footing (rad): 0 without one."""
         return self.footing.rocking if self.footing else 0.0

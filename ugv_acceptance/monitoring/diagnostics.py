@@ -30,6 +30,10 @@ class Status:
     values: dict[str, object] = field(default_factory=dict)
 
 
+# What stands in place of torques while the arm touches the ground with permission.
+TORQUE_NOT_JUDGED = 'torque not judged: the hand may touch the ground'
+
+
 def verdict_of(session: Session) -> Status:
     """Return the verdict line for the operator: most severe cause, what is left, what to do."""
     alarm_tracker, now = session.alarm_tracker, session.clock.now()
@@ -64,6 +68,9 @@ def verdict_of(session: Session) -> Status:
 
 def _left(margins: Margins, session: Session) -> str:
     settings = session.settings
+    if any(map(math.isnan, margins.torque)):
+        tilt = tilt_words(margins, session.evaluator) or 'no tilt margin'
+        return f'{tilt if settings.hears_imu else TILT_NOT_CHECKED}, {TORQUE_NOT_JUDGED}'
     if not settings.hears_imu:
         return with_most_used('', margins.torque, settings)
     return with_most_used(tilt_words(margins, session.evaluator), margins.torque, settings)
@@ -90,12 +97,14 @@ def _worst(
 
 
 def _limits(session: Session) -> dict[str, object]:
-    """Return the hash of the limits in force, and which are wider than permitted, and why."""
+    """Return the hash of the limits in force, what is wider than permitted, and if the hand may."""
     values: dict[str, object] = {'limits_hash': session.limits_hash}
     found = relaxed(session.settings)
     if found:
         names = ', '.join(breach.name for breach in found)
         values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
+    if session.settings.hand_may_touch:
+        values['hand_may_touch'] = True
     return values
 
 
@@ -184,6 +193,7 @@ def margin_statuses(
             level = _level(active, 'TORQUE_LIMIT', name, margins)
             use = abs(torque) / limit
             text = f'{use:.0%} of its limit' if margins else 'not known'
+            text = TORQUE_NOT_JUDGED if margins and math.isnan(use) else text
             numbers: dict[str, object] = {
                 'torque': torque,
                 'limit': limit,

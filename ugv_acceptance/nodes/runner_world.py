@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Inertia, InertiaStamped, Twist, Vector3
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -52,6 +52,7 @@ class RosCommands:
         self._trajectory = publish(JointTrajectory, 'arm_controller/joint_trajectory', 10)
         self._velocity = publish(Twist, 'cmd_vel', 10)
         self._payload = publish(InertiaStamped, config.topics.payload.name, QoSProfile(depth=10))
+        self._operator = publish(DiagnosticStatus, f'{MONITOR}/operator', 10)
         self._ground = publish(Vector3, f'{SIMULATOR}/ground', 10)
         self._pull = publish(Vector3, f'{SIMULATOR}/pull', 10)
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
@@ -64,7 +65,7 @@ class RosCommands:
 
         A command sent before a subscriber is matched is lost without notice.
         """
-        needed = [self._payload]
+        needed = [self._payload, self._operator]
         if mode != OPERATOR:
             needed.append(self._trajectory)
         if mode == SIM:
@@ -113,6 +114,12 @@ class RosCommands:
         request = SetParameters.Request(parameters=[Parameter(name='ground.kind', value=text)])
         if self._set.wait_for_service(ANSWER_WITHIN) and self._done(self._set.call_async(request)):
             self._told = told
+
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the monitor whether the arm may touch the ground from now on."""
+        value = KeyValue(key='allowed', value='true' if allowed else 'false')
+        told = DiagnosticStatus(name='hand_may_touch', hardware_id='run', values=[value])
+        self._operator.publish(told)
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""

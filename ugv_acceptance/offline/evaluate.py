@@ -92,6 +92,8 @@ def evaluate(
     opened = replace(opened, names=opened.names or robot.topics.names)
     demanded = _criteria(criteria, settings)
     settings = _on_ground(settings, demanded, ground)
+    if demanded is not None and demanded.hand_may_touch:
+        settings = replace(settings, hand_may_touch=demanded.hand_may_touch)
     effort = EffortComparison(settings)
     if options.compare_effort:
         options = replace(options, takers=(effort.add, *options.takers))

@@ -26,6 +26,7 @@ from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margi
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
 from ugv_acceptance.evaluation.effort.model_check import ModelCheck
+from ugv_acceptance.evaluation.ground_contact import TouchExamination
 from ugv_acceptance.evaluation.holding_back import HeldMargins
 from ugv_acceptance.evaluation.input_times import InputTimes
 from ugv_acceptance.evaluation.margin_table import MarginRows
@@ -130,6 +131,7 @@ def _examinations(
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),
         CarryingJoints(settings, limits.payloads.at, lambda: evaluator.carrying),
+        TouchExamination(),
         ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
         GroundExamination(settings, criteria, evaluator.watch.trend, evaluator.watch.log),
     )

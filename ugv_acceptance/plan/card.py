@@ -34,6 +34,7 @@ SHOWN = (
     'MOTOR_WEAK',
     'SLIDE',
     'NO_SUPPORT',
+    'ARM_ON_GROUND',
     'STATIC_MODEL',
     'INPUT_STALE',
     'INPUT_SLOW',

@@ -82,7 +82,8 @@ class Step(_Part):
     `action` is hold: go to the posture and hold it. tip: the same, and the robot is expected to
     tip over. sweep: move on from `via_deg` at `speed_degps`. drive: m/s and deg/s for `hold_s`.
     pull: a person pulls with `force_n`. cycle: the postures of `via_deg` again and again for
-    `hold_s`. `expected` are the model's margins, for the reader.
+    `hold_s`. `expected` are the model's margins, for the reader. With `hand_may_touch` the arm may
+    touch the ground, to pick something up: torques are not judged while it does.
     """
 
     id: Annotated[str, Field(min_length=1, pattern=r'^[A-Za-z0-9_-]+$')]
@@ -100,6 +101,7 @@ class Step(_Part):
     hold_s: Positive = 3.0
     drive: tuple[Finite, Finite] | None = None
     force_n: Positive | None = None
+    hand_may_touch: bool = False
     limits: dict[str, Finite] = {}
     expected: dict[str, Finite] = {}
     alerts: Alerts = Alerts()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.clearance import CLEARANCE, clearance
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Payload, Robot
 from ugv_acceptance.model.stability import STANDING, margins, stability
@@ -18,8 +19,8 @@ from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 
-# Step (deg) of the search; least height (m) of arm and load; hull's width (m) beyond its contacts.
-STEP_DEG, CLEAR, AROUND = 5.0, 0.06, 0.12
+# Step (deg) of the search; hull's width (m) beyond its contacts.
+STEP_DEG, AROUND = 5.0, 0.12
 # Points between two postures at which a motion is checked.
 PATH = 25
 
@@ -119,9 +120,10 @@ class Arm:
         low, high = feet.min(axis=0) - AROUND, feet.max(axis=0) + AROUND
         deck = points[..., 0, 2, None]
         over = (points[..., :2] > low[:2]).all(axis=-1) & (points[..., :2] < high[:2]).all(axis=-1)
-        height = points[..., 2]
-        bad = (height < self.robot.ground + CLEAR) | (over & (height < deck + CLEAR))
-        good: Mask = ~bad[..., 1:].any(axis=-1)
+        bad = over & (points[..., 2] < deck + CLEARANCE)
+        columns = [np.asarray(x) for x in np.moveaxis(q, -1, 0)]
+        height = clearance(mechanics_of(self.robot), None, columns, self.robot.payload.cog)
+        good: Mask = ~bad[..., 1:].any(axis=-1) & (height >= CLEARANCE)
         return good
 
     def chain(self, q: Floats) -> Floats:

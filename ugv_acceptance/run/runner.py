@@ -48,6 +48,7 @@ class Runner:
     over: str = ''
     _setup: Any = None
     _lying: bool = True
+    _touched: bool = False
     moves: Moves = field(init=False)
 
     def __post_init__(self) -> None:
@@ -102,11 +103,15 @@ class Runner:
         self.world.record(recording)
         try:
             self.world.commands.declare(self._setup[1] if self._setup else 0.0)
+            self.world.commands.may_touch(allowed=step.hand_may_touch or self._touched)
             problem = self._prepare(step)
+            self._touched = step.hand_may_touch
+            self.world.commands.may_touch(allowed=self._touched)
             done = None if problem else self._perform(step)
         finally:
             self.brake.disarm()
             self.world.stop_recording()
+            self.world.commands.may_touch(allowed=False)
         if self.asked():
             self.brake.freeze()
             return None
@@ -142,12 +147,12 @@ class Runner:
             if not self.hands.stand_up():
                 return REFUSED
             self._lying = False
-        if setup != self._setup:
+        if setup != self._setup or self._touched:
             wrong = self._go_home()
             self.brake.disarm()
             if wrong:
                 return f'on the way home: {wrong}'
-            if not self.hands.set_up(step):
+            if setup != self._setup and not self.hands.set_up(step):
                 return REFUSED
             self._setup = setup
         self.brake.unwanted = step.alerts.must_not

@@ -22,6 +22,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.plan.motions import HITCH
 from ugv_acceptance.run.simulated_robot import VirtualRobot
@@ -193,6 +194,11 @@ class OfflineCommands:
     def tell_ground(self, kind: str | None) -> None:
         """Tell the evaluation the kind of ground; None: that of the configuration."""
         self.world.stand_on(kind)
+
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the evaluation whether the arm may touch the ground from now on."""
+        evaluator = self.world.evaluator
+        evaluator.adopt(replace(evaluator.settings, hand_may_touch=ALWAYS if allowed else ()))
 
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""

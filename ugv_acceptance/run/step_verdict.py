@@ -13,6 +13,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import pattern_words
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.offline.judge import Options
@@ -78,6 +79,8 @@ class Seen:
 
 def judge_step(step: Step, folder: Path, config: Config, done: Done) -> dict[str, Any]:
     """Return a step's result for JSON. Raises BadBag where its recording cannot be read."""
+    if step.hand_may_touch:
+        config = replace(config, settings=replace(config.settings, hand_may_touch=ALWAYS))
     start, result, seen = _judged(folder, config, step)
     window = tuple((t - start) / 1e9 for t in (done.begin, done.hold, done.end))
     found = {
@@ -181,10 +184,11 @@ def measured(seen: Seen, done: Done) -> dict[str, float]:
     rows = (time >= done.hold) & (time <= done.end)
     if not rows.any():
         return {}
-    return {
-        'tilt_left_deg': round(float(np.degrees(np.median(tilt[rows].min(axis=1)))), 2),
-        'use': round(float(np.median(use[rows].max(axis=1))), 4),
-    }
+    tilt_left = round(float(np.degrees(np.median(tilt[rows].min(axis=1)))), 2)
+    most = use[rows].max(axis=1)
+    most = most[~np.isnan(most)]  # not known where the hand touches the ground
+    told = {'use': round(float(np.median(most)), 4)} if len(most) else {}
+    return {'tilt_left_deg': tilt_left, **told}
 
 
 def stood(seen: Seen, done: Done) -> str:

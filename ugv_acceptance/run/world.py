@@ -105,6 +105,9 @@ class Commands(Protocol):
     def tell_ground(self, kind: str | None) -> None:
         """Tell the monitor the kind of ground; None: that of the configuration."""
 
+    def may_touch(self, *, allowed: bool) -> None:
+        """Say to the monitor whether the arm may touch the ground from now on."""
+
     def tilt(self, tilt: float, heading: float, rate: float) -> None:
         """Tilt the ground: rad, down towards `heading` (rad), at a peak `rate` (rad/s)."""
 

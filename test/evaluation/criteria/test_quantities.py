@@ -18,7 +18,7 @@ ROW = made(
     [0],
     torque=[(-30.0, 8.0)], q=[(0.3, -0.2)], qd=[(-0.5, 0.1)], effort=[(-12.0, 7.0)],
     angle=[(0.4, 0.3, 0.2, 0.1)], moment=[(1.0, 2.0, 3.0, 4.0)], energy=[(5.0, 6.0, 7.0, 8.0)],
-    zmp=[0.25], gravity=[(2.0, 1.0, -2.0)],
+    zmp=[0.25], clearance=[0.35], gravity=[(2.0, 1.0, -2.0)],
 )  # fmt: skip
 
 
@@ -35,6 +35,7 @@ ROW = made(
         ('tip_moment', (1.0, 2.0, 3.0, 4.0)),
         ('tip_energy', (5.0, 6.0, 7.0, 8.0)),
         ('zmp', (0.25,)),
+        ('clearance', (0.35,)),
         ('tilt', (math.acos(2.0 / 3.0),)),
     ],
 )
@@ -53,7 +54,7 @@ def test_a_signal_is_taken_from_its_column(signal: str, expected: tuple[float, .
 
 def test_every_signal_is_tried_and_three_need_what_is_computed_on_demand() -> None:
     """Moments, energies and the ZMP cost time that no other signal has to pay."""
-    assert len(SIGNALS) == 11
+    assert len(SIGNALS) == 12
     assert {name for name, k in SIGNALS.items() if k.detail} == {'tip_moment', 'tip_energy', 'zmp'}
 
 

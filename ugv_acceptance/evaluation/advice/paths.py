@@ -2,19 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.expressions import Scalar
-from ugv_acceptance.model.kernels import Kernel, compile_kernel
-from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
+from ugv_acceptance.model.clearance import CLEARANCE, clearance_at
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Joint, Payload, Robot
+from ugv_acceptance.model.row_selection import ALL
 from ugv_acceptance.model.stability import STANDING, stability
-from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of
 from ugv_acceptance.type_aliases import Floats
 
 # Duration of a path (s) and its number of steps; a joint that moves contact points takes finer
@@ -22,8 +19,6 @@ from ugv_acceptance.type_aliases import Floats
 HORIZON, STEPS, FINE = 4.0, 16, 0.01
 # Speed assumed for a joint (rad/s; m/s) without a known speed; share of a known speed that is used.
 CAREFUL, SHARE = 0.3, 0.9
-# Clearance of the arm above the ground (m), since joints, hand and load have a size.
-CLEARANCE = 0.06
 # Turning on the spot: rate and step (rad/s, rad), and the slope (as sin) from which it matters.
 TURN_RATE, TURN_STEP, LEVEL = 0.4, float(np.radians(5.0)), 0.05
 # Share of the weight on the lighter track below which it slips: the robot then drives off instead
@@ -99,40 +94,12 @@ def _above_ground(robot: Robot, q: Floats, paths: list[Path]) -> list[Path]:
     """Return the paths with steps forbidden where the arm is below CLEARANCE and lower than now."""
     if not paths:
         return paths
-    height = _lowest(robot, np.vstack((q, *(path.q for path in paths))))
-    below = height[1:] < min(robot.ground + CLEARANCE, float(height[0])) - 1e-6
+    every = np.vstack((q, *(path.q for path in paths)))
+    height = clearance_at(mechanics_of(robot), None, list(every.T), robot.payload.cog, ALL)
+    below = height[1:] < min(CLEARANCE, float(height[0])) - 1e-6
     ends = np.cumsum([len(path.q) for path in paths])[:-1]
     parts = zip(paths, np.split(below, ends), strict=True)
     return [replace(path, forbidden=part) for path, part in parts]
-
-
-def _lowest(robot: Robot, q: Floats) -> Floats:
-    """Return the height (n,) in m, `base_link`, of the arm's lowest joint or its load."""
-    heights = _arm_heights(mechanics_of(robot)).run(*q.T)
-    lowest: Floats = np.min([np.broadcast_to(z, len(q)) for z in (np.inf, *heights)], axis=0)
-    return lowest
-
-
-@lru_cache(maxsize=16)
-def _arm_heights(mechanics: Mechanics) -> Kernel:
-    """Compile the heights (m) of the arm's joints and its load.
-
-    Joints that carry contact points, such as flippers, do not belong to the arm.
-    """
-    robot, tree = mechanics.robot, mechanics.tree
-    names, drives = [body.joint for body in tree.bodies], drives_of(robot, tree)
-    arm = [
-        k for k in range(1, len(names)) if not _moves_contacts(robot, robot.joint(names[k]).child)
-    ]
-
-    def formula(*q: Scalar) -> tuple[Any, ...]:
-        pose = pose_of(tree, body_positions(drives, q))
-        found = [pose.origin[k] for k in arm]
-        if robot.payload_link is not None:
-            found.append(point_of(tree, pose, robot.payload_link, robot.payload.cog)[1])
-        return tuple(z for _, _, z in found)
-
-    return compile_kernel(formula, robot.joint_names)
 
 
 def turn_paths(robot: Robot, q: Floats, gravity: Floats, payload: Payload) -> Iterator[Path]:

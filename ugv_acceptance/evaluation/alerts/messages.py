@@ -89,6 +89,14 @@ ALERTS = {
         FailureSource.INTERACTION,
         'The robot does not stand on its contact points: it is tipping or hanging.',
     ),
+    'ARM_ON_GROUND': AlertText(
+        'the arm stands on the ground, or so it seems: {height} the plane on which the robot'
+        ' stands, so no margin is valid',
+        'lift the arm; if it is to touch the ground, say so (hand_may_touch); if it does not,'
+        ' check the zeros of its joints and the contact points',
+        FailureSource.INTERACTION,
+        'The arm touches the ground, which then carries a part of the robot: no margin is valid.',
+    ),
     'STATIC_MODEL': AlertText(
         '{subject} moves at {peak:.2f} {rate}; margins are valid only up to {limit:.2f} {rate}',
         'move the joint more slowly',

@@ -136,6 +136,9 @@ class Prediction:
                 (self.weak, _weak(time, tau, effort, limit) * _standing(angle)),
                 (self.frozen, self._frozen(old, tau, effort, q) / limit),
             )
+        untold = np.isnan(tau)  # the ground may carry the arm
+        for values in (found[1][1], found[3][1], found[4][1]) if untold.any() else ():
+            values[untold] = -np.inf
         for signals, values in found:
             _feed(signals, time[old:], values[old:])
         self._time, self._looks = time[-KEPT:], looks[-KEPT:]

@@ -25,6 +25,8 @@ STRANGE = 0.15
 MARGIN_BACK = 0.01745
 # An input is slow if SLOW (s) or more pass between its messages, one after the other for SLOW_FOR.
 SLOW, SLOW_FOR = 0.3, 2.0
+# No arm is this far (m) from the ground.
+FAR = 1e6
 # An implausible jump is found by positions up to this (ns) before.
 LEAP_REACH = 2_000_000_000
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
@@ -37,9 +39,10 @@ FROZEN, TURNED, UNIT, SOURCES = 1.0, 5.0, 4.0, 3.0
 def urgency(code: str, level: int) -> int:
     """Return how urgent an alert is among those of its level: the larger, the sooner it is told.
 
-    What contradicts the IMU comes before a tip-over that was drawn from it, and that before others.
+    What contradicts the IMU, or margins as such, comes before a tip-over that was drawn from them,
+    and that before others.
     """
-    if code.startswith('IMU_') and level > WARN:
+    if (code.startswith('IMU_') and level > WARN) or code == 'ARM_ON_GROUND':
         return 2
     return 1 if code in ('TIP_OVER', 'TIP_TREND', 'NO_SUPPORT') else 0
 
@@ -58,6 +61,7 @@ class RuleSet:
     speed: list[Signal] = field(init=False)
     tip: list[tuple[Signal, Signal]] = field(init=False)
     support: Signal = field(init=False)
+    ground: Signal = field(init=False)
     chassis: ChassisSignals = field(init=False)
     joints: 'InputSignals' = field(init=False)
     imu: 'InputSignals' = field(init=False)
@@ -92,6 +96,9 @@ class RuleSet:
             for side in SIDES
         ]
         self.support = self._fault('NO_SUPPORT', 'robot', ERROR, self.settings.delays.tip_on)
+        # Its value is minus the clearance (m), evaluation/ground_contact.py decides what is bad.
+        off, delay = (-FAR, -FAR), self.settings.delays.fault_on
+        self.ground = self._signal('ARM_ON_GROUND', 'arm', ERROR, off, delay)
         self.chassis = self._chassis()
         self.joints, self.imu = self._input('joint_states'), self._input('imu')
         self.missing = self._fault('INPUT_INCOMPLETE', 'joint_states', STALE)
@@ -267,7 +274,7 @@ class RuleSet:
         attitude = [
             of.frame, of.orientation, of.strange, of.disagreement, of.nothing, *of.motion.all()
         ]  # fmt: skip
-        faults = [self.support, self.payload, self.missing, self.repeated, *attitude]
+        faults = [self.support, self.ground, self.payload, self.missing, self.repeated, *attitude]
         return [
             *pairs,
             *self.speed,

@@ -134,7 +134,8 @@ class CriteriaSet:
     `coverage` is the share of each window that must be evaluated for a PASS, `waive` the names of
     safeguards that are not to hold, with the reason. `ground` is the rule accepted on ground that
     is not flat, None: none is. `ground_kind` and `ground_windows` say what the ground of a
-    recording is, as in ground.Ground; None and none: they say nothing.
+    recording is, as in ground.Ground; None and none: they say nothing. `hand_may_touch` are the
+    windows in which the arm may touch the ground.
     """
 
     name: str
@@ -148,6 +149,7 @@ class CriteriaSet:
     ground: AcceptedRule | None = None
     ground_kind: str | None = None
     ground_windows: tuple[GroundWindow, ...] = ()
+    hand_may_touch: tuple[Window, ...] = ()
 
     def uncertainty_of(self, criterion: Criterion) -> str:
         """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""

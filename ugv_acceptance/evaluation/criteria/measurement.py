@@ -44,9 +44,10 @@ class ValueMeasure:
     """The measurement of one criterion on a value; `span` is its window in log time (ns).
 
     `worst` holds the worst rows, at most one per part of the recording, the worst first; `first`
-    is the first row in violation. `evaluated` (ns) is the time with a known value, `violation`
-    the spans in violation, `kept` those without (for `dwell` only), `violators` the joints or sides
-    that were in violation.
+    is the first row in violation. `evaluated` (ns) is the time with a known value, `excused` that
+    in which the hand might touch the ground and nobody can know it, `violation` the spans in
+    violation, `kept` those without (for `dwell` only), `violators` the joints or sides that were in
+    violation.
     """
 
     criterion: Criterion
@@ -54,13 +55,14 @@ class ValueMeasure:
     payloads: PayloadLog
     span: tuple[int, int]
     evaluated: int = 0
+    excused: int = 0
     samples: int = 0
     worst: list[Moment] = field(default_factory=list)
     first: Moment | None = None
     violation: Spans = field(default_factory=Spans)
     kept: Spans = field(default_factory=Spans)
     violators: set[str] = field(default_factory=set)
-    _last: tuple[int, int, float] | None = None
+    _last: tuple[int, int, float, bool] | None = None
 
     @property
     def demand(self) -> Value:
@@ -76,9 +78,13 @@ class ValueMeasure:
         demand = self.demand
         self._settle(int(rows.time[0]))
         values = columns_of(demand.signal, demand.of, rows, self.settings, largest=demand.below)
-        self._last = (int(rows.time[-1]), int(rows.until[-1]), float(values[-1]))
+        touches = np.isnan(values) & rows.touches if rows.touches.any() else None
+        last = bool(touches is not None and touches[-1])
+        self._last = (int(rows.time[-1]), int(rows.until[-1]), float(values[-1]), last)
         self._see(rows, values)
         self._spend(rows.time[:-1], rows.until[:-1], values[:-1])
+        if touches is not None:
+            self._excuse(rows.time[:-1][touches[:-1]], rows.until[:-1][touches[:-1]])
 
     def finish(self, now: int) -> None:
         """Finish at the end of the recording, `now` (ns)."""
@@ -90,10 +96,17 @@ class ValueMeasure:
         """Count the last row's time, now that the next message or the end (`now`, ns) is known."""
         if self._last is None:
             return
-        time, until, value = self._last
+        time, until, value, excused = self._last
         one = np.array([time]), np.array([min(until, now)]), np.array([value])
         self._spend(*one)
+        if excused:
+            self._excuse(*one[:2])
         self._last = None
+
+    def _excuse(self, start: Times, end: Times) -> None:
+        """Add up the time (ns) inside the window in which the hand touched with permission."""
+        start, end = np.maximum(start, self.span[0]), np.minimum(end, self.span[1])
+        self.excused += int(np.maximum(end - start, 0).sum())
 
     def _spend(self, start: Times, end: Times, values: Floats) -> None:
         """Add up the time from `start` to `end` (n,) in ns for which `values` (n,) held."""

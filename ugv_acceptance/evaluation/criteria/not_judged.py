@@ -9,6 +9,8 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.clearance import unread_links
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
 
@@ -55,6 +57,10 @@ def not_judged(settings: Settings) -> Iterator[NotChecked]:
     if settings.passive:
         why = 'declared as passive: a spring, a damper or a stop holds it, no motor'
         yield NotChecked(f'torque of {", ".join(settings.passive)}', why)
+    unread = unread_links(mechanics_of(settings.robot))
+    if unread:
+        what = f'shape of {", ".join(unread)}'
+        yield NotChecked(what, 'meshes are not read: only its joints are held above the ground')
     if not settings.hears_imu:
         yield NotChecked('tip-over', 'no IMU: the base was declared level')
     if not settings.hears_joints:

@@ -49,6 +49,11 @@ def _tilt(rows: MarginRows, _: Settings) -> Floats:
         return np.arctan2(np.hypot(g[:, 0], g[:, 1]), -g[:, 2])[:, None]
 
 
+def _clearance(rows: MarginRows, _: Settings) -> Floats:
+    height = rows.clearance if len(rows.clearance) else np.full(len(rows.time), np.nan)
+    return height[:, None]
+
+
 SIGNALS = {
     'torque_utilisation': SignalKind(_utilisation, 'joints', ('',), '', 'torque utilisation'),
     'torque': SignalKind(
@@ -98,6 +103,9 @@ SIGNALS = {
         'm',
         'distance of the ZMP inside the support polygon',
         detail=True,
+    ),
+    'clearance': SignalKind(
+        _clearance, 'robot', ('length',), 'm', 'height of the arm above the ground'
     ),
     'tilt': SignalKind(_tilt, 'robot', ('angle',), 'deg', 'tilt of the base', _DEGREES),
 }

@@ -37,6 +37,7 @@ SAFEGUARDS = {
     'measured_effort': 'no measured effort reaches the limit of its joint',
     'residual': 'measured efforts differ from the model by less than the margin left',
     'payload': 'the payload is known, and is the one that was declared',
+    'ground_contact': 'the arm touches the ground only where it may',
     'joint_positions': 'the positions of the joints are those of the arm',
     'imu': 'the IMU can be believed',
 }
@@ -44,6 +45,7 @@ SAFEGUARDS = {
 ALERT_OBJECTIONS: dict[str, tuple[str, str]] = {
     'ENCODER_FROZEN': ('joint_positions', INCONCLUSIVE),
     'INPUT_SLOW': ('unseen_stretches', INCONCLUSIVE),
+    'ARM_ON_GROUND': ('ground_contact', INCONCLUSIVE),
 }
 # What a criterion on values is about, and the safeguard that would say the same again.
 _SAID_BY = {

@@ -61,7 +61,7 @@ def judge_value(criterion: Criterion, findings: Findings) -> Outcome:
     assert isinstance(measure, ValueMeasure)  # noqa: S101 - by its demand
     measured = _measured(measure, findings)
     evidence = tuple(_related(measure, findings))
-    short = short_of_data(measure.evaluated, criterion, findings)
+    short = short_of_data(measure.evaluated + measure.excused, criterion, findings)
     if not measure.samples:
         return Outcome(INCONCLUSIVE, f'{criterion.name}: {NO_VALUE}', measured)
     if not _met(measure):

@@ -3,6 +3,7 @@
 The counterpart for recordings is rests.py: both end in `understand`.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -92,7 +93,8 @@ class LiveRests:
 
         rad, rad/s, N m (N), m/s2; `torque` is static, with the declared load.
         """
-        if any(abs(rate) > REST for rate in rates):
+        on_the_ground = any(map(math.isnan, torque))
+        if on_the_ground or any(abs(rate) > REST for rate in rates):
             self.current = None
             return False
         sample = tuple(np.array(x, np.float64) for x in (effort, torque, q, gravity))

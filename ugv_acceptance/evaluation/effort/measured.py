@@ -55,7 +55,7 @@ class MeasuredLimits:
         effort, torque = rows.effort, rows.torque
         with np.errstate(invalid='ignore'):
             size, left = np.abs(effort), self._limit - np.abs(torque)
-            standing = rows.known & ~(rows.angle.min(axis=1) <= 0.0)
+            standing = rows.weighed & ~(rows.angle.min(axis=1) <= 0.0)
             self._feed(self._over, rows, size >= REACHED * self._limit, size)
             for sign, spells in self._apart.items():
                 apart = np.abs(sign * effort - torque)

@@ -39,9 +39,11 @@ from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
 from ugv_acceptance.nodes.monitor.operator_commands import (
+    HAND,
     all_reset,
     black_box_of,
     by_service,
+    hand_allowed,
     operate,
 )
 from ugv_acceptance.nodes.monitor.parameters import (
@@ -262,7 +264,10 @@ class Monitor(LifecycleNode):
         try:
             if self.session is None:
                 raise BadSample(INACTIVE)
-            self._tell(operate(self.session, message))
+            if message.name == HAND:
+                self.set_parameters_atomically([Parameter(HAND, value=hand_allowed(message))])
+            else:
+                self._tell(operate(self.session, message))
         except AcceptanceError as error:
             self.get_logger().warning(f'operator: {error}')
         self.say()

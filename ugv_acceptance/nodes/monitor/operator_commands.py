@@ -17,6 +17,8 @@ from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.black_box import BlackBox, Channel
 
+# Says whether the arm may touch the ground; value: allowed, true or false.
+HAND = 'hand_may_touch'
 DOINGS = ('acknowledge', 'shelve', 'unshelve', 'reset')
 # The name for acknowledgements by the service, which gives none.
 SERVICE = 'service'
@@ -55,6 +57,14 @@ def operation_from(message: DiagnosticStatus) -> Operation:
         raise BadSample(f'seconds: expected a number from 0 on, got {seconds:g}')
     who, note = message.hardware_id[:LONGEST_TEXT], message.message[:LONGEST_TEXT]
     return Operation(message.name, who or 'unknown', key, note, seconds)
+
+
+def hand_allowed(message: DiagnosticStatus) -> bool:
+    """Return what a command HAND says. Raises BadSample unless `allowed` is true or false."""
+    value = {pair.key: pair.value for pair in message.values}.get('allowed', '')
+    if value not in ('true', 'false'):
+        raise BadSample(f'{HAND}: expected allowed: true or false, got {value[:80]!r}')
+    return bool(value == 'true')
 
 
 def by_service(session: Session) -> list[Change]:

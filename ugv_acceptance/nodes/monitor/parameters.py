@@ -23,7 +23,7 @@ from ugv_acceptance.evaluation.permitted_limits import (
     refused,
     torque_name,
 )
-from ugv_acceptance.evaluation.settings import LEVEL, Settings
+from ugv_acceptance.evaluation.settings import ALWAYS, LEVEL, Settings
 from ugv_acceptance.model.robot import Payload
 
 ATTITUDES = ('auto', 'orientation', 'accelerometer')
@@ -74,7 +74,7 @@ def described_integer(what: str, lower: int, upper: int) -> ParameterDescriptor:
 AT_REST = ('config', 'urdf', 'depth', 'black_box', 'lock_parameters')
 # What an operator declares: never locked. The load is also declared by messages.
 LOAD = ('payload.mass_kg', 'payload.cog_m')
-FREE = (*LOAD, 'ground.kind')
+FREE = (*LOAD, 'ground.kind', 'hand_may_touch')
 ALLOWED = 'allowed_publishers'
 
 
@@ -200,6 +200,12 @@ _CHOICES = (
         f'what the robot stands on: {", ".join(KINDS)}; empty: not entered, taken as flat',
         lambda s: s.ground.kind or '',
         _with_ground,
+    ),
+    TunableParameter(
+        'hand_may_touch',
+        'the arm may touch the ground, to pick something up: torques are not known while it does',
+        lambda s: bool(s.hand_may_touch),
+        lambda s, v: replace(s, hand_may_touch=ALWAYS if v else ()),
     ),
     TunableParameter(
         'imu.attitude',
