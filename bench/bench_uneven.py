@@ -253,7 +253,7 @@ def flat_hours(robot: Robot, hours: float, seed: int) -> None:
         felt = gravity + np.cross(rng.normal(0.0, 0.004, (n, 3)), gravity)
         shown = margins(robot, q + rng.normal(0.0, 0.001, q.shape), felt, load_kg).angle
         excess.append(np.degrees(shown.min(axis=1) - true)[::20])
-        at: Floats = np.arange(n) * LOOK
+        at = np.linspace(0.0, (n - 1) * LOOK, n)
         for limit in (5.0, 10.0):
             on = shown.min(axis=1) < math.radians(limit)
             for start, end in alerts(at, on):

@@ -14,7 +14,6 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import margins
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.shape import Block
-from ugv_acceptance.type_aliases import Floats
 
 ROBOT = replace(load().settings.robot, payload=Payload(2.0))
 FOLDED = {'turret_joint': 0.0, 'shoulder_joint': 2.0, 'elbow_joint': -2.4, 'flipper_joint': math.pi}
@@ -75,7 +74,7 @@ def test_the_true_margin_of_a_square_is_its_closed_form() -> None:
 
 def test_an_alert_is_raised_after_its_delay_and_ends_after_its_other() -> None:
     """One look alone raises nothing; what lasts is one alert until it is gone for a second."""
-    at: Floats = np.arange(100) * 0.05
+    at = np.linspace(0.0, 4.95, 100)
     on = np.zeros(100, bool)
     on[5] = on[20:30] = on[35:40] = True
     ((start, end),) = alerts(at, on)

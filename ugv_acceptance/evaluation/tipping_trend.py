@@ -64,15 +64,16 @@ def trend_of(time: Times, angle: Floats, cautious: Floats, rule: TrendRule = TRE
     tips = (slope <= -rule.fast) & (then < rule.error)
     narrow = cautious < rule.cautious
     known = np.isfinite(slope).all(axis=1) & ~np.isnan(cautious).any(axis=1)
-    level = np.where((falls | narrow).any(axis=1), WARN, np.where(known, OK, NOT_KNOWN))
-    level[tips.any(axis=1)] = ERROR
+    calm = np.where(known, OK, NOT_KNOWN)
+    warned = np.where((falls | narrow).any(axis=1), WARN, calm)
+    level = np.where(np.any(tips, axis=1), ERROR, warned)
     worst = np.where(known[:, None], then, cautious)
     side = np.where(np.isnan(worst), np.inf, worst).argmin(axis=1)
     at = np.arange(len(time)), side
     left = np.full(len(time), np.inf)
     of_side: Floats = slope[at]
     left[np.isnan(of_side)] = np.nan
-    shrinks = np.less(of_side, 0.0)
+    shrinks = np.flatnonzero(of_side < 0.0)
     left[shrinks] = np.maximum(angle[at][shrinks], 0.0) / -of_side[shrinks]
     return Trend(level.astype(np.int8), side.astype(np.int8), of_side, left)
 
