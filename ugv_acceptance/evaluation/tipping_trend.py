@@ -63,11 +63,11 @@ def trend_of(time: Times, angle: Floats, cautious: Floats, rule: TrendRule = TRE
     falls = (slope <= -rule.rate) & (then < rule.warn)
     tips = (slope <= -rule.fast) & (then < rule.error)
     narrow = cautious < rule.cautious
-    known = np.isfinite(slope).all(axis=1) & ~np.isnan(cautious).any(axis=1)
-    calm = np.where(known, OK, NOT_KNOWN)
+    known = np.all(np.isfinite(slope) & ~np.isnan(cautious), axis=1, keepdims=True)
+    calm = np.where(known[:, 0], OK, NOT_KNOWN)
     warned = np.where((falls | narrow).any(axis=1), WARN, calm)
     level = np.where(np.any(tips, axis=1), ERROR, warned)
-    worst = np.where(known[:, None], then, cautious)
+    worst = np.where(known, then, cautious)
     side = np.where(np.isnan(worst), np.inf, worst).argmin(axis=1)
     at = np.arange(len(time)), side
     left = np.full(len(time), np.inf)
