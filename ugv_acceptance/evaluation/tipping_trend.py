@@ -24,10 +24,10 @@ class TrendRule:
     """
 
     ahead: float = 1.0
-    rate: float = math.radians(2.0)
-    warn: float = math.radians(20.0)
+    rate: float = math.radians(10.0)
+    warn: float = math.radians(15.0)
     cautious: float = math.radians(5.0)
-    fast: float = math.radians(5.0)
+    fast: float = math.radians(10.0)
     error: float = 0.0
 
 
@@ -63,17 +63,19 @@ def trend_of(time: Times, angle: Floats, cautious: Floats, rule: TrendRule = TRE
     falls = (slope <= -rule.rate) & (then < rule.warn)
     tips = (slope <= -rule.fast) & (then < rule.error)
     narrow = cautious < rule.cautious
-    known = np.isfinite(slope).all(axis=1) & ~np.isnan(cautious).any(axis=1)
-    level = np.where((falls | narrow).any(axis=1), WARN, np.where(known, OK, NOT_KNOWN))
-    level[tips.any(axis=1)] = ERROR
-    worst = np.where(known[:, None], then, cautious)
+    known = np.all(np.isfinite(slope) & ~np.isnan(cautious), axis=1, keepdims=True)
+    calm = np.where(known[:, 0], OK, NOT_KNOWN)
+    warned = np.where((falls | narrow).any(axis=1), WARN, calm)
+    level = np.where(np.any(tips, axis=1), ERROR, warned)
+    worst = np.where(known, then, cautious)
     side = np.where(np.isnan(worst), np.inf, worst).argmin(axis=1)
     at = np.arange(len(time)), side
     left = np.full(len(time), np.inf)
-    left[np.isnan(slope[at])] = np.nan
-    shrinks = slope[at] < 0.0
-    left[shrinks] = np.maximum(angle[at][shrinks], 0.0) / -slope[at][shrinks]
-    return Trend(level.astype(np.int8), side.astype(np.int8), slope[at], left)
+    of_side: Floats = slope[at]
+    left[np.isnan(of_side)] = np.nan
+    shrinks = np.flatnonzero(of_side < 0.0)
+    left[shrinks] = np.maximum(angle[at][shrinks], 0.0) / -of_side[shrinks]
+    return Trend(level.astype(np.int8), side.astype(np.int8), of_side, left)
 
 
 def _slopes(time: Times, angle: Floats) -> Floats:
