@@ -16,6 +16,7 @@ from ugv_acceptance.type_aliases import Floats
 # What is charged for rocking by a share of a distance, and for each radian of a face's slope beyond
 # FREE_SLOPE (rad). A charge above DEAR (rad) grows faster by this factor.
 COST, FREE_SLOPE, DEAR, FACTOR = 10.0, np.radians(30.0), np.radians(25.0), 1.6
+MOST = np.radians(90.0)
 # Shares of a radius: how far a drop is counted at least, and how high a track may be above others.
 LEAST_REACH, UNEVEN = 1.0 / 4.0, 1.0 / 16.0
 # A point no further (m) below a face's plane does not keep the face from being one of the hull.
@@ -44,7 +45,12 @@ def reference_margin(
     """
     at, centre, down = (np.asarray(x, dtype=float) for x in (points, cog, gravity))
     best = Found(-np.inf, (), np.inf)
-    for chosen, rocking in footings(at, ground, fixed):
+    found = list(footings(at, ground, fixed))
+    # Rocking by a quarter turn leaves no margin: it counts only where there is no other footing.
+    most = max(MOST, min((rocking for _, rocking in found), default=0.0))
+    for chosen, rocking in found:
+        if rocking >= MOST and rocking > most:
+            continue
         margin = least_edge(at, chosen, centre, down) - rocking
         if margin > best.margin:
             best = Found(float(margin), tuple(sorted(chosen)), float(rocking))
