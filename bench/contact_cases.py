@@ -20,6 +20,8 @@ TIPPED = np.radians(5.0)
 RATES, BACK = np.radians((12.0, 2.0, 0.2)), np.radians((7.0, 2.0))
 # On the fastest plane a tip is noticed late, by less than this (rad).
 LATE = float(np.radians(1.0))
+# It is still at rest so much (rad) before it has turned by TIPPED.
+FALLING = float(np.radians(0.5))
 # Tilt (rad) at which a search ends, and how often (s) its states are kept.
 LAST, KEPT = float(np.radians(75.0)), 0.1
 # Headings closer than this (rad) count as one.
@@ -150,7 +152,9 @@ class _Slope:
 
     def rests(self, before: float) -> Iterator[tuple[float, Floats]]:
         """Yield tilts (rad) and attitudes before a tilt, one a degree and the last."""
-        known = sorted(((t, a) for t, _, a in self.states if t < before), key=lambda s: s[0])
+        last = before - FALLING
+        known = sorted(((t, a) for t, _, a in self.states if t <= last), key=lambda s: s[0])
+        known = known or [(0.0, self.upright)]
         for goal in np.arange(1.0, np.degrees(min(before, LAST)), 1.0):
             yield min(known, key=lambda s: abs(s[0] - np.radians(goal)))
         yield known[-1]
