@@ -231,14 +231,14 @@ def continuity_figure(robot: Robot) -> bytes:
     """Return the figure: the margin over the height of one contact, before and now (PNG)."""
     made = figure(7.2, 2.6)
     heights = np.arange(-60, 61) * 1e-4
-    names = ('stowed', 'flippers 8 mm above it', 'stretched, flippers forward')
+    names = ('stowed', 'raised on the flippers', 'stretched, flippers forward')
     for axes, name in zip(made.subplots(1, 3), names, strict=True):
         curve = [of_both(lowered(robot, 'rear_left', -z), name, DOWN) for z in heights]
         old, new = np.array(curve).T
         axes.plot(heights * 1e3, old, color='#888888', linestyle=':', label='before')
         axes.plot(heights * 1e3, new, color='black', label='now')
         axes.axhline(0.0, color='#cc4444', linewidth=0.6)
-        axes.set_title(name)
+        axes.set_title(name, fontsize=9.0)
         axes.set_xlabel('rear_left higher by (mm)')
     made.axes[0].set_ylabel('least margin (deg)')
     made.axes[0].legend()

@@ -174,7 +174,7 @@ class _Slope:
             mujoco.mj_step(model, data, nstep=oracle.STRIDE)
             attitude = oracle.attitude(self.vehicle, data)
             if oracle.turn(attitude, self.upright) > TIPPED:
-                return tilt
+                return float(tilt)
             if tilt - kept > rate * KEPT:
                 self.states.append((tilt, _state(data), attitude))
                 kept = tilt

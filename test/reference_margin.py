@@ -119,7 +119,8 @@ def upwards(corners: Floats) -> Floats | None:
     size = np.linalg.norm(normal)
     if size < LEVEL or abs(normal[2]) < LEVEL * size:
         return None
-    return normal / np.copysign(size, normal[2])
+    upward: Floats = normal / np.copysign(size, normal[2])
+    return upward
 
 
 def least_edge(points: Floats, chosen: Sequence[int], cog: Floats, gravity: Floats) -> float:
