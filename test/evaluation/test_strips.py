@@ -60,7 +60,7 @@ def test_a_long_run_has_wider_columns_and_the_same_worst() -> None:
     for start in range(0, 12_000, 1000):
         run = run_of(1000.0, joints_hz=20.0, imu_hz=1.0)
         bent = [
-            replace(m, position=(1e-4 * start + 1e-3 * (k % 977), 0.1))
+            replace(m, position=(-1e-4 * start - 1e-3 * (k % 977), 0.1))
             if isinstance(m, Joints)
             else m
             for k, m in enumerate(run)

@@ -32,7 +32,7 @@ from ugv_acceptance.evaluation.rough_ground import ground_rows
 from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.clearance import Face, clearance_at
+from ugv_acceptance.model.clearance import Face, clearance
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload
@@ -332,7 +332,8 @@ class RecordedEvaluator:
             self.carrying.update(carry(table, place, *at, stance.points, down))
             face = stance.ground_face if hears else None
             if face not in heights:
-                heights[face] = clearance_at(self._mechanics, face, *hangs, ALL)
+                least = clearance(self._mechanics, face, *hangs)
+                heights[face] = np.broadcast_to(least, len(q))
             height[place] = heights[face][j[some]]
             if not hears:
                 continue

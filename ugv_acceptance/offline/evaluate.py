@@ -82,7 +82,7 @@ def evaluate(
     >>> result.verdict
     'FAIL'
     >>> sorted({alert.code for alert in result.alerts if alert.level == 'ERROR'})
-    ['TIP_OVER', 'TORQUE_LIMIT']
+    ['ARM_ON_GROUND', 'TIP_OVER', 'TORQUE_LIMIT']
     >>> result.margins.sides
     ('front', 'left', 'rear', 'right')
     """
