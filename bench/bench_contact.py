@@ -188,9 +188,9 @@ def result_of(seed: int) -> Result | None:
     down = np.array(
         [gravity_on_slope(9.81, t, case.heading) @ attitude for t, attitude in once.rests]
     )
-    shown = [before(case.points, case.cog, down, case.ground), now(robot, (0.0,), down)]
+    shown = [before(case.points, case.cog, down), now(robot, (0.0,), down)]
     over = [_most_above(s, min(once.tilt, LAST) - tilts) for s in shown]
-    level = np.degrees([s[0] for s in shown])
+    level = np.degrees(np.nan_to_num([s[0] for s in shown]))  # no margin: none is left
     tilt = float(np.degrees(min(first.tilt, LAST)))
     return Result(case.kind, tilt, (level[0], level[1]), (over[0], over[1]))
 
@@ -215,8 +215,7 @@ def print_truth(count: int) -> None:
     for kind in (*KINDS, 'all'):
         some = [r for r in found if kind in {r.kind, 'all'}]
         for which, name in enumerate(('before', 'now')):
-            error = np.array([np.fmin(r.margin[which], 75.0) - r.tilt for r in some])
-            error = np.nan_to_num(error, nan=-75.0)
+            error = np.array([min(r.margin[which], 75.0) - r.tilt for r in some])
             over = np.array([r.over[which] for r in some])
             shares = [np.mean(error > x) for x in (2.0, 1.0)]
             shares += [np.mean(error < x) for x in (-2.0, -5.0, -10.0, -20.0)]
