@@ -68,7 +68,7 @@ def failed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Path:
     folder = tmp_path_factory.mktemp('annotated')
     words = ['evaluate', repository / 'bags' / 'packbot_fail', '--annotate', folder / 'run.mcap']
     words += ['--json', folder / 'result.json', '--csv', folder / 'margins.csv']
-    command = [sys.executable, '-c', OFFLINE, *words]
+    command = [sys.executable, '-c', OFFLINE, *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 1, done.stderr
     return folder

@@ -174,7 +174,7 @@ def test_the_same_bag_gives_the_same_bytes(tmp_path: Path) -> None:
     for k in range(2):
         found = tmp_path / f'{k}.json'
         # Each with a seed of its own for the order of sets.
-        command = [sys.executable, '-c', MAIN, 'evaluate', run, '--json', found]
+        command = [sys.executable, '-c', MAIN, 'evaluate', str(run), '--json', str(found)]
         subprocess.run(command, capture_output=True, check=False, timeout=60)
         texts.append(found.read_bytes())
     assert texts[0] == texts[1]
