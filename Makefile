@@ -14,7 +14,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help venv tools demo test lint docs pytest colcon recipe versions hardening error-rate clean distclean
+.PHONY: help venv tools second-tools demo test lint docs pytest second-run colcon recipe versions hardening error-rate clean distclean
 
 # The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
 # libraries load.
@@ -29,7 +29,7 @@ else
 ROS := -r requirements/ros.txt
 TOOLS := docs,lint,test
 endif
-PIP_INSTALL := -m pip install -qq -c requirements/constraints.txt
+PIP_INSTALL := -m pip install -qq $(INSTALL_FLAGS) -c requirements/constraints.txt
 REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
 # Files and folders of tests that `make colcon` leaves to `make pytest`: what depends on the versions of Python and
@@ -95,10 +95,14 @@ tools: .venv/.tools
 demo: venv
 	.venv/bin/ugv-acceptance demo
 
-test: lint docs pytest
+test: lint docs pytest second-run
+
 ifneq ($(JAZZY_PYTHON),)
-	$(MAKE) colcon
+second-tools: .venv312/.installed
+second-run: colcon
 else
+second-tools:
+second-run:
 	@echo '*** NOT DONE: the second run, on Python 3.12 + NumPy 1.26: no python3.12 on PATH, in pyenv or in uv.'
 	@echo '*** NOT DONE: `make colcon JAZZY_PYTHON=/path/to/python3.12` makes it.'
 	@test -z "$${CI:-}" || { echo '*** CI needs that run.'; exit 1; }

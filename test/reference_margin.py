@@ -15,7 +15,7 @@ from ugv_acceptance.type_aliases import Floats
 
 # What is charged for rocking by a share of a distance, and for each radian of a face's slope beyond
 # FREE_SLOPE (rad). A charge above DEAR (rad) grows faster by this factor.
-COST, FREE_SLOPE, DEAR, FACTOR = 10.0, np.radians(30.0), np.radians(25.0), 1.6
+COST, FREE_SLOPE, DEAR, FACTOR = 10.0, np.radians(30.0), np.radians(25.0), 1.5
 MOST = np.radians(90.0)
 # Shares of a radius: how far a drop is counted at least, and how high a track may be above others.
 LEAST_REACH, UNEVEN = 1.0 / 4.0, 1.0 / 16.0
@@ -71,13 +71,13 @@ def footings(
         heights[list(face)] = 0.0
         if heights.min() < -LEVEL:
             continue
-        others = [k for k in np.argsort(heights, kind='stable') if k not in face]
+        costs = np.maximum(COST * heights / radius, drop)
+        others = [k for k in np.argsort(costs, kind='stable') if k not in face]
         slope = np.arctan2(np.hypot(normal[0], normal[1]), normal[2])
         lean = COST * max(0.0, float(slope) - FREE_SLOPE)
         for count in range(len(others) + 1):
             chosen = (*face, *(int(k) for k in others[:count]))
-            height = max(float(heights[list(chosen)].max()), 0.0)
-            charge = max(COST * height / radius, float(drop[list(chosen)].max()))
+            charge = max(0.0, float(costs[list(chosen)].max()))
             yield chosen, charge + (FACTOR - 1.0) * max(0.0, charge - DEAR) + lean
 
 

@@ -1,12 +1,10 @@
 """A folder that is not one recording but holds several: nothing is taken for one run."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from bag.bag_cases import run, write_mcap
+from cli.here import ugv
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.metadata import numbered
@@ -78,15 +76,13 @@ def test_a_folder_without_recordings_says_what_one_is(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('verb', [('evaluate',), ('watch',), ('map', 'torque', '--from-bag')])
-def test_every_verb_says_so_in_one_line(verb: tuple[str, ...], tmp_path: Path) -> None:
+def test_every_verb_says_so_in_one_line(
+    verb: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Every verb refuses a folder of several recordings with one line and exit code 2."""
     folder = write_runs(tmp_path / 'day', 'a', 'b')
-    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    code = 'from ugv_acceptance.cli import main; main()'
-    command = [sys.executable, '-c', code, *verb, str(folder)]
-    done = subprocess.run(
-        command, env=env, capture_output=True, text=True, check=False, cwd=tmp_path
-    )
+    monkeypatch.chdir(tmp_path)
+    done = ugv(*verb, folder)
     assert done.returncode == 2
     assert done.stderr.count('\n') == 1
     assert f'`ugv-acceptance campaign {folder}` judges all of them' in done.stderr

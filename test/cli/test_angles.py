@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from cli.test_plan_and_simulate import ugv
+from cli.here import ugv
 from typer.main import get_command
 
 from ugv_acceptance import BadConfig

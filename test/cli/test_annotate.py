@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cli.here import ugv
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.exceptions import McapError
@@ -30,7 +31,6 @@ from ugv_acceptance.bag.annotated import Said, write_annotated
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.model.stability import SIDES
 
-MAIN = 'from ugv_acceptance.cli import main; main()'
 OFFLINE = (
     'import sys\nfrom ugv_acceptance.cli import main\ntry: main()\nfinally:'
     ' assert not {"rclpy", "diagnostic_msgs"} & set(sys.modules)'
@@ -39,11 +39,9 @@ OFFLINE = (
 Message = tuple[int, int, str, bytes]
 
 
-def annotate(bag: object, path: Path, *more: object, code: str = MAIN) -> Any:
+def annotate(bag: object, path: Path, *more: object) -> 'subprocess.CompletedProcess[str]':
     """Run the verb."""
-    words = ['evaluate', str(bag), '--annotate', str(path), *map(str, more)]
-    command = [sys.executable, '-c', code, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
+    return ugv('evaluate', bag, '--annotate', path, *more)
 
 
 def raw(path: Path) -> list[Message]:
@@ -68,12 +66,10 @@ def decoded(path: Path) -> dict[str, list[tuple[int, Any]]]:
 def failed(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Path:
     """Return a folder with the annotated run that fails, and its result and CSV."""
     folder = tmp_path_factory.mktemp('annotated')
-    done = annotate(
-        repository / 'bags' / 'packbot_fail',
-        folder / 'run.mcap',
-        *('--json', folder / 'result.json', '--csv', folder / 'margins.csv'),
-        code=OFFLINE,
-    )
+    words = ['evaluate', repository / 'bags' / 'packbot_fail', '--annotate', folder / 'run.mcap']
+    words += ['--json', folder / 'result.json', '--csv', folder / 'margins.csv']
+    command = [sys.executable, '-c', OFFLINE, *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 1, done.stderr
     return folder
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cli.here import ugv as here_ugv
 
 from ugv_acceptance.cli.monitor import mark
 from ugv_acceptance.evaluation.alerts.messages import (
@@ -29,8 +30,15 @@ criteria:
 """
 
 
+def here(*arguments: object) -> str:
+    """Run a verb of one process in this one and return what it printed."""
+    done = here_ugv(*arguments)
+    assert done.returncode != 2, done.stderr
+    return done.stdout
+
+
 def ugv(*arguments: object) -> str:
-    """Run the command and return what it printed."""
+    """Run the command in a process of its own and return what it printed."""
     command = [sys.executable, '-c', MAIN, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode != 2, done.stderr
@@ -69,8 +77,8 @@ def test_a_judged_recording_is_told_in_words(
     site.write_text(SITE)
     files = [tmp_path / name for name in ('r.html', 'r.json', 'm.csv')]
     options = zip(('--report', '--json', '--csv'), files, strict=True)
-    printed = ugv('evaluate', bag, *(x for pair in options for x in pair))
-    judged = ugv('evaluate', bag, '--criteria', site)
+    printed = here('evaluate', bag, *(x for pair in options for x in pair))
+    judged = here('evaluate', bag, '--criteria', site)
     for text in (printed, judged, files[0].read_text()):
         assert not FOR_MACHINES.search(text)
         assert words_of(text) >= shown
@@ -83,7 +91,7 @@ def test_a_judged_recording_is_told_in_words(
 def test_a_plan_is_told_in_words_and_written_in_those_of_ros(tmp_path: Path) -> None:
     """Table and card say what the monitor will show; the YAML keeps patterns as they are read."""
     plan, card = tmp_path / 'plan.yaml', tmp_path / 'card.html'
-    printed = ugv('plan', '--short', '-o', plan, '--card', card)
+    printed = here('plan', '--short', '-o', plan, '--card', card)
     for text in (printed, card.read_text()):
         assert not FOR_MACHINES.search(text)
         assert words_of(text) >= {'CAUTION', 'DANGER'}

@@ -1,21 +1,10 @@
 """The verbs simulate, plan and run as a person types them."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
-
-CODE = 'from ugv_acceptance.cli import main; main()'
-
-
-def ugv(*arguments: str) -> 'subprocess.CompletedProcess[str]':
-    """Run the command in a process of its own."""
-    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
-    command = [sys.executable, '-c', CODE, *arguments]
-    return subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+from cli.here import ugv
 
 
 def test_a_simulated_run_that_tips_is_recorded_and_fails(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from ugv_acceptance.model.stability import stability, stances_of, standing, tip_
 from ugv_acceptance.type_aliases import Floats
 
 # How far (deg) the least margin may move with each millimetre of a contact's coordinate.
-STEEPEST = 4.1
+STEEPEST = 4.0
 STOWED = np.pi
 POSTURES = {
     'stowed': (0.0, 2.0, -2.5, STOWED),

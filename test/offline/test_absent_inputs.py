@@ -1,14 +1,13 @@
 """Recordings without an IMU or without joint states, judged with and without a word about it."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+from cli import here
 
 import ugv_acceptance as ugv
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
@@ -19,7 +18,6 @@ T0 = 1_700_000_000 * S
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 FOLDED, STRETCHED = (0.0, 2.0, -2.5, 2.0), (0.0, 0.0, 0.0, 2.0)
 STILL, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 9.81)
-MAIN = 'from ugv_acceptance.cli import main; main()'
 LEVEL_WITHOUT_IMU = 'set topics.imu: null and imu.attitude: level'
 
 
@@ -60,9 +58,7 @@ def packbot(folder: Path, repository: Path, absent: str) -> Path:
 
 def command(*arguments: str) -> tuple[int, str]:
     """Run `ugv-acceptance`; return its exit code and output."""
-    done = subprocess.run(
-        [sys.executable, '-c', MAIN, *arguments], capture_output=True, text=True, check=False
-    )
+    done = here.ugv(*arguments)
     return done.returncode, done.stdout + done.stderr
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
 from ugv_acceptance.evaluation.ground import CARRIED, UPPER_BOUND, ground_words
 from ugv_acceptance.model.stability import RAISED, STATES
@@ -229,6 +230,16 @@ def model(
         ),
     ] = '',
     payload: PayloadMass = '',
+    power_loss: Annotated[
+        bool,
+        typer.Option(
+            '--power-loss', help='Simulate in MuJoCo whether limp joints tip the robot from here.'
+        ),
+    ] = False,
+    braked: Annotated[
+        str,
+        typer.Option(help='With --power-loss: joints whose brakes close without power, NAME,NAME.'),
+    ] = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
     """Print the robot as configured, and its margins in one posture.
@@ -240,18 +251,25 @@ def model(
       ugv-acceptance model
       ugv-acceptance model --posture shoulder_joint=30deg,flipper_joint=180deg
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
+      ugv-acceptance model --posture shoulder_joint=60deg --tilt roll=15deg --power-loss
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.model import print_tables
+    from ugv_acceptance.cli.power_loss import describe_power_loss, print_power_loss
     from ugv_acceptance.cli.robot_description import describe, payload_doubts, warn
     from ugv_acceptance.config import load
 
     loaded = load(config, urdf=urdf)
     description = describe(loaded, posture, tilt, payload)
     warn(payload_doubts(loaded.settings.robot, payload))
+    if braked and not power_loss:
+        raise BadConfig('--braked: expected --power-loss beside it')
+    if power_loss:
+        description['power_loss'] = describe_power_loss(loaded, posture, tilt, payload, braked)
     if as_json:
         import json
 
         typer.echo(json.dumps(description, indent=2))
     else:
         print_tables(description)
+        if power_loss:
+            print_power_loss(description['power_loss'])

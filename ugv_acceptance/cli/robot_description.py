@@ -15,7 +15,7 @@ from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mec
 from ugv_acceptance.model.clearance import clearance, lowest_part, nearness_of
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import Reactions, reactions_of
-from ugv_acceptance.model.robot import Joint, Payload, Robot
+from ugv_acceptance.model.robot import Joint, Payload, Robot, Vector
 from ugv_acceptance.model.stability import (
     RAISED,
     SIDES,
@@ -42,8 +42,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     robot = config.settings.robot
     q = posture_from(robot, posture)
     roll, pitch = _tilt_from(tilt)
-    down = rotation_from_rpy((roll, pitch, 0.0))[2]
-    gravity = (-robot.gravity * down[0], -robot.gravity * down[1], -robot.gravity * down[2])
+    gravity = tilted_gravity(robot, tilt)
     load = payload_from(robot, payload)
     mechanics = mechanics_of(robot)
     found = posture_of(mechanics, q, load.mass, load.cog)
@@ -113,6 +112,13 @@ def warn(sentences: Iterable[str]) -> None:
     """Print warnings to standard error."""
     for text in sentences:
         typer.echo(f'ugv-acceptance: warning: {text}', err=True)
+
+
+def tilted_gravity(robot: Robot, text: str) -> Vector:
+    """Return gravity (m/s2) in `base_link` at a tilt such as 'roll=10deg,pitch=5deg'."""
+    roll, pitch = _tilt_from(text)
+    x, y, z = rotation_from_rpy((roll, pitch, 0.0))[2]
+    return (-robot.gravity * x, -robot.gravity * y, -robot.gravity * z)
 
 
 def _tilt_from(text: str) -> tuple[float, float]:

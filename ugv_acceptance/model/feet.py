@@ -26,7 +26,7 @@ ROCKING = 10.0
 STEEP = math.radians(30.0)
 # Beyond this rocking (rad) each radian counts as DEARER: what is so far off the ground is no foot.
 FAR = math.radians(25.0)
-DEARER = 1.6
+DEARER = 1.5
 # As shares of the contacts' radius: the least distance from the tracks that counts for a drop, and
 # how high above the tracks' ground plane a point of the base is one of the tracks.
 NEAR = 0.25

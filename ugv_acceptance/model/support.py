@@ -135,12 +135,13 @@ def _sets(points: Sequence[Point], feet: Feet) -> Iterator[_Found]:
             continue  # the plane of another face: the same sets
         lean = leaning(math.acos(min(upright, 1.0)))
         price, height = max([drops[k] for k in face]), 0.0
-        order = sorted(zip(heights, others, strict=True))
+        costs = [max(charge * h, drops[k]) for h, k in zip(heights, others, strict=True)]
+        order = sorted(zip(costs, heights, others, strict=True))
         for place in range(len(order) + 1):
             if place:
-                height, k = order[place - 1]
-                bits, price = bits | 1 << k, max(price, charge * height, drops[k])
-            if place == len(order) or order[place][0] - max(height, 0.0) >= LEVEL:
+                cost, h, k = order[place - 1]
+                bits, price, height = bits | 1 << k, max(price, cost), max(height, h)
+            if place == len(order) or order[place][0] - price >= _SAME:
                 if height < LEVEL:
                     planes.append(bits)
                 yield bits, charged(price) + lean, face
@@ -303,18 +304,18 @@ def _near_face(
     lean = leaning(np.arccos(np.minimum(np.broadcast_to(upright, count)[rows], 1.0)))
     price = drops[list(face)].max(axis=0)
     table = np.array([np.broadcast_to(h, count)[rows] for h in heights]).reshape(-1, len(rows))
+    table = np.maximum(charge * table, drops[list(others)])
     order = np.argsort(table, axis=0, kind='stable')
     table = np.take_along_axis(table, order, 0)
-    bits, height, found = np.full(len(rows), _bits(face)), np.zeros(len(rows)), []
+    bits, found = np.full(len(rows), _bits(face)), []
     numbers = np.array([1 << k for k in others], dtype=np.int64)
     for place in range(len(others) + 1):
         if place:
-            k, height = order[place - 1], table[place - 1]
-            bits, drop = bits | numbers[k], drops[np.array(others)[k], np.arange(len(rows))]
-            price = np.maximum(np.maximum(price, charge * height), drop)
+            bits = bits | numbers[order[place - 1]]
+            price = np.maximum(price, table[place - 1])
         some: Rows = ALL
         if place < len(others):
-            some = np.flatnonzero(table[place] - np.maximum(height, 0.0) >= LEVEL)
+            some = np.flatnonzero(table[place] - price >= _SAME)
         found.append((rows[some], bits[some], (charged(price) + lean)[some]))
     return found
 

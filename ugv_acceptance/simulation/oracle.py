@@ -108,12 +108,16 @@ def turn(a: Floats, b: Floats) -> float:
     return float(np.arccos(np.clip(a[2] @ b[2], -1.0, 1.0)))
 
 
-def settled(vehicle: Vehicle, rest: Floats) -> mujoco.MjData:
-    """Return the simulated state after the robot settled on the level, put in attitude `rest`."""
+def settled(vehicle: Vehicle, rest: Floats, q: ArrayLike = 0.0) -> mujoco.MjData:
+    """Return the simulated state after the robot settled on the level, put in attitude `rest`.
+
+    `q` (j,) are the positions of joints that can move; nothing holds them but their damping.
+    """
     model = vehicle.model
     data = mujoco.MjData(model)
     model.opt.gravity[:] = gravity_on_slope(vehicle.robot.gravity, 0.0, 0.0)
     mujoco.mju_mat2Quat(data.qpos[3:7], rest.reshape(9))
+    data.qpos[vehicle.position] = q
     mujoco.mj_forward(model, data)
     spheres = [g for g in range(model.ngeom) if model.geom(g).name.startswith('contact:')]
     data.qpos[2] -= data.geom_xpos[spheres, 2].min() - model.geom_size[spheres[0], 0]
