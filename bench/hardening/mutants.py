@@ -26,11 +26,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('model/row_selection.py', '', '4096 -> 8192'): 'counted or sorted, the values are the same',
     ('model/row_selection.py', 'groups', 'high - low < _FEW -> high - low <= _FEW'): 'the same',
     ('model/row_selection.py', 'groups', 'high - low -> high + low'): 'the same',
-    ('model/support.py', '', '4 -> 5'): 'tried on all or searched one by one, faces are the same',
-    ('model/support.py', '_faces_under', 'h >= -_LEVEL -> h > -_LEVEL'): 'the same',
-    ('model/support.py', '_faces_under', '-_LEVEL -> +_LEVEL'): 'the same',
-    ('model/support.py', '_faces_under', '2 -> 3'): 'any sample may lend its triple',
-    ('model/support.py', '_faces_under', '1 -> 2'): 'any number below 0 says that there is none',
     ('model/stability.py', '_state', '2 -> 3'): 'WEIGHTLESS is 1 m/s2, to any power',
     ('model/expressions.py', '_node',
      '_order(args[1]) < _order(args[0]) -> _order(args[1]) <= _order(args[0])'):

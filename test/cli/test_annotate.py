@@ -167,7 +167,8 @@ def test_the_verdict_is_there_each_second_and_follows_the_alerts(failed: Path) -
 def test_markers_are_drawn_ten_times_a_second(failed: Path) -> None:
     """Each with the support polygon closed."""
     found = decoded(failed / 'run.mcap')['/acceptance_monitor/markers']
-    assert len(found) == pytest.approx(290, abs=3)
+    # In 29 s, but for the one in which the arm lies on the ground.
+    assert len(found) == pytest.approx(282, abs=3)
     for _, array in found:
         outline = {marker.ns: marker for marker in array.markers}['support'].points
         assert (outline[0].x, outline[0].y) == (outline[-1].x, outline[-1].y)

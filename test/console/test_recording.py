@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -201,7 +202,7 @@ def test_no_alert_tells_what_is_yet_to_come(fail: ShownRecording, seconds: float
     """At any time an alert of tipping over tells the worst up to then, not later."""
     when = fail.bag.start_ns + int(seconds * 1e9)
     shown = fail.snapshot_at(when)
-    known = fail.track.angle[: fail.track.row(when) + 1].min(initial=math.inf)
+    known = np.fmin.reduce(fail.track.angle[: fail.track.row(when) + 1], axis=None, initial=np.inf)
     for row in shown.alerts:
         assert row.start <= when
         if row.code == 'TIP_OVER' and 'before the robot tips' in row.text:

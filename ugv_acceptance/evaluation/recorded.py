@@ -301,8 +301,7 @@ class RecordedEvaluator:
         `load` is the payload (mass and place) of each joint row, `whole` says which joint rows have
         all positions and a known load, `known` which rows have margins.
         """
-        q = pairs.joints.q
-        n = q.shape[1]
+        q, n = pairs.joints.q, pairs.joints.q.shape[1]
         table = np.empty((n + (13 if self.detail else 4), len(known)))
         state = np.full(len(known), UNKNOWN, np.int8)
         height = np.full(len(known), np.nan)
