@@ -86,7 +86,7 @@ def truth(released: Released, rng: np.random.Generator) -> tuple[bool, bool]:
     q = np.array(released.q) + rng.normal(0.0, OFF, len(released.q))
     damping = np.exp(rng.uniform(np.log(DAMPINGS[0]), np.log(DAMPINGS[-1]), len(q)))
     real = replace(released, q=tuple(q.tolist()))
-    turned, stood = let_go(real, damping, float(rng.uniform(0.5, 1.0)))
+    turned, stood = let_go(real, damping.tolist(), float(rng.uniform(0.5, 1.0)))
     return turned > OVER, stood
 
 
@@ -102,7 +102,11 @@ def main() -> None:
         if not stood:  # with power too
             fell_before += 1
             continue
-        counts[power_loss(released).answer, tipped] += 1
+        found = power_loss(released)
+        if not found.stood:  # which the verb says: it is no answer about the power
+            fell_before += 1
+            continue
+        counts[found.answer, tipped] += 1
     print(f'seed {seed}: {counts.total()} that stood ({fell_before} others fell with power)')
     for answer in (TIPS, MAY_TIP, NOT_SEEN_TO_TIP):
         print(f'{answer:16} tipped {counts[answer, True]:4}, not {counts[answer, False]:4}')

@@ -12,13 +12,16 @@ from ugv_acceptance.config import load
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot
 from ugv_acceptance.model.statics import torque_of
-from ugv_acceptance.simulation import power_loss as module
 from ugv_acceptance.simulation.power_loss import (
+    DAMPINGS,
     MAY_TIP,
     NOT_SEEN_TO_TIP,
     TIPS,
+    Fall,
     Released,
+    answer_of,
     brakes_of,
+    mixed,
     power_loss,
 )
 
@@ -63,11 +66,27 @@ def test_a_light_mast_on_a_heavy_base_is_not_seen_to_tip() -> None:
     assert power_loss(mast(40.0, 0.0)).answer == NOT_SEEN_TO_TIP
 
 
-def test_some_dampings_that_tip_make_it_may_tip(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The answer is TIPS only if all falls tip, and MAY TIP if one does."""
-    turns = {0.05: 1.0, 0.5: 0.1, 2.0: 0.1}
-    monkeypatch.setattr(module, 'let_go', lambda _, damping, __: (turns[damping], True))
-    assert power_loss(mast(4.0, 0.0)).answer == MAY_TIP
+@pytest.mark.parametrize(
+    ('turns_deg', 'answer'),
+    [
+        ((31.0, 31.0, 31.0), TIPS),
+        ((31.0, 0.1, 0.1), MAY_TIP),
+        ((0.1, 29.0, 31.0), MAY_TIP),
+        ((0.1, 6.0, 0.1), MAY_TIP),
+        ((4.0, 4.0, 4.0), NOT_SEEN_TO_TIP),
+    ],
+)
+def test_the_answer_is_that_of_all_falls(turns_deg: tuple[float, ...], answer: str) -> None:
+    """TIPS if every fall tips, MAY TIP if one turns the base by more than 5 deg."""
+    falls = [Fall((0.5,), math.radians(turn), turn > 30.0) for turn in turns_deg]
+    assert answer_of(falls) == answer
+
+
+def test_joints_may_have_dampings_of_their_own() -> None:
+    """Besides equal ones, every second joint is slow, and each half of them; one joint has none."""
+    f, s = DAMPINGS[0], DAMPINGS[-1]
+    assert set(mixed(4)) == {(f, s, f, s), (s, f, s, f), (f, f, s, s), (s, s, f, f)}
+    assert mixed(1) == ()
 
 
 def test_who_does_not_stand_with_power_is_said_to() -> None:
@@ -101,14 +120,14 @@ def test_packbots_flippers_carry_it() -> None:
 
 def test_the_verb_prints_the_answer_and_writes_it_as_json() -> None:
     """`model --power-loss` says one of three answers, what it means and what was assumed."""
-    words = ('model', '--posture', 'shoulder_joint=60deg,flipper_joint=180deg', '--power-loss')
+    words = ('model', '--posture', 'shoulder_joint=120deg,elbow_joint=-140deg', '--power-loss')
     printed = ugv(*words)
     assert printed.returncode == 0, printed.stderr
     assert 'If the power goes: NOT SEEN TO TIP: no simulated fall' in printed.stdout
     assert 'Assumed: flat ground' in printed.stdout
     found = json.loads(ugv(*words, '--braked', 'shoulder_joint', '--json').stdout)['power_loss']
     assert found['braked'] == ['shoulder_joint']
-    assert [fall['damping_ratio'] for fall in found['falls']] == [0.05, 0.5, 2.0]
+    assert [fall['damping_ratios'] for fall in found['falls']] == [[d] * 4 for d in DAMPINGS]
 
 
 @pytest.mark.parametrize(

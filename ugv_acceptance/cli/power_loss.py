@@ -19,7 +19,7 @@ Values = dict[str, Any]
 
 MEANING = {
     'TIPS': ('red', 'the robot tips at every damping of its joints that was simulated'),
-    'MAY TIP': ('red', 'the robot tips at some dampings of its joints: which it has is not known'),
+    'MAY TIP': ('red', 'at some dampings of its joints it tips, or turns by more than 5 deg'),
     'NOT SEEN TO TIP': ('yellow', 'no simulated fall tipped it; that does not exclude it'),
 }
 ASSUMED = (
@@ -57,7 +57,7 @@ def describe_power_loss(
         'braked': list(held),
         'falls': [
             {
-                'damping_ratio': fall.damping,
+                'damping_ratios': list(fall.damping),
                 'largest_turn_deg': None if fall.tips else math.degrees(fall.turn),
                 'tips': fall.tips,
             }
@@ -87,10 +87,13 @@ def print_power_loss(found: Values) -> None:
     if not found['stands_with_power']:
         console.print('[red]With power it does not stand in this posture either.[/]')
     console.print(f'Held by brakes: {escape(held) or "no joint"}')
-    falls = _table('Simulated falls', 'damping ratio of the joints', 'largest turn deg', 'tips')
+    falls = _table('Simulated falls', 'damping ratios', 'largest turn deg', 'tips')
     for fall in found['falls']:
         turn = f'{fall["largest_turn_deg"]:.1f}' if not fall['tips'] else 'over 30'
-        falls.add_row(f'{fall["damping_ratio"]:g}', turn, 'yes' if fall['tips'] else 'no')
+        ratios = fall['damping_ratios']
+        shown = ratios[:1] if len(set(ratios)) == 1 else ratios
+        text = ' '.join(f'{ratio:g}' for ratio in shown)
+        falls.add_row(text, turn, 'yes' if fall['tips'] else 'no')
     console.print(falls)
     brakes = _table('What a brake would hold here', 'joint', 'torque', 'falls m', 'energy J')
     for brake in found['brakes']:
