@@ -36,16 +36,15 @@ def reference_margin(
     points: ArrayLike,
     cog: ArrayLike,
     gravity: ArrayLike,
-    ground: float = 0.0,
     fixed: Sequence[int] = (),
 ) -> Found:
     """Return the margin of a robot on contact points (n, 3), under gravity in base axes (3,).
 
-    `ground` (m) is the height of the tracks' ground plane, `fixed` are the points of the base.
+    `fixed` are the points of the base.
     """
     at, centre, down = (np.asarray(x, dtype=float) for x in (points, cog, gravity))
     best = Found(-np.inf, (), np.inf)
-    found = list(footings(at, ground, fixed))
+    found = list(footings(at, fixed))
     # Rocking by a quarter turn leaves no margin: it counts only where there is no other footing.
     most = max(MOST, min((rocking for _, rocking in found), default=0.0))
     for chosen, rocking in found:
@@ -57,12 +56,10 @@ def reference_margin(
     return best
 
 
-def footings(
-    points: Floats, ground: float, fixed: Sequence[int]
-) -> Iterator[tuple[tuple[int, ...], float]]:
+def footings(points: Floats, fixed: Sequence[int]) -> Iterator[tuple[tuple[int, ...], float]]:
     """Yield every set of points the robot may stand on, with what its rocking costs (rad)."""
     radius = reach(points)
-    drop = drops(points, ground, fixed)
+    drop = drops(points, fixed)
     for face in combinations(range(len(points)), 3):
         normal = upwards(points[list(face)])
         if normal is None:
@@ -86,20 +83,20 @@ def reach(points: Floats) -> float:
     return float(np.linalg.norm(points[:, :2] - points[:, :2].mean(axis=0), axis=1).max())
 
 
-def drops(points: Floats, ground: float, fixed: Sequence[int]) -> Floats:
+def drops(points: Floats, fixed: Sequence[int]) -> Floats:
     """Return what is charged (rad) for each point (n,) that a robot on its tracks drops onto."""
     found: Floats = np.zeros(len(points))
     if len(fixed) < 3:
         return found
     base = points[list(fixed)]
-    plane = max(ground, sorted(base[:, 2])[2])
+    plane = sorted(base[:, 2])[2]
     high = plane + UNEVEN * reach(base)
     tracks = [k for k in fixed if points[k, 2] <= high]
     outer = [(i, j) for i, j in permutations(tracks, 2) if _is_edge(points, tracks, i, j)]
     others = set(range(len(points))) - set(tracks)
     if len(outer) < 3 or not others:
         return found
-    raised = max(0.0, *(ground - points[k, 2] for k in others))
+    raised = max(0.0, *(plane - points[k, 2] for k in others))
     for k in others:
         away = [-_turn(points[i], points[j], points[k]) / _length(points, i, j) for i, j in outer]
         size = np.clip(max(away), LEAST_REACH * reach(points), reach(points))

@@ -67,7 +67,7 @@ def expected(robot: Robot, q: Floats, gravity: Floats) -> float:
     """Return the reference's least margin (rad) of one sample."""
     fixed = [k for k, contact in enumerate(robot.contacts) if contact.link == robot.root]
     _, cog = centre(robot, q.tolist(), robot.payload)
-    return reference_margin(feet(robot, q.tolist()), cog, gravity, robot.ground, fixed).margin
+    return reference_margin(feet(robot, q.tolist()), cog, gravity, fixed).margin
 
 
 def check(robot: Robot, q: Floats, gravity: Floats) -> None:
@@ -179,3 +179,11 @@ def test_a_robot_that_would_drop_onto_its_flippers_has_tipped(flippers: float) -
     """Its front drops by 6 to 12 deg before they hold it: that is no margin."""
     q = np.array((0.0, 0.0, 0.0, np.radians(flippers)))
     assert least_alone(packbot(), q, np.array(DOWN)) < 0.0
+
+
+@pytest.mark.parametrize('ground', [-0.1, 0.03, 0.07])
+def test_a_wrong_height_of_the_ground_makes_no_flipper_a_foot(ground: float) -> None:
+    """At full reach forward PackBot is 18 deg past tipping, wherever the ground is said to be."""
+    robot = replace(load().settings.robot, ground=ground)
+    found = least(robot, np.zeros((1, 4)), np.array([[0.0, 0.0, -9.81]]))
+    assert float(np.degrees(found[0])) == pytest.approx(-18.0, abs=0.1)

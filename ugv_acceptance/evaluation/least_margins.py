@@ -2,13 +2,40 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import SupportsFloat
+
+import numpy as np
 
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.type_aliases import Floats, Json, Times
 
 # What stands in place of the tilt left where nobody measures it.
 TILT_NOT_CHECKED = 'tip-over not checked (no IMU: the base was declared level)'
+
+
+@dataclass(slots=True)
+class LeastTilt:
+    """The least of a margin (rad): to which side and when (ns); infinite if none was known."""
+
+    value: float = math.inf
+    side: str = ''
+    time: int = 0
+
+    def take(self, time: Times, margin: Floats) -> None:
+        """Take margins (n, 4) at `time` (n,); NaN: not known."""
+        known = np.where(np.isnan(margin), np.inf, margin)
+        if known.size and known.min() < self.value:
+            k, side = divmod(int(known.argmin()), len(SIDES))
+            self.value, self.side, self.time = float(known[k, side]), SIDES[side], int(time[k])
+
+    def json(self, start: int) -> Json | None:
+        """Return it for a result whose recording began at `start` (ns); None if none was known."""
+        if self.value == math.inf:
+            return None
+        seconds = (self.time - start) / 1e9
+        return {'deg': math.degrees(self.value), 'side': self.side, 'time_s': seconds}
 
 
 def least_tilt(angles: Iterable[SupportsFloat]) -> tuple[str, float]:

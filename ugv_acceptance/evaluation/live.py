@@ -167,7 +167,7 @@ class LiveEvaluator:
             return
         self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
         self._stances = stances_of(self._mechanics, self._posture)
-        self._chassis.stands = self._stances, tuple(self._joints.q), load
+        self._chassis.pose = tuple(self._joints.q), load
         self.ground.stands(self._joints.q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
@@ -335,7 +335,7 @@ class LiveEvaluator:
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
         posture, gravity, until = self._posture, self._gravity, self._alive_until()
         unknown = posture is None or gravity[0] != gravity[0] or now > until
-        stance = None if unknown else standing(self._stances, gravity)
+        stance = self._chassis.stance = None if unknown else standing(self._stances, gravity)
         touch = FREE
         if stance is not None:
             touch = self.ground.step(now, None if self._level else stance.ground_face)
@@ -357,9 +357,9 @@ class LiveEvaluator:
         prediction = self.watch.prediction
         if now >= prediction.due:
             prediction.keep(now, stability.angle, torque, self._joints.effort, q)
-            stands = self._chassis.stands
-            if stands is not None and not self._level:
-                self.watch.trend.keep(now, stability.angle, q, gravity, stands[2])
+            pose = self._chassis.pose
+            if pose is not None and not self._level:
+                self.watch.trend.keep(now, stability.angle, q, gravity, pose[1])
         return self.margins
 
     def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:

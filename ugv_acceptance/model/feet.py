@@ -8,16 +8,16 @@ points costs is charged here; which sets there are is found in support.py.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, reduce
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ugv_acceptance.model.expressions import Number, Vec
-from ugv_acceptance.model.hull import Cycle, Point, hull, pairs
+from ugv_acceptance.model.expressions import Number
+from ugv_acceptance.model.hull import Cycle, Point, hull, largest, pairs
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.row_selection import Values
-from ugv_acceptance.model.tree import in_body
+from ugv_acceptance.model.tree import in_body, plain
 
 # Rocking (rad) charged for a point that is as far from the plane as the contacts are from their
 # middle; for a point that drops by its distance from the tracks; for each radian of a face's
@@ -86,7 +86,7 @@ def feet_of(mechanics: Mechanics) -> Feet:
     """Return the Feet of a robot."""
     robot, frames = mechanics.robot, mechanics.tree.frames
     base = {
-        k: _plain(in_body(mechanics.tree, contact.link, contact.position)[1])
+        k: plain(in_body(mechanics.tree, contact.link, contact.position)[1])
         for k, contact in enumerate(robot.contacts)
         if frames[contact.link][0] == 0
     }
@@ -94,7 +94,7 @@ def feet_of(mechanics: Mechanics) -> Feet:
     none = Feet((), robot.ground, (), (), robot.ground, tolerance, moves)
     if len(base) < 3:
         return none
-    plane = max(robot.ground, sorted(z for _, _, z in base.values())[2])
+    plane = sorted(z for _, _, z in base.values())[2]
     band = BAND * radius_of(list(base.values()))
     tracks = tuple(k for k, (_, _, z) in base.items() if z <= plane + band)
     polygon = hull(tuple(base[k] for k in tracks), tracks)
@@ -117,7 +117,7 @@ def _furthest(mechanics: Mechanics) -> float:
     tree, found = mechanics.tree, 0.0
     for contact in mechanics.robot.contacts:
         body, point = in_body(tree, contact.link, contact.position)
-        length = math.hypot(*_plain(point))
+        length = math.hypot(*plain(point))
         while body:
             if tree.bodies[body].prismatic:
                 return math.inf
@@ -131,11 +131,6 @@ def _line(start: Point, end: Point) -> tuple[float, float, float, float]:
     x, y = end[0] - start[0], end[1] - start[1]
     length = math.hypot(x, y)
     return (start[0], start[1], y / length, -x / length)
-
-
-def _plain(point: Vec) -> Point:
-    x, y, z = (float(c) for c in point)  # type: ignore[arg-type]  # numbers in, numbers out
-    return (x, y, z)
 
 
 def height_over(
@@ -173,7 +168,7 @@ def drops_of(points: Sequence[Any], feet: Feet, radius: Any) -> list[Any]:  # no
     if not feet.others:
         return prices
     # Flippers below the tracks' plane raise the robot: others then reach the ground earlier.
-    raised = largest([0.0, *(feet.ground - points[k][2] for k, _ in feet.others)])
+    raised = largest([0.0, *(feet.plane - points[k][2] for k, _ in feet.others)])
     for k, height in feet.others:
         x, y, z = points[k]
         away = [(x - ax) * nx + (y - ay) * ny for ax, ay, nx, ny in feet.lines]
@@ -187,10 +182,3 @@ def charged(price: Values) -> Values:
     if isinstance(price, float):
         return max(price, FAR + DEARER * (price - FAR))
     return np.maximum(price, FAR + DEARER * (price - FAR))
-
-
-def largest(values: Sequence[Any]) -> Any:  # noqa: ANN401 - a float, or one a row
-    """Return the largest of floats, or of arrays row by row."""
-    if all(isinstance(x, float) for x in values):
-        return max(values)
-    return reduce(np.maximum, values)

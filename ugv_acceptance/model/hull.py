@@ -61,17 +61,20 @@ def hull(points: tuple[Point, ...], numbers: tuple[int, ...]) -> Cycle:
     return cycle[start:] + cycle[:start]
 
 
-def _is_thin(points: Sequence[Any], largest: Callable[[list[Any]], Any]) -> Values:
+def _is_thin(points: Sequence[Any], greatest: Callable[[list[Any]], Any]) -> Values:
     """Return whether the points are within THIN of one line, seen from above.
 
-    `largest` is the maximum of a list: of floats for one sample, of arrays for many.
+    `greatest` is the maximum of a list: of floats for one sample, of arrays for many.
     """
-    thickest = largest([abs(_turn(*three)) for three in combinations(points, 3)])
-    square = largest([(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)])
+    thickest = greatest([abs(_turn(*three)) for three in combinations(points, 3)])
+    square = greatest([(a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 for a, b in combinations(points, 2)])
     return thickest * thickest <= THIN * THIN * square
 
 
-def _largest(values: list[Any]) -> Values:
+def largest(values: Sequence[Any]) -> Any:  # noqa: ANN401 - a float, or one a row
+    """Return the largest of floats, or of arrays row by row."""
+    if all(isinstance(x, float) for x in values):
+        return max(values)
     return reduce(np.maximum, values)
 
 
@@ -113,8 +116,8 @@ def _is_hull(points: Sequence[Any], cycle: Cycle, active: Cycle) -> Values:
     if len(active) < 3:
         return True
     if not cycle:
-        return _is_thin([points[k] for k in active], _largest)
-    good = np.logical_not(_is_thin([points[k] for k in cycle], _largest))
+        return _is_thin([points[k] for k in active], largest)
+    good = np.logical_not(_is_thin([points[k] for k in cycle], largest))
     for i, j in pairs(cycle):
         for k in active:
             if k not in {i, j}:

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from ugv_acceptance.model.expressions import Vec, add, rotate, subtract, transpose
 from ugv_acceptance.model.robot import Contact, Robot, Vector
-from ugv_acceptance.model.tree import Tree, in_body, tree_of
+from ugv_acceptance.model.tree import Tree, in_body, plain, tree_of
 
 # What is left of a track that is shorter than the cut (m to each side of its middle).
 STUMP = 0.001
@@ -29,7 +29,7 @@ def shortened(robot: Robot, cut: float) -> Robot:
     """
     tree = tree_of(robot)
     placed = [in_body(tree, contact.link, contact.position) for contact in robot.contacts]
-    at = [(body, _plain(point)) for body, point in placed]
+    at = [(body, plain(point)) for body, point in placed]
     of_base = [point[0] for body, point in at if body == 0]
     middle = (min(of_base) + max(of_base)) / 2.0 if of_base else 0.0
     moved = []
@@ -66,13 +66,8 @@ def _drawn_in(axis: Vector, point: Vector, cut: float) -> Vector:
     return (along * axis[0] + share * x, along * axis[1] + share * y, along * axis[2] + share * z)
 
 
-def _plain(vector: Vec) -> Vector:
-    x, y, z = (float(c) for c in vector)  # type: ignore[arg-type]  # numbers in, numbers out
-    return (x, y, z)
-
-
 def _moved(tree: Tree, contact: Contact, by: Vec) -> Contact:
     """Return a contact moved `by` so much (m, axes of its body)."""
     turn = tree.frames[contact.link][1]
     shift = rotate(transpose(turn), by)
-    return replace(contact, position=_plain(add(contact.position, shift)))
+    return replace(contact, position=plain(add(contact.position, shift)))

@@ -38,11 +38,10 @@ from ugv_acceptance.model.feet import (
     drops_of,
     feet_of,
     height_over,
-    largest,
     leaning,
     radius_of,
 )
-from ugv_acceptance.model.hull import THIN, Cycle, Point, hull, hulls, pairs
+from ugv_acceptance.model.hull import THIN, Cycle, Point, hull, hulls, largest, pairs
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.model.row_selection import ALL, Rows, Values, groups, pick

@@ -104,13 +104,13 @@ def tree_of(robot: Robot) -> Tree:
     members: list[list[tuple[float, Vector, Matrix]]] = [[] for _ in moving]
     for link in robot.links:
         frame = frames[link.name]
-        cog = _plain(add(frame.xyz, rotate(frame.rotation, link.cog)))
+        cog = plain(add(frame.xyz, rotate(frame.rotation, link.cog)))
         inertia = matmul(matmul(frame.rotation, link.inertia), transpose(frame.rotation))
         members[frame.body].append((link.mass, cog, _plain_matrix(inertia)))
     bodies = []
     for k, (joint, parent) in enumerate(moving):
-        at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
-        axis = _plain(rotate(frames[joint.child].rotation, joint.axis))
+        at = plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
+        axis = plain(rotate(frames[joint.child].rotation, joint.axis))
         bodies.append(Body(joint.name, parent.body, joint.slides, axis, at, *_lump(members[k])))
     return Tree(tuple(bodies), {n: (f.body, f.rotation, f.xyz) for n, f in frames.items()})
 
@@ -181,21 +181,22 @@ def _child_frame(
         number = len(moving)
         moving.append((joint, parent))
         return _Frame(number, turned, ZERO)
-    at = _plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
+    at = plain(add(parent.xyz, rotate(parent.rotation, joint.xyz)))
     if joint.slides:
-        at = _plain(add(at, scale(rotate(turned, joint.axis), held)))
+        at = plain(add(at, scale(rotate(turned, joint.axis), held)))
     elif joint.kind != 'fixed':
         turned = _plain_matrix(matmul(turned, rotation_about(joint.axis, held)))
     return _Frame(parent.body, turned, at)
 
 
-def _plain(v: Sequence[Scalar]) -> Vector:
+def plain(v: Sequence[Scalar]) -> Vector:
+    """Return a vector whose coordinates are numbers, as one of floats."""
     x, y, z = (float(c) for c in v)  # type: ignore[arg-type]  # numbers in, numbers out
     return (x, y, z)
 
 
 def _plain_matrix(m: Sequence[Vec]) -> Matrix:
-    a, b, c = (_plain(row) for row in m)
+    a, b, c = (plain(row) for row in m)
     return (a, b, c)
 
 
@@ -204,8 +205,8 @@ def _lump(parts: list[tuple[float, Vector, Matrix]]) -> tuple[float, Vector, Mat
     mass = math.fsum(m for m, _, _ in parts)
     if mass == 0.0:
         return 0.0, ZERO, NO_INERTIA
-    cog = _plain([math.fsum(m * c[k] for m, c, _ in parts) / mass for k in range(3)])
-    placed = [(m, _plain(subtract(c, cog)), own) for m, c, own in parts]
+    cog = plain([math.fsum(m * c[k] for m, c, _ in parts) / mass for k in range(3)])
+    placed = [(m, plain(subtract(c, cog)), own) for m, c, own in parts]
 
     def entry(i: int, j: int) -> float:
         return math.fsum(
@@ -213,7 +214,7 @@ def _lump(parts: list[tuple[float, Vector, Matrix]]) -> tuple[float, Vector, Mat
             for m, d, own in placed
         )
 
-    inertia = [_plain([entry(i, j) for j in range(3)]) for i in range(3)]
+    inertia = [plain([entry(i, j) for j in range(3)]) for i in range(3)]
     return mass, cog, _plain_matrix(inertia)
 
 

@@ -11,6 +11,7 @@ from ugv_acceptance.evaluation.chassis.filters import TRUE
 from ugv_acceptance.evaluation.chassis.motion import LIFT
 from ugv_acceptance.evaluation.criteria.criteria import FAIL, INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
+from ugv_acceptance.evaluation.least_margins import LeastTilt
 from ugv_acceptance.evaluation.margin_table import ChassisRows, MarginRows
 from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.type_aliases import Floats, Json, Times
@@ -43,35 +44,11 @@ class _Event:
 
 
 @dataclass(slots=True)
-class _Worst:
-    """The least of a margin (rad): where and when (ns); infinite if none was judged."""
-
-    value: float = math.inf
-    side: str = ''
-    time: int = 0
-
-    def take(self, time: Times, margin: Floats) -> None:
-        """Take margins (m, 4) at `time` (m,)."""
-        if not margin.size:
-            return
-        k, side = divmod(int(margin.argmin()), len(SIDES))
-        if margin[k, side] < self.value:
-            self.value, self.side, self.time = float(margin[k, side]), SIDES[side], int(time[k])
-
-    def json(self, start: int) -> Json | None:
-        """Return it for a result whose recording began at `start` (ns)."""
-        if self.value == math.inf:
-            return None
-        seconds = (self.time - start) / 1e9
-        return {'deg': math.degrees(self.value), 'side': self.side, 'time_s': seconds}
-
-
-@dataclass(slots=True)
 class ChassisExamination:
     """Looks at what the chassis felt in a run: an examination of criteria/statement.py."""
 
-    _moving: _Worst = field(default_factory=_Worst)
-    _effective: _Worst = field(default_factory=_Worst)
+    _moving: LeastTilt = field(default_factory=LeastTilt)
+    _effective: LeastTilt = field(default_factory=LeastTilt)
     _tips: _Event = field(default_factory=_Event)
     _lifts: _Event = field(default_factory=_Event)
     _denied: _Event = field(default_factory=_Event)

@@ -17,7 +17,7 @@ from ugv_acceptance.model.edges import SIDES, corners_of
 from ugv_acceptance.model.kernels import Kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import IDENTITY, Payload, Vector
-from ugv_acceptance.model.stability import Stance, standing
+from ugv_acceptance.model.stability import Stance
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
 from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of
 
@@ -133,15 +133,16 @@ class Episodes:
         return [past * past * wn2 > 1.0 and turn < NONE for past, turn, wn2 in found]
 
 
-# What a posture determines: ways to stand, joint positions (rad, m), payload.
-Pose = tuple[tuple[Stance, ...], tuple[float, ...], Payload]
+# What the inertia depends on: joint positions (rad, m), payload.
+Pose = tuple[tuple[float, ...], Payload]
 
 
 @dataclass(slots=True)
 class ChassisMotion:
     """What live and recorded forms share: filters, episodes, signals, compiled mechanics.
 
-    `stands` is how the robot stands since the newest joint state, None while that is not known.
+    `pose` is that of the newest joint state, `stance` how the robot stands by the newest margins,
+    None while that is not known.
     `busy` says that a signal is not quiet,
     `turned` that the gyro showed any number but 0: one that never does is none.
     """
@@ -151,7 +152,8 @@ class ChassisMotion:
     filter: ChassisFilter = field(init=False)
     mechanics: Mechanics = field(init=False)
     episodes: Episodes = field(default_factory=Episodes)
-    stands: Pose | None = None
+    pose: Pose | None = None
+    stance: Stance | None = None
     busy: bool = False
     turned: bool = False
     _inertia: tuple[Pose | None, Four] = (None, ())
@@ -185,10 +187,10 @@ class ChassisMotion:
             if not felt.blocks.known:
                 self.episodes.begin()
             return
-        stands = self.stands
-        if stands is None or angles is None or not rate or not self.turned:
+        stance = self.stance
+        if stance is None or angles is None or not rate or not self.turned:
             return
-        least, stance = min(angles), standing(stands[0], gravity)
+        least = min(angles)
         if stance.edges is None or not least > 0.0:  # past tipping at rest: TIP_OVER says it all
             return
         square, up, off = found
@@ -244,12 +246,12 @@ class ChassisMotion:
 
     def margins(self, gravity: Vector) -> tuple[Four, ...]:
         """Return the four results of model/tipping.py for the newest message and stance."""
-        if self.stands is None:
+        stance = self.stance
+        if self.pose is None or stance is None:
             return (UNKNOWN4,) * 4
-        stances, q, load = self.stands
-        stance = standing(stances, gravity)
-        if self._inertia[0] is not self.stands:
-            self._inertia = self.stands, inertia_of(self.mechanics).one(*q, load.mass, *load.cog)
+        q, load = self.pose
+        if self._inertia[0] is not self.pose:
+            self._inertia = self.pose, inertia_of(self.mechanics).one(*q, load.mass, *load.cog)
         kernel = stance_kernel(self.mechanics, stance, self.settings.imu.position)
         _, _, _, vx, vy, vz, px, py, pz, qx, qy, qz, _, _ = self.filter.state
         gx, gy, gz = gravity
@@ -261,7 +263,7 @@ class ChassisMotion:
         """Return the tilt left (rad) to each side with the energy of the turn; None: no gyro."""
         if not (self.turned and self.filter.blocks.fast):
             return None
-        if self.stands is None or self.stands[0][0].edges is None:
+        if self.stance is None or self.stance.edges is None:
             return None
         return tuple(map(min, self.margins(gravity)[0], angles))
 

@@ -24,37 +24,15 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.ground import CARRIED, FLAT, KINDS
 from ugv_acceptance.evaluation.holding_back import doubtful_spans, drawn_in_doubt
+from ugv_acceptance.evaluation.least_margins import LeastTilt
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.shortened_tracks import has_tracks
-from ugv_acceptance.model.stability import RAISED, SIDES
-from ugv_acceptance.type_aliases import Floats, Json, Times
+from ugv_acceptance.model.stability import RAISED
+from ugv_acceptance.type_aliases import Json, Times
 
 SAFEGUARD = 'ground'
 Numbers = NDArray[np.int8]
-
-
-@dataclass(slots=True)
-class _Least:
-    """The least of a margin (rad): to which side and when (ns); infinite if none was known."""
-
-    value: float = math.inf
-    side: str = ''
-    time: int = 0
-
-    def take(self, time: Times, margin: Floats) -> None:
-        """Take margins (n, 4) at `time` (n,); NaN: not known."""
-        known = np.where(np.isnan(margin), np.inf, margin)
-        if known.size and known.min() < self.value:
-            k, side = divmod(int(known.argmin()), len(SIDES))
-            self.value, self.side, self.time = float(known[k, side]), SIDES[side], int(time[k])
-
-    def json(self, start: int) -> Json | None:
-        """Return it for a result whose recording began at `start` (ns); None if none was known."""
-        if self.value == math.inf:
-            return None
-        seconds = (self.time - start) / 1e9
-        return {'deg': math.degrees(self.value), 'side': self.side, 'time_s': seconds}
 
 
 @dataclass(slots=True)
@@ -72,8 +50,8 @@ class GroundExamination:
     _held: Times = field(default_factory=lambda: np.zeros(len(KINDS), np.int64))
     _raised: int = 0
     _not_cautious: int = 0
-    _bound: _Least = field(default_factory=_Least)
-    _cautious: _Least = field(default_factory=_Least)
+    _bound: LeastTilt = field(default_factory=LeastTilt)
+    _cautious: LeastTilt = field(default_factory=LeastTilt)
     _last: tuple[int, int, int, bool, bool] | None = None
 
     def add(self, rows: MarginRows) -> None:
