@@ -4,7 +4,7 @@ Prints the share of cases in which the margin the advice is for is larger afterw
 simulation; how many robots tipped on the way, and how near the others came to it; how far the gain
 came out as promised; and what it costs to find the advice.
 
-    python bench/bench_advice.py [trials of each kind] [kinds]
+    python -m bench.bench_advice [trials of each kind] [kinds]
 """
 
 import math

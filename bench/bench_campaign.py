@@ -1,4 +1,4 @@
-"""Throughput of a campaign: `python bench/bench_campaign.py [FOLDER]`, one worker against several.
+"""Throughput of a campaign: `python -m bench.bench_campaign [FOLDER]`, one worker against several.
 
 FOLDER holds recordings, such as make_fleet.py writes; without it one-minute bags with the rates of
 a real robot are written: joint states at 200 Hz, IMU at 400 Hz, zstd. The campaign runs in a fresh

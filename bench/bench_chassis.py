@@ -2,7 +2,7 @@
 
 Then hours of ordinary driving as signals: how often it cries wolf.
 
-    nice python bench/bench_chassis.py [trials] [hours]
+    nice python -m bench.bench_chassis [trials] [hours]
 """
 
 import math

@@ -3,7 +3,7 @@
 A tilt that swings one degree about the warning limit for ten minutes at 50 Hz, measured with a
 noise of half a degree. The number of alerts raised is counted.
 
-    python bench/bench_chatter.py [swings a minute ...]
+    python -m bench.bench_chatter [swings a minute ...]
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The console beside a live robot: `python bench/bench_console.py`.
+"""The console beside a live robot: `python -m bench.bench_console`.
 
 A driver (100 Hz joints, 200 Hz IMU), a monitor and a console are processes; a real Chromium paints.
 Prints the time from a message's stamp to the screen, frames that were dropped while maps are made

@@ -4,7 +4,7 @@ Prints the margins of PackBot with one contact lowered, the largest step of the 
 move, and margins of random robots on uneven feet beside simulated tips. Draws the figure of
 docs/model.md into a folder.
 
-    nice python bench/bench_contact.py [cases] [folder]
+    nice python -m bench.bench_contact [cases] [folder]
 """
 
 import sys

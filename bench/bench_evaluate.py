@@ -2,7 +2,7 @@
 
 Makes (or takes) recordings of 6 joints at 200 Hz and an IMU at 400 Hz, then measures each stage
 in a process of its own: unpacking alone (the floor), columns, margins and alerts, the whole of
-`evaluate`. One run prints all ratios. `python bench/bench_evaluate.py --minutes 10 60`
+`evaluate`. One run prints all ratios. `python -m bench.bench_evaluate --minutes 10 60`
 """
 
 import argparse
@@ -16,8 +16,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from bench_reading import floor, make  # type: ignore[import-not-found]
-
+from bench.bench_reading import floor, make
 from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.config import load

@@ -3,7 +3,7 @@
 Ours gives torques and the tilt left to every edge, or also the edges' moments, energies and ZMP;
 the loops give torques and the centre of mass alone. CPU seconds, best of rounds; ratios count.
 
-    python bench/bench_kernels.py [postures]
+    python -m bench.bench_kernels [postures]
 """
 
 import math

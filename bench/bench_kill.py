@@ -1,4 +1,4 @@
-"""Kills a run at random moments (kill -9) and checks what is left: `python bench/bench_kill.py`.
+"""Kills a run at random moments (kill -9) and checks what is left: `python -m bench.bench_kill`.
 
 For every kill: seconds it ran and what it was doing (from its journal), steps with a result,
 recordings that can be read, whether closed ones are complete, seconds between the last message

@@ -1,6 +1,6 @@
 """Live path: CPU a message, latency from publishing to the margin, loss; beside three others.
 
-    nice python bench/bench_live.py [--seconds 5] [--rounds 3]
+    nice python -m bench.bench_live [--seconds 5] [--rounds 3]
 
 Every round starts each listener anew with the same load: an empty raw subscriber on the events
 executor (the floor), an empty decoded one, our monitor (margins of every message, its topics at

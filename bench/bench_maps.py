@@ -2,7 +2,7 @@
 
 Each way a few times, all ways in turn, medians; the torque maps must be the same booleans.
 
-    python bench/bench_maps.py [cells a side]
+    python -m bench.bench_maps [cells a side]
 """
 
 import math

@@ -4,7 +4,7 @@ Truth is the same floating base with what nobody knows beforehand: a damping of 
 joint, the friction of the ground, a posture that is off by a degree. It shows what three dampings
 miss of these, not what MuJoCo misses of the world.
 
-    python bench/bench_power_loss.py [true tips wanted] [seed]
+    python -m bench.bench_power_loss [true tips wanted] [seed]
 """
 
 import math

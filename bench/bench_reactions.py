@@ -3,7 +3,7 @@
 PackBot on its raised flippers, and Go2, B1 and ANYmal C on their legs: on three feet, on four, and
 on four with friction that may brace them. The three legged robots' URDFs are read from a folder.
 
-    python bench/bench_reactions.py [folder of robots, by default ../shared/robots]
+    python -m bench.bench_reactions [folder of robots, by default ../shared/robots]
 """
 
 import math

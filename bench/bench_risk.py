@@ -1,6 +1,6 @@
 """Risk: Monte Carlo against the cost of its random numbers, memory, quadrature.
 
-python bench/bench_risk.py [samples]
+python -m bench.bench_risk [samples]
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Do alerts come in time: labelled runs on both cores; `python bench/bench_scenarios.py`.
+"""Do alerts come in time: labelled runs on both cores; `python -m bench.bench_scenarios`.
 
 Prints recall of critical events, warning time before them by kind (p5, p50), false critical alerts
 per hour of quiet work by kind, the same for predictions, and how fast the simulation was.

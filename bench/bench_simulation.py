@@ -3,7 +3,7 @@
 A run is recorded with the IMU at 400 Hz and the joints at 200 Hz into a rosbag2 folder (MCAP, zstd,
 CRC). CPU seconds for one run, wall seconds for a batch on two processes; medians of rounds in turn.
 
-    python bench/bench_simulation.py [seconds]
+    python -m bench.bench_simulation [seconds]
 """
 
 import statistics

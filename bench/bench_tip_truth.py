@@ -3,7 +3,7 @@
 First table: random postures, payloads, flipper angles and slopes, quasi-static. Second: joints
 moved at speed on slopes, spread evenly over the static margin; each cell is the share that tips.
 
-    python bench/bench_tip_truth.py [cases] [motions]
+    python -m bench.bench_tip_truth [cases] [motions]
 """
 
 import math

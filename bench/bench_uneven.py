@@ -1,6 +1,6 @@
 """Tip-overs on uneven ground: who warns of them, and who cries wolf. docs/uneven_ground.md.
 
-    nice python bench/bench_uneven.py [drives on each scene] [seed] [hours on flat ground]
+    nice python -m bench.bench_uneven [drives on each scene] [seed] [hours on flat ground]
 
 The drives are split over two processes. Draws docs/images/uneven_tradeoff.png.
 """

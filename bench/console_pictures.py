@@ -1,4 +1,4 @@
-"""Pictures of the console in four states, wide and on a phone: `python bench/console_pictures.py`.
+"""Pictures of the console in four states, wide and on a phone: `python -m bench.console_pictures`.
 
 A real monitor watches a driver that stands still, stretches its arm and falls silent; a real
 Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small enough to be kept.

@@ -1,6 +1,6 @@
 """How often efforts are named rightly: falsified robots against the truth, with many seeds.
 
-`python bench/effort_meanings.py [--seeds N] [--postures P] [--robots DIR]`
+`python -m bench.effort_meanings [--seeds N] [--postures P] [--robots DIR]`
 """
 
 import argparse

@@ -3,7 +3,7 @@
 Simulated runs of a minute, all drawn from seeds: good ones in several forms, and each kind of
 fault. Alerts of the checks at rest are left out.
 
-    python bench/imu_checks_trial.py [runs of each kind]
+    python -m bench.imu_checks_trial [runs of each kind]
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Simulate a fleet's acceptance campaign: `python bench/make_fleet.py FOLDER`.
+"""Simulate a fleet's acceptance campaign: `python -m bench.make_fleet FOLDER`.
 
 Half of the runs have firmware fw1, half fw2, which fails more rarely; a run an hour, short. Among
 them are a copy, a file that breaks off and one that is no recording. The same seed gives the same

@@ -1,6 +1,6 @@
 """Draws the scenes of uneven_scenes.py, each with the robot on it, into docs/images.
 
-MUJOCO_GL=egl python bench/uneven_pictures.py
+MUJOCO_GL=egl python -m bench.uneven_pictures
 """
 
 from itertools import pairwise

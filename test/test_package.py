@@ -148,3 +148,14 @@ def test_no_file_names_a_machine_or_a_registry(repository: Path) -> None:
         if text.encode() in path.read_bytes()
     ]
     assert not found
+
+
+def test_the_benches_start_as_it_is_written(repository: Path) -> None:
+    """Each command that names one finds it, from the root of the checkout, with what it imports."""
+    pages = [*repository.glob('docs/**/*.md'), *repository.glob('bench/**/*.py')]
+    text = '\n'.join(page.read_text('utf-8') for page in pages)
+    assert 'python bench' + '/' not in text
+    named = set(re.findall(r'python -m (bench(?:\.[a-z_]+)+)', text))
+    assert len(named) > 20
+    code = 'import importlib, sys; [importlib.import_module(name) for name in sys.argv[1:]]'
+    subprocess.run([sys.executable, '-c', code, *named], check=True, cwd=repository, timeout=120)
