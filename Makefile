@@ -63,7 +63,7 @@ tools: .venv/.tools
 .venv/.installed: $(REQUIREMENTS)
 	@echo 'Installing what is needed into .venv: 0.7 GB, 1 to 6 minutes.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim]'
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,init,sim]'
 	test -x .venv/bin/ugv-acceptance
 	touch $@
 
@@ -71,7 +71,7 @@ tools: .venv/.tools
 .venv/.tools: $(REQUIREMENTS)
 	@echo 'Installing what is needed and what the tests need into .venv: 1.6 GB, 2 to 18 minutes.'
 	test -x .venv/bin/python || $(PYTHON) -m venv .venv
-	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,sim,$(TOOLS)]'
+	.venv/bin/python $(PIP_INSTALL) $(ROS) -e '.[console,fast,init,sim,$(TOOLS)]'
 	test -x .venv/bin/ugv-acceptance
 	touch $@ .venv/.installed
 
@@ -80,7 +80,7 @@ tools: .venv/.tools
 	@echo 'Installing what is needed and what the tests need into .venv312: 1.6 GB, 2 to 18 minutes.'
 	test -x .venv312/bin/python || $(JAZZY_PYTHON) -m venv .venv312
 	.venv312/bin/python $(PIP_INSTALL) -c requirements/jazzy.txt $(ROS) \
-	    -e '.[console,fast,sim,test]' colcon-common-extensions
+	    -e '.[console,fast,init,sim,test]' colcon-common-extensions
 	touch $@
 
 # The pip that comes with 3.10 searches for over ten minutes before it finds versions that fit.
@@ -89,7 +89,7 @@ tools: .venv/.tools
 	test -x .venv3$*/bin/python || "$$python" -m venv .venv3$*
 	.venv3$*/bin/python -m pip install -qq --upgrade pip
 	.venv3$*/bin/python $(PIP_INSTALL) $(if $(filter 10,$*),-c requirements/jazzy.txt) -r requirements/ros.txt \
-	    -e '.[console,fast,sim,test]'
+	    -e '.[console,fast,init,sim,test]'
 	touch $@
 
 demo: venv

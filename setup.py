@@ -47,7 +47,7 @@ TEST = [
     'wheel',
 ]
 # Extras that the tests try too.
-TESTED = ('cluster', 'console', 'foxglove', 'pdf', 'sim', 'table')
+TESTED = ('cluster', 'console', 'foxglove', 'init', 'pdf', 'sim', 'table')
 DOCS = ['furo', 'myst-parser', 'sphinx']
 LINT = [
     'mypy',

@@ -16,7 +16,7 @@ MODULES = sorted(PACKAGE.rglob('*.py'))
 # What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
 BELOW_OFFLINE = {'model', 'studies', 'evaluation', 'config', 'bag', 'monitoring', 'report'}
 BELOW_RUN = BELOW_OFFLINE | {'offline', 'simulation', 'plan', 'campaign', 'processes'}
-BELOW_NODES = BELOW_RUN | {'run', 'console'}
+BELOW_NODES = BELOW_RUN | {'run', 'console', 'configure'}
 MAY_IMPORT: dict[str, set[str]] = {
     # The front door: for types, and when a name is first used.
     '__init__': {'bag', 'config', 'model', 'monitoring', 'offline'},
@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'evaluation': {'model'},
     'config': {'model', 'evaluation'},
     'bag': {'model', 'evaluation'},
+    'configure': {'model', 'evaluation', 'config', 'bag', 'report'},
     'monitoring': {'model', 'evaluation', 'config', 'bag'},
     'simulation': {'model', 'processes'},
     'report': {'model', 'studies', 'evaluation'},
@@ -61,6 +62,7 @@ HOME_OF = {
     'rosbags': {'bag', 'offline'},
     'distributed': {'campaign'},
     'foxglove': {'nodes'},
+    'collada': {'configure'},
     'fsspec': {'campaign'},
     'matplotlib': {'report'},
     'jinja2': {'report', 'plan'},
@@ -69,8 +71,10 @@ HOME_OF = {
     'typer': {'cli'},
     'starlette': {'console'},
     'textual': {'console'},
+    'trimesh': {'configure'},
     'uvicorn': {'console'},
     'websockets': {'console'},
+    'xacro': {'configure'},
 }
 # The pure part takes time, files and settings as arguments.
 PURE = {'model', 'studies', 'evaluation'}

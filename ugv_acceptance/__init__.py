@@ -66,6 +66,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     'console': ('starlette', 'textual', 'uvicorn', 'websockets'),
     'fast': ('isal',),
     'foxglove': ('foxglove-sdk',),
+    'init': ('pycollada', 'trimesh', 'xacro'),
     'pdf': ('weasyprint',),  # over Debian's libpango-1.0-0 and libpangoft2-1.0-0
     'sim': ('mujoco',),
     'table': ('pyarrow',),
