@@ -10,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Document, Path
+from ugv_acceptance.config.poses import poses_from
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
@@ -244,6 +245,8 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         tuple(m for m in _followed(build, measured) if m.follows in measured),
         tuple(_laws(build, sections)),
     )
+    joints = [robot.joint(name) for name in measured]
+    robot = replace(robot, poses=tuple(poses_from(file.poses, joints, build.refuse)))
     arm = arm_links(robot)
     return replace(robot, shapes=tuple(s for s in build.urdf.shapes if s.link in arm))
 

@@ -132,6 +132,14 @@ class Payload:
 
 
 @dataclass(frozen=True, slots=True)
+class Pose:
+    """A named posture: measured joints with their positions (rad, m); it may leave some out."""
+
+    name: str
+    positions: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """The physical model of a robot; the root link's frame is `base_link`.
 
@@ -140,7 +148,7 @@ class Robot:
     `held` pairs with their name, else at 0. `laws` are of joints among them.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground. `shapes` is the collision geometry of what
-    is held above the ground (clearance.py).
+    is held above the ground (clearance.py). `poses` are postures that people call by a name.
     """
 
     name: str
@@ -157,6 +165,7 @@ class Robot:
     mimics: tuple[Mimic, ...] = ()
     laws: tuple[Law, ...] = ()
     shapes: tuple[Shape, ...] = ()
+    poses: tuple[Pose, ...] = ()
 
     @property
     def root(self) -> str:
