@@ -44,7 +44,7 @@ def poses_like(context: typer.Context, incomplete: str) -> list[str]:
         poses = load(context.params.get('config')).settings.robot.poses
     except AcceptanceError:
         return []
-    return [pose.name for pose in poses if pose.name.lower().startswith(incomplete.lower())]
+    return [pose.name for pose in poses if pose.name.startswith(incomplete)]
 
 
 def ros_arguments(context: typer.Context) -> list[str]:
