@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Path
-from ugv_acceptance.config.units import Measure, parse, shown, split_key
+from ugv_acceptance.config.units import Measure, cut, parse, shown, split_key
 from ugv_acceptance.model.robot import Joint, Pose, Robot
 
 Refuse = Callable[[Path, str], BadConfig]
@@ -70,4 +70,4 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
     """Return '; did you mean NAME?' for the known name that is most like `name`, else ''."""
     by_lower = {one.lower(): one for one in known}
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
-    return f'; did you mean {by_lower[near[0]]}?' if near else ''
+    return f'; did you mean {cut(by_lower[near[0]])}?' if near else ''

@@ -73,6 +73,10 @@ class Joint:
         high = self.upper if math.isfinite(self.upper) else half
         return low, high
 
+    def nearest(self, position: float) -> float:
+        """Return the position (rad, m) of its range that is nearest to `position`."""
+        return min(max(position, self.lower), self.upper)
+
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
