@@ -31,7 +31,7 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
+from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings, Untold
 from ugv_acceptance.model.robot import Vector
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
@@ -131,6 +131,47 @@ def test_sliding_is_the_same_too(messages: list[Message], cuts: list[int], frict
     """With a known friction, sliding before tipping raises the same alerts live and recorded."""
     limits = Limits((45.0, 30.0), friction=friction, tip_warn=0.3)
     compare(settings(limits=limits, delays=Delays(tip_on=0.02, off=0.1)), messages, cuts, [], S)
+
+
+@st.composite
+def late_joints(draw: st.DrawFn) -> list[Message]:
+    """Return messages of which the first, many or all, tell only one of the two joints."""
+    names = draw(st.permutations(['lift', 'hand_slide']))
+    count = draw(st.integers(20, 100))
+    begins = draw(st.one_of(st.integers(5, count), st.just(count)))
+    steps = st.tuples(
+        st.sampled_from([5, 20, 20, 90, 300]), st.integers(0, 3), st.floats(-0.1, 0.3)
+    )
+    now = T0
+    found: list[Message] = []
+    for k, (wait, kind, q) in enumerate(draw(st.lists(steps, min_size=count, max_size=count))):
+        now += wait * MS
+        told = names[:1] if k < begins else names[: 1 + kind % 2]
+        of = {'lift': 0.1 - q, 'hand_slide': q}
+        position = tuple(of[name] for name in told)
+        found.append(Joints(now, tuple(told), position) if kind < 2 else Imu(now))
+    return found
+
+
+_untold = st.none() | st.builds(Untold, st.floats(-0.1, 0.3), harmless=st.booleans())
+
+
+@hypothesis.settings(max_examples=60)
+@given(
+    late_joints(),
+    st.lists(st.integers(0, 100), max_size=5),
+    st.lists(st.integers(0, 3000), max_size=10),
+    st.tuples(_untold, _untold),
+)
+def test_joints_that_are_told_late_or_never_are_the_same_too(
+    messages: list[Message],
+    cuts: list[int],
+    ticks: list[int],
+    untold: tuple[Untold | None, ...],
+) -> None:
+    """Joints that are taken as held until a message tells them, in any batches."""
+    told = replace(settings(delays=Delays(tip_on=0.02, off=0.1)), untold=untold)
+    compare(told, messages, cuts, [T0 + t * MS for t in ticks], S)
 
 
 def test_a_robot_slides_before_it_tips_where_friction_says_so() -> None:

@@ -15,6 +15,7 @@ from ugv_acceptance.config.mimics import followed
 from ugv_acceptance.config.poses import poses_from
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, cut, shown
+from ugv_acceptance.config.untold import untold_of
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
@@ -100,6 +101,8 @@ def settings_from(build: Build) -> Settings:
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)
+    if build.file.joints is None:  # implied by the URDF: not all of them need to be told
+        settings = replace(settings, untold=untold_of(robot, settings.limits.torque))
     return settings
 
 

@@ -144,6 +144,7 @@ class LiveEvaluator:
         oldest = min(joints.seen)
         # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
         old = now - oldest > limit and (oldest != NEVER or now - joints.began > STARTUP)
+        old = old or joints.doubted
         if old or not watch.missing.quiet:
             if old and not watch.missing.raw:
                 watch.missing.detail = words.what_is_missing(joints, now, limit)
@@ -264,6 +265,11 @@ class LiveEvaluator:
     def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Newest rates and efforts of the joints (rad/s, N m; m/s, N); NaN where not reported."""
         return tuple(self._joints.qd), tuple(self._joints.effort)
+
+    @property
+    def assumed(self) -> list[str]:
+        """Names of the joints that were taken as held for want of messages, now or before."""
+        return [self.settings.robot.joint_names[j] for j in sorted(self._joints.assumed)]
 
     @property
     def orientations(self) -> dict[str, int]:

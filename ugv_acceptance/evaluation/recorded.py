@@ -130,6 +130,11 @@ class RecordedEvaluator:
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     @property
+    def assumed(self) -> list[str]:
+        """Names of the joints that were taken as held for want of messages, now or before."""
+        return [self.settings.robot.joint_names[j] for j in sorted(self._joints.assumed)]
+
+    @property
     def imu(self) -> ImuTracker:
         """The tracker of the IMU, with what its checks judged."""
         return self._imu
@@ -234,6 +239,7 @@ class RecordedEvaluator:
         )
         old = time - joints.oldest > limits
         old &= (joints.oldest != NEVER) | (time - merger.began > STARTUP)
+        old |= merger.told.doubted
         feed(
             self.watch.missing, time, old,
             lambda row: words.what_is_missing(merger, int(time[row]), int(limits[row]), row),

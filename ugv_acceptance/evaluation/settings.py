@@ -101,6 +101,18 @@ class Delays:
 
 
 @dataclass(frozen=True, slots=True)
+class Untold:
+    """A joint that margins may do without: `position` (rad, m) is taken while no message tells it.
+
+    `harmless`: wherever it is, no margin changes by more than is said in config/untold.py; else
+    margins are shown, but are in doubt.
+    """
+
+    position: float
+    harmless: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Settings:
     """Everything an evaluation needs besides the messages; `joints` follows `robot.joint_names`.
 
@@ -110,7 +122,8 @@ class Settings:
     or a stop holds: their limits are infinite. `moved_contacts` says of contact points that the
     file puts on a wheel what they are taken for. `hand_may_touch` are the times (from, to in s
     since the start) in which the arm may touch the ground, to pick something up: torques are not
-    known while it does.
+    known while it does. `untold` says for each joint what is taken if no message ever tells it
+    (None: margins are not known then; empty: so it is for all).
     """
 
     robot: Robot
@@ -124,6 +137,7 @@ class Settings:
     passive: tuple[str, ...] = ()
     moved_contacts: tuple[str, ...] = ()
     hand_may_touch: tuple[tuple[float, float], ...] = ()
+    untold: tuple[Untold | None, ...] = ()
 
     @property
     def hears_joints(self) -> bool:

@@ -12,6 +12,8 @@ from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
+from ugv_acceptance.evaluation.inputs.joint_names import names_words
+from ugv_acceptance.evaluation.inputs.joint_words import held_words
 from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
@@ -49,7 +51,7 @@ def verdict_of(session: Session) -> Status:
         **ground_values(session.evaluator),
     }
     known = session.advisory.values(now)
-    left = '; '.join([left, *session.advisory.hints(now)])
+    left = '; '.join([left, *session.advisory.hints(now), *_untold(session)])
     if active:
         return _worst(session, active, left, values | known)
     if margins is None:
@@ -105,7 +107,15 @@ def _limits(session: Session) -> dict[str, object]:
         values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
     if session.settings.hand_may_touch:
         values['hand_may_touch'] = True
+    if session.evaluator.assumed:
+        values['untold_joints'] = held_words(session.settings, session.evaluator.assumed)
     return values
+
+
+def _untold(session: Session) -> Iterator[str]:
+    """Yield which joints are taken as held because no message told them, if any are."""
+    if session.evaluator.assumed:
+        yield f'never told, taken as held: {names_words(session.evaluator.assumed)}'
 
 
 def _now(alert: Alert, session: Session) -> Alert:

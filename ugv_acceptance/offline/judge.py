@@ -20,7 +20,7 @@ from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.ground_statement import GroundExamination
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
-from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
+from ugv_acceptance.evaluation.criteria.not_judged import absent_imu, untold_joints
 from ugv_acceptance.evaluation.criteria.statement import Examination
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
@@ -102,6 +102,7 @@ def judge(
     }
     statements = [e.statement(*span) for e in reading.examinations]
     statements.append(absent_imu(settings, topics.imu))
+    statements.append(untold_joints(settings, evaluator.assumed))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result

@@ -161,7 +161,7 @@ ALERTS = {
         'at least one joint is missing from {subject}, or is no longer updated',
         'compare the joint names in the configuration with those on the topic',
         FailureSource.SENSOR,
-        'A joint is missing from the messages: no margin is known.',
+        'A joint is missing from the messages: margins are not known, or in doubt.',
     ),
     'INPUT_INVALID': AlertText(
         '{subject} contains values that cannot be used',

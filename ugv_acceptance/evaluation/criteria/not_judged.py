@@ -1,13 +1,14 @@
 """What a configuration leaves out of every verdict: joints without limits, absent inputs."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
+from ugv_acceptance.evaluation.inputs.joint_words import held_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.clearance import unread_links
 from ugv_acceptance.model.mechanics import mechanics_of
@@ -65,6 +66,14 @@ def not_judged(settings: Settings) -> Iterator[NotChecked]:
         yield NotChecked('tip-over', 'no IMU: the base was declared level')
     if not settings.hears_joints:
         yield NotChecked('torques', 'no joint states: the robot has no measured joints')
+
+
+def untold_joints(settings: Settings, joints: Sequence[str]) -> Statement:
+    """Return that joints were taken as held since no message told them, with the line to enter."""
+    if not joints:
+        return Statement()
+    why = f'no message told it, so it was taken as held: {held_words(settings, joints)}'
+    return Statement(not_checked=(NotChecked(f'position of {", ".join(joints)}', why),))
 
 
 def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:

@@ -55,8 +55,9 @@ class Told:
 
     `repeated` (n,) are the seconds for which the message is repeated (0: it is new), `repeating`
     says that some joint's newest message is; `speed` (n, j) are rates to be believed, NaN where
-    unknown. The rest is for words: positions (n, j), and as told (j, n), which were named, those
-    told before the batch, and when each was received.
+    unknown; `doubted` says that a joint is taken as held which may be elsewhere. The rest is for
+    words: positions (n, j), and as told (j, n), which were named, those told before the batch, and
+    when each was received.
     """
 
     repeated: Floats
@@ -67,6 +68,7 @@ class Told:
     named: Mask
     before: list[float]
     seen: list[Times]
+    doubted: Mask
 
     def told_at(self, j: int, row: int) -> float:
         """Return the position of joint number j that was told last at a row of the batch."""

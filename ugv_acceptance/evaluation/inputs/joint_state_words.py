@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
 from ugv_acceptance.evaluation.inputs.joint_words import (
     foreign_words,
@@ -10,6 +12,7 @@ from ugv_acceptance.evaluation.inputs.joint_words import (
     unusable_words,
 )
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER
 
 
 def why_unusable(merger: JointMerger, row: int | None = None) -> str:
@@ -28,8 +31,13 @@ def why_unusable(merger: JointMerger, row: int | None = None) -> str:
 def what_is_missing(merger: JointMerger, now: int, limit: int, row: int | None = None) -> str:
     """Return which joints were told longer before `now` than `limit` (ns), as `why_unusable`."""
     seen = merger.seen if row is None else [int(times[row]) for times in merger.told.seen]
+    doubtful = [untold is not None and not untold.harmless for untold in merger.settings.untold]
+    never = [at == NEVER for at in seen]
+    for j in np.flatnonzero(doubtful).tolist():
+        never[j] |= seen[j] == FOREVER
     ages = [
-        None if now - at <= limit else math.inf if at == NEVER else (now - at) / 1e9 for at in seen
+        math.inf if none else None if now - at <= limit else (now - at) / 1e9
+        for at, none in zip(seen, never, strict=True)
     ]
     return missing_words(merger.settings, ages, _names(merger, now))
 

@@ -47,16 +47,27 @@ def missing_words(settings: Settings, ages: Sequence[float | None], names: Itera
     `names` are all names that messages told.
     """
     joints = list(zip(settings.robot.joint_names, settings.joints, ages, strict=True))
-    words = [
-        f'{name} was never told' if math.isinf(age) else f'{name} was last told {age:.2f} s before'
-        for name, _, age in joints
-        if age is not None
-    ]
     never = [(name, how.topic_name) for name, how, age in joints if age == math.inf]
+    silent = ', '.join(name for name, _ in never)
+    words = [f'{silent} {"was" if len(never) == 1 else "were"} never told'] if never else []
+    words += [
+        f'{name} was last told {age:.2f} s before'
+        for name, _, age in joints
+        if age is not None and age != math.inf
+    ]
     others = sorted(set(names) - {how.topic_name for how in settings.joints})
     if never and others:
         words.append(_others(never, others))
+    if never:
+        line = held_words(settings, (name for name, _ in never))
+        words.append(f'if they do not move, enter where they are, not under joints: {line}')
     return _listed(words, len(words))
+
+
+def held_words(settings: Settings, joints: Iterable[str]) -> str:
+    """Return the line of a configuration that holds joints where they are taken to be."""
+    at = {name: settings.robot.joint(name).nearest(0.0) for name in joints}
+    return f'held: {{{", ".join(f"{name}: {q:g}" for name, q in at.items())}}}'
 
 
 def foreign_words(settings: Settings, names: Iterable[str]) -> str:

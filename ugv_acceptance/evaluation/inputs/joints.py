@@ -23,9 +23,10 @@ from ugv_acceptance.evaluation.inputs.joint_rows import (
 )
 from ugv_acceptance.evaluation.inputs.leaps import SECOND, Leaps
 from ugv_acceptance.evaluation.inputs.repeats import Repeats
+from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP
 from ugv_acceptance.evaluation.inputs.turns import ABSURD, FULL, Turns, turning_of
 from ugv_acceptance.evaluation.samples import JointStateColumns
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import Settings, Untold
 from ugv_acceptance.model.robot import Joint
 from ugv_acceptance.type_aliases import Floats, Times
 
@@ -43,6 +44,10 @@ class JointMerger:
     `repeated` is for how many seconds the newest message is repeated, `repeating` how many lists of
     names have such a message. `told` is what the last batch told, `turns` what messages told,
     `rates` (j,) tell which reported rates can be believed, `layouts` the lists of names that came.
+
+    A joint that no message told in STARTUP after the first is taken where `settings.untold` says,
+    until one tells it: its `seen` is FOREVER then. `assumed` are all that were ever taken so;
+    `doubted` says that one is now of which margins may be wrong.
     """
 
     settings: Settings
@@ -59,6 +64,9 @@ class JointMerger:
     layouts: dict[tuple[str, ...], Layout] = field(default_factory=dict)
     turns: Turns = field(init=False)
     rates: list[JointRate] = field(init=False)
+    assumed: set[int] = field(default_factory=set)
+    doubted: bool = False
+    _untold: dict[int, Untold] = field(init=False)
     _range: list[tuple[float, float]] = field(init=False)
     _leaps: Leaps = field(init=False)
 
@@ -66,6 +74,7 @@ class JointMerger:
         n = len(self.settings.joints)
         self.q, self.qd, self.effort, self.speed = ([math.nan] * n for _ in range(4))
         self.seen = [NEVER] * n
+        self._untold = {j: u for j, u in enumerate(self.settings.untold) if u is not None}
         robot = self.settings.robot
         joints = [robot.joint(name) for name in robot.joint_names]
         self.turns = Turns(turning_of(robot))
@@ -122,6 +131,8 @@ class JointMerger:
         else:
             repeats.stamp, repeats.since, repeats.position = stamp, now, tuple(position)
             self.repeated = 0.0
+        if self._untold:
+            self._hear(layout)
         odd = self._take(now, stamp, layout, position, velocity, effort)
         for j in odd:
             apart, slope = now - self.seen[j], self.rates[j].slope
@@ -129,7 +140,27 @@ class JointMerger:
             self._place(j, now, self.turns.told[j] if known else math.nan)
         if now // SECOND != layout.second or self._leaps.busy:
             self._leaps.look(now, layout, self.q)
+        if self._untold and now - self.began > STARTUP:
+            self._assume()
         return True
+
+    def _hear(self, layout: Layout) -> None:
+        """Note that a message tells joints: they are no longer, or never will be, taken as held."""
+        for j, _ in layout.pairs:
+            if self._untold.pop(j, None) is not None and self.seen[j] == FOREVER:
+                self.seen[j] = NEVER
+                self.doubted = self._doubts()
+
+    def _assume(self) -> None:
+        """Take the joints that nobody told as held."""
+        for j, untold in self._untold.items():
+            if self.seen[j] == NEVER:
+                self.q[j], self.seen[j] = untold.position, FOREVER
+                self.assumed.add(j)
+                self.doubted = self._doubts()
+
+    def _doubts(self) -> bool:
+        return any(self.seen[j] == FOREVER and not of.harmless for j, of in self._untold.items())
 
     def _take(
         self,
@@ -184,6 +215,7 @@ class JointMerger:
         """Take many messages: the same rows as `merge` one at a time, in order of receipt."""
         self._note_first(segments)
         useful = [s for s in segments if self.layout(s.names).pairs and s.position.size]
+        self._no_longer_assumed(useful)
         time = np.concatenate([s.log_time for s in useful] or [np.empty(0, np.int64)])
         stamp = np.concatenate([s.stamp for s in useful] or [np.empty(0, np.int64)])
         joints, n = len(self.settings.joints), len(time)
@@ -217,11 +249,21 @@ class JointMerger:
         looked = [(self.layout(x), rows) for x, rows in rows_of.items()]
         self._leaps.columns(time, raw, tables[0], named, looked, self.seen)
         before = list(self.turns.told)
+        doubtful = [j for j, untold in self._untold.items() if not untold.harmless]
         merged, speed, seen = self._carry(time, stamp, tables, named)
-        self.told = Told(*repeats, speed, merged.q, raw, named, before, seen)
+        doubted = np.zeros(n, np.bool_)
+        for j in doubtful:
+            doubted |= seen[j] == FOREVER
+        self.told = Told(*repeats, speed, merged.q, raw, named, before, seen, doubted)
         for j in range(joints * bool(n)):
             self.turns.told[j] = self.told.told_at(j, n - 1)
         return merged
+
+    def _no_longer_assumed(self, segments: Sequence[JointStateColumns]) -> None:
+        """Note that joints which were taken as held are told in these messages."""
+        told = {j for s in segments for j, _ in self.layout(s.names).pairs} & self._untold.keys()
+        for j in told:
+            self.seen[j] = NEVER if self.seen[j] == FOREVER else self.seen[j]
 
     def _note_first(self, segments: Sequence[JointStateColumns]) -> None:
         for segment in segments:
@@ -312,14 +354,25 @@ class JointMerger:
             oldest, unusable = time.copy(), np.zeros(len(time), np.bool_)
             for j in range(len(named)):
                 seen[j] = self._carry_joint(j, time, tables[:, j], named[j])
+                if j in self._untold:
+                    self._assume_rows(j, time, tables[0, j], seen[j])
                 np.minimum(oldest, seen[j], out=oldest)
                 unusable |= np.isnan(tables[0, j]) & (seen[j] != NEVER)
         if len(time):
             self.q, self.qd, self.effort, self.speed = tables[:, :, -1].tolist()
         for j in np.flatnonzero(named.any(axis=1)).tolist():
+            self._untold.pop(j, None)
             self.seen[j] = int(time[len(time) - 1 - named[j, ::-1].argmax()])
         q, qd, effort, speed = (table.T for table in tables)
         return JointRows(time, stamp, q, qd, effort, oldest, unusable), speed, seen
+
+    def _assume_rows(self, j: int, time: Times, q: Floats, seen: Times) -> None:
+        """Take joint number j as held in the rows before the first that names it, in place."""
+        rows = ((seen == NEVER) | (seen == FOREVER)) & (time - self.began > STARTUP)
+        if rows.any():
+            q[rows], seen[rows] = self._untold[j].position, FOREVER
+            self.seen[j] = FOREVER
+            self.assumed.add(j)
 
     def _carry_joint(self, j: int, time: Times, tables: Floats, named: Mask) -> Times:
         """Fill the rows that do not name joint number j; return when its value was received."""
