@@ -16,8 +16,10 @@ from ugv_acceptance.model.tree import Tree, tree_of
 from ugv_acceptance.type_aliases import Floats
 
 # All that are taken as held may turn the line from the ground to the centre of gravity so far
-# (rad), and change no torque by more than this share of its limit.
+# (rad), and change no torque by more than this share of its limit. From DOUBTED_TILT on nothing is
+# shown; what is shown between the two is in doubt.
 MOST_TILT, MOST_SHARE = math.radians(0.25), 0.01
+DOUBTED_TILT = math.radians(1.0)
 # A contact point, and a part of the arm, may be this far (m) from where it is taken to be.
 CONTACT_OFF, ARM_OFF = 0.001, 0.01
 # The least height (m) of a centre of gravity above the ground that is reckoned with.
@@ -44,18 +46,19 @@ def untold_of(robot: Robot, limits: Sequence[float]) -> tuple[Untold | None, ...
 
     `limits` (j,) are those of the torques (N m; N). Joints are taken in the order of what they can
     do, as long as all of them together can turn the line to the centre of gravity by less than
-    MOST_TILT.
+    DOUBTED_TILT; MOST_TILT if they are harmless.
     """
     bodies = _Bodies(robot, tree_of(robot))
     reach = [bodies.reach(k) for k in range(len(robot.joint_names))]
     found: list[Untold | None] = [None] * len(reach)
-    most, used = math.tan(MOST_TILT) * bodies.height, 0.0
+    most, used = math.tan(DOUBTED_TILT) * bodies.height, 0.0
     for k in sorted(range(len(reach)), key=lambda k: reach[k].shift):
         light = used + reach[k].shift <= most and not bodies.strains(k, reach, limits)
         if light and not bodies.carries_payload(k):
             used += reach[k].shift
-            harmless = reach[k].contact <= CONTACT_OFF and reach[k].arm <= ARM_OFF
-            found[k] = Untold(reach[k].at, harmless=harmless)
+            sure = used <= math.tan(MOST_TILT) * bodies.height
+            near = reach[k].contact <= CONTACT_OFF and reach[k].arm <= ARM_OFF
+            found[k] = Untold(reach[k].at, harmless=sure and near)
     return tuple(found)
 
 

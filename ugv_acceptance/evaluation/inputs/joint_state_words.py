@@ -3,8 +3,6 @@
 import math
 from collections.abc import Iterable
 
-import numpy as np
-
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
 from ugv_acceptance.evaluation.inputs.joint_words import (
     foreign_words,
@@ -29,15 +27,14 @@ def why_unusable(merger: JointMerger, row: int | None = None) -> str:
 
 
 def what_is_missing(merger: JointMerger, now: int, limit: int, row: int | None = None) -> str:
-    """Return which joints were told longer before `now` than `limit` (ns), as `why_unusable`."""
+    """Return which joints were told longer before `now` than `limit` (ns), as `why_unusable`.
+
+    Those that were never told are all named, also where they are taken as held.
+    """
     seen = merger.seen if row is None else [int(times[row]) for times in merger.told.seen]
-    doubtful = [untold is not None and not untold.harmless for untold in merger.settings.untold]
-    never = [at == NEVER for at in seen]
-    for j in np.flatnonzero(doubtful).tolist():
-        never[j] |= seen[j] == FOREVER
     ages = [
-        math.inf if none else None if now - at <= limit else (now - at) / 1e9
-        for at, none in zip(seen, never, strict=True)
+        math.inf if at in {NEVER, FOREVER} else None if now - at <= limit else (now - at) / 1e9
+        for at in seen
     ]
     return missing_words(merger.settings, ages, _names(merger, now))
 
