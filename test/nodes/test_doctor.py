@@ -16,6 +16,7 @@ from sensor_msgs.msg import JointState
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.settings import Untold
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.nodes.doctor.checks import FAIL, OK, WARN, Finding, examine
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
@@ -213,6 +214,19 @@ def test_names_with_a_prefix_are_shown_with_the_keys_to_set() -> None:
     assert found.level == FAIL
     assert f'joints.{NAMES[1]}.topic_name: r1_{NAMES[1]}' in found.do
     assert 'all with the prefix r1_' in found.do
+
+
+@pytest.mark.parametrize(('harmless', 'level'), [(True, WARN), (False, FAIL)])
+def test_a_joint_that_is_not_on_the_topic_is_shown_with_the_line_to_enter(
+    *, harmless: bool, level: str
+) -> None:
+    """The line that holds it; only a warning where margins do without it."""
+    untold = (Untold(0.0, harmless=harmless), None, None, None)
+    config = replace(CONFIG, settings=replace(CONFIG.settings, untold=untold))
+    around = healthy(joint=joint_state(names=NAMES[1:], position=FOLDED[1:]))
+    (found,) = [f for f in examine(around, config) if f.about == 'joint names']
+    assert found.level == level
+    assert f'if they do not move: held: {{{NAMES[0]}: 0}}' in found.do
 
 
 def doctor(*options: str) -> 'subprocess.Popen[str]':

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -92,9 +93,9 @@ EOD = load('packbot_eod').settings.robot
 POSED = {**STEP, 'posture': 'DRIVE', 'posture_deg': {'turret_joint': 20}}
 
 
-def posed(folder: Path, step: dict[str, object]) -> Plan:
+def posed(folder: Path, step: Mapping[str, object]) -> Plan:
     """Return a plan of one step, read for a robot that has poses."""
-    plan = {**PLAN, 'home_deg': {'shoulder_joint': 5}, 'steps': [step]}
+    plan = {**PLAN, 'home_deg': {'shoulder_joint': 5}, 'steps': [dict(step)]}
     return read_plan(written(folder, yaml.safe_dump(plan)), EOD)
 
 

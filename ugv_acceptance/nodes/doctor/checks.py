@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.effort.live_rests import LiveRests
 from ugv_acceptance.evaluation.effort.understanding import understand
 from ugv_acceptance.evaluation.ground import ground_words
 from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
-from ugv_acceptance.evaluation.inputs.joint_words import position_words
+from ugv_acceptance.evaluation.inputs.joint_words import held_words, position_words
 from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ImuInput
@@ -179,7 +179,14 @@ def _joints(samples: Sequence[JointStateSample], config: Config) -> Iterator[Fin
         pairs = [(wanted[topic_name][0], topic_name) for topic_name in missing]
         do = what_to_set(pairs, names) or 'set joints.<joint>.topic_name'
         do += f'; the topic has {names_words(sorted(names))}'
-        yield Finding(FAIL, 'joint names', f'not on the topic: {", ".join(missing)}', do)
+        do += f'; if they do not move: {held_words(settings, [name for name, _ in pairs])}'
+        spared = {
+            name
+            for name, untold in zip(settings.robot.joint_names, settings.untold, strict=False)
+            if untold and untold.harmless
+        }
+        level = WARN if {name for name, _ in pairs} <= spared else FAIL
+        yield Finding(level, 'joint names', f'not on the topic: {", ".join(missing)}', do)
     else:
         text = f'all {len(wanted)} of the robot, {len(names) - len(wanted)} others'
         yield Finding(OK, 'joint names', text)
