@@ -20,6 +20,7 @@ from ugv_acceptance.evaluation.alerts.messages import LIVE
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
 from ugv_acceptance.evaluation.ground import CARRIED
 from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.settings import Untold
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker
 from ugv_acceptance.monitoring.diagnostics import diagnostics_of, guarded, verdict_of
@@ -324,6 +325,28 @@ def test_the_verdict_says_what_the_ground_is_taken_for() -> None:
     assert 'all margins kept' in status.message
     assert 'at most' not in status.message
     assert verdict_of(standing_on('flat')).values['ground'] == 'flat'
+
+
+@pytest.mark.parametrize('harmless', [True, False])
+def test_a_joint_taken_as_held_is_told_and_its_doubt_is_no_ok(*, harmless: bool) -> None:
+    """The verdict names it; where it may matter nothing is OK, and no margin is sent."""
+    clock, sent = Stopwatch(NS), []
+    held = Untold(3.1, harmless=harmless)
+    told = replace(CONFIG.settings, untold=(None, None, None, held))
+    watched = Session(told, lambda _s, m: sent.append(m), lambda: None, lambda _t: None, clock)
+    for _ in range(60):
+        clock.at += NS // 50
+        data = joint_state_cdr(clock.at, '', NAMES[:3], FOLDED[:3], (), ())
+        watched.take_joint_state(data)
+        watched.take_imu(imu(stamp=clock.at))
+        watched.tick()
+    status = verdict_of(watched)
+    levels = {s.level for s in diagnostics_of(status, CONFIG, watched, None) if 'T' in s.name[:2]}
+    assert (status.level, levels) == ((OK, {OK}) if harmless else (STALE, {STALE}))
+    assert bool(sent) == harmless
+    assert watched.evaluator.margins is not None
+    assert f'never told, taken as held: {NAMES[3]}' in status.message
+    assert status.values['untold_joints'] == f'held: {{{NAMES[3]}: 0}}'
 
 
 def test_on_stairs_no_margin_in_degrees_is_an_ok() -> None:

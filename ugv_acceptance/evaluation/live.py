@@ -272,6 +272,11 @@ class LiveEvaluator:
         return [self.settings.robot.joint_names[j] for j in sorted(self._joints.assumed)]
 
     @property
+    def doubted(self) -> bool:
+        """Whether a joint is taken as held which may be elsewhere: margins are for information."""
+        return self._joints.doubted
+
+    @property
     def orientations(self) -> dict[str, int]:
         """Number of IMU messages by how their orientation was treated, see inputs/imu.py."""
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))

@@ -249,6 +249,13 @@ def _level(active: Sequence[Alert], code: str, subject: str | None, margins: Mar
     return max([*levels, OK if margins else STALE])
 
 
+def _doubted(status: Status) -> Status:
+    """Return the status of a margin that rests on a joint which is taken as held."""
+    return replace(
+        status, level=max(status.level, STALE), message=f'in doubt, see Monitor: {status.message}'
+    )
+
+
 def unavailable(problem: str) -> Status:
     """Return the verdict (STALE) of a monitor that is not active, with the `problem` if any."""
     text = f'the monitor is not active: {problem}' if problem else 'the monitor is not active'
@@ -295,7 +302,8 @@ def diagnostics_of(
     if session is not None:
         active = session.active
         moving = session.evaluator.moving
-        statuses += margin_statuses(session.evaluator, active, moving)
+        found = margin_statuses(session.evaluator, active, moving)
+        statuses += map(_doubted, found) if session.evaluator.doubted else found
         statuses += [_input(name, session, inputs, active) for name in session.counts]
     return statuses
 

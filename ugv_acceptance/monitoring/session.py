@@ -75,11 +75,11 @@ class InputCount:
 class Session:
     """One session of monitoring a running robot: decodes, evaluates, counts and tracks alarms.
 
-    `on_margins(stamp, margins)` is called for every message that gave margins, with its own header
-    stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for the log. `clock`
-    dates what comes in, `stamps` converts header stamps to its time; `sources` are of uncertainty:
-    a margin that is kept by less than its bound is told. `take_joint_state`, `take_imu` and
-    `take_payload` take a serialised message and never raise.
+    `on_margins(stamp, margins)` is called for every message that gave margins without doubt, with
+    its own header stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for
+    the log. `clock` dates what comes in, `stamps` converts header stamps to its time; `sources` are
+    of uncertainty: a margin that is kept by less than its bound is told. `take_joint_state`,
+    `take_imu` and `take_payload` take a serialised message and never raise.
     """
 
     settings: Settings
@@ -207,7 +207,8 @@ class Session:
             margins = evaluate(now, local, *fields(sample))
             if margins is not None:
                 see(margins)
-                self.on_margins(stamp, margins)
+                if not self.evaluator.doubted:
+                    self.on_margins(stamp, margins)
             if (margins is not None) is not self._known or alarm_tracker.changed():
                 self._look()
 

@@ -162,7 +162,7 @@ class MarkerOutput:
         if session is None or not self._publisher.get_subscription_count():
             return
         settings, margins = session.settings, session.evaluator.margins
-        if margins is None:
+        if margins is None or session.evaluator.doubted:
             return
         if self._figure is None or self._figure.mechanics.robot is not settings.robot:
             self._figure = figure_of(settings.robot)
