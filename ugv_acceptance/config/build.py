@@ -1,22 +1,27 @@
 """Combines a validated YAML file and a URDF into the settings of an evaluation."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.document import Document, Path
+from ugv_acceptance.config.combining import Build
+from ugv_acceptance.config.combining import known as _known
+from ugv_acceptance.config.combining import listed as _list
+from ugv_acceptance.config.combining import of_joint as _of_joint
+from ugv_acceptance.config.document import Document
+from ugv_acceptance.config.held import held_joints
 from ugv_acceptance.config.masses import check_masses
 from ugv_acceptance.config.mimics import followed
 from ugv_acceptance.config.poses import poses_from
 from ugv_acceptance.config.schema import File, JointSection
-from ugv_acceptance.config.units import EXAMPLES, Given, cut, shown
+from ugv_acceptance.config.units import shown
 from ugv_acceptance.config.untold import untold_of
-from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.config.urdf import rotation_from_rpy
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame
@@ -33,24 +38,6 @@ _LAW_KINDS = {
     'spring': ('stiffness', 'linear stiffness'),
     'rest': ('angle', 'length'),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Build:
-    """The YAML file and the URDF being combined, and the warnings collected meanwhile."""
-
-    document: Document
-    file: File
-    urdf: Urdf
-    warnings: list[str]
-
-    def refuse(self, path: Path, text: str) -> BadConfig:
-        """Return the BadConfig for a field of the YAML file, with file and line."""
-        return BadConfig(f'{self.document.where(path)}: {text}')
-
-    def warn(self, path: Path, text: str) -> None:
-        """Add a warning about a field of the YAML file, with file and line."""
-        self.warnings.append(f'{self.document.where(path)}: {text}')
 
 
 def checked(document: Document, model: type[M]) -> M:
@@ -184,13 +171,6 @@ def _measured(build: Build) -> dict[str, JointSection]:
     return dict(named)
 
 
-def _known(build: Build, path: Path, name: str, known: Sequence[str], what: str) -> None:
-    if name not in known:
-        near = get_close_matches(name, known, 1, 0.5)
-        hint = f'did you mean {cut(near[0])}?' if near else f'it has {_list(known)}'
-        raise build.refuse(path, f'the URDF has no {what} {shown(name)}; {hint}')
-
-
 def assumed_numbers(build: Build) -> tuple[tuple[str, str], ...] | None:
     """Return the numbers that are only assumed, with the reasons; None if the file says nothing.
 
@@ -214,10 +194,6 @@ def assumed_numbers(build: Build) -> tuple[tuple[str, str], ...] | None:
     return tuple(said.items())
 
 
-def _list(names: Sequence[str]) -> str:
-    return ', '.join(map(cut, names[:8])) + ', ...' * (len(names) > 8) if names else 'none'
-
-
 def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
     measured = tuple(sections)
     stays = {*measured, *build.file.held}
@@ -239,7 +215,7 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         build.urdf.joints,
         measured,
         tuple(Contact(name, c.link, c.position) for name, c in file.contacts.items()),
-        tuple(_held(build, measured)),
+        tuple(held_joints(build, measured)),
         None if file.payload is None else file.payload.link,
         load,
         file.gravity,
@@ -283,62 +259,6 @@ def _links(build: Build, names: list[str]) -> Iterable[Link]:
         mass = link.mass if new is None or new.mass is None else new.mass
         cog = link.cog if new is None or new.cog is None else new.cog
         yield replace(link, mass=mass, cog=cog)
-
-
-def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]]:
-    """Yield every movable joint without messages with the position at which it is held."""
-    held, silent = build.file.held, []
-    follows = {m.joint: m for m in followed(build.urdf.mimics, {*measured, *held})}
-    movable = {joint.name: joint for joint in build.urdf.joints if joint.kind != 'fixed'}
-    for name in held:
-        _known(build, ('held', name), name, list(movable), 'movable joint')
-        if name in measured:
-            raise build.refuse(('held', name), 'expected a joint that is not under joints too')
-    for name, joint in movable.items():
-        if name in held:
-            yield name, _declared(build, joint)
-        elif name in follows:
-            of = follows[name]
-            if of.follows in measured:
-                continue
-            led = held[of.follows].value if of.follows in held else movable[of.follows].nearest(0.0)
-            yield name, of.multiplier * led + of.offset
-        elif name not in measured:
-            silent.append(joint)
-    yield from _silent(build, silent)
-
-
-def _declared(build: Build, joint: Joint) -> float:
-    """Return where the file says that a joint is held; one beyond its range is warned of."""
-    path = ('held', joint.name)
-    at = _of_joint(build, path, joint, build.file.held[joint.name], 'angle', 'length')
-    if at != joint.nearest(at):
-        unit = joint.units.position
-        build.warn(path, f'{at:g} is outside its range, {joint.lower:g} .. {joint.upper:g} {unit}')
-    return at
-
-
-def _silent(build: Build, joints: Sequence[Joint]) -> Iterable[tuple[str, float]]:
-    """Yield where joints that nobody tells are held: at 0, or the nearest end of their range."""
-    if joints:
-        names = _list([joint.name for joint in joints])
-        build.warn(('joints',), f'neither under joints nor held, so held at 0: {names}')
-    for joint in joints:
-        if at := joint.nearest(0.0):
-            build.warn(('joints',), f'{joint.name}: its range is without 0, so held at {at:g}')
-            yield joint.name, at
-
-
-def _of_joint(
-    build: Build, path: Path, joint: Joint, given: Given, turning: str, sliding: str
-) -> float:
-    """Return a number of a joint in SI; BadConfig for metres of a rotary joint and the like."""
-    kind = sliding if joint.slides else turning
-    if given.kind not in (None, kind):
-        raise build.refuse(
-            path, f'expected {EXAMPLES[kind]} for a {joint.kind} joint, got a {given.kind}'
-        )
-    return given.value
 
 
 def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:

@@ -215,7 +215,6 @@ class JointMerger:
         """Take many messages: the same rows as `merge` one at a time, in order of receipt."""
         self._note_first(segments)
         useful = [s for s in segments if self.layout(s.names).pairs and s.position.size]
-        self._no_longer_assumed(useful)
         time = np.concatenate([s.log_time for s in useful] or [np.empty(0, np.int64)])
         stamp = np.concatenate([s.stamp for s in useful] or [np.empty(0, np.int64)])
         joints, n = len(self.settings.joints), len(time)
@@ -249,27 +248,20 @@ class JointMerger:
         looked = [(self.layout(x), rows) for x, rows in rows_of.items()]
         self._leaps.columns(time, raw, tables[0], named, looked, self.seen)
         before = list(self.turns.told)
-        doubtful = [j for j, untold in self._untold.items() if not untold.harmless]
-        merged, speed, seen = self._carry(time, stamp, tables, named)
-        doubted = np.zeros(n, np.bool_)
-        for j in doubtful:
-            doubted |= seen[j] == FOREVER
+        merged, speed, seen, doubted = self._carry(time, stamp, tables, named)
         self.told = Told(*repeats, speed, merged.q, raw, named, before, seen, doubted)
         for j in range(joints * bool(n)):
             self.turns.told[j] = self.told.told_at(j, n - 1)
         return merged
-
-    def _no_longer_assumed(self, segments: Sequence[JointStateColumns]) -> None:
-        """Note that joints which were taken as held are told in these messages."""
-        told = {j for s in segments for j, _ in self.layout(s.names).pairs} & self._untold.keys()
-        for j in told:
-            self.seen[j] = NEVER if self.seen[j] == FOREVER else self.seen[j]
 
     def _note_first(self, segments: Sequence[JointStateColumns]) -> None:
         for segment in segments:
             layout = self.layout(segment.names)
             if layout.first == NEVER and len(segment.log_time):
                 layout.first = int(segment.log_time.min())
+            for j, _ in layout.pairs if self._untold and segment.position.size else ():
+                if self.seen[j] == FOREVER:  # taken as held, and told now
+                    self.seen[j] = NEVER
 
     def _repeat_rows(
         self,
@@ -346,16 +338,16 @@ class JointMerger:
 
     def _carry(
         self, time: Times, stamp: Times, tables: Floats, named: Mask
-    ) -> tuple[JointRows, Floats, list[Times]]:
+    ) -> tuple[JointRows, Floats, list[Times], Mask]:
         """Let every joint keep its newest value until the next message that names it."""
         oldest, unusable = time, np.isnan(tables[0]).any(axis=0)
-        seen = [time] * len(named)
+        seen, doubted = [time] * len(named), np.zeros(len(time), np.bool_)
         if not named.all():
             oldest, unusable = time.copy(), np.zeros(len(time), np.bool_)
             for j in range(len(named)):
                 seen[j] = self._carry_joint(j, time, tables[:, j], named[j])
                 if j in self._untold:
-                    self._assume_rows(j, time, tables[0, j], seen[j])
+                    doubted |= self._assume_rows(j, time, tables[0, j], seen[j])
                 np.minimum(oldest, seen[j], out=oldest)
                 unusable |= np.isnan(tables[0, j]) & (seen[j] != NEVER)
         if len(time):
@@ -364,15 +356,16 @@ class JointMerger:
             self._untold.pop(j, None)
             self.seen[j] = int(time[len(time) - 1 - named[j, ::-1].argmax()])
         q, qd, effort, speed = (table.T for table in tables)
-        return JointRows(time, stamp, q, qd, effort, oldest, unusable), speed, seen
+        return JointRows(time, stamp, q, qd, effort, oldest, unusable), speed, seen, doubted
 
-    def _assume_rows(self, j: int, time: Times, q: Floats, seen: Times) -> None:
-        """Take joint number j as held in the rows before the first that names it, in place."""
+    def _assume_rows(self, j: int, time: Times, q: Floats, seen: Times) -> Mask:
+        """Take joint number j as held before the first row that names it; return where in doubt."""
         rows = ((seen == NEVER) | (seen == FOREVER)) & (time - self.began > STARTUP)
         if rows.any():
             q[rows], seen[rows] = self._untold[j].position, FOREVER
             self.seen[j] = FOREVER
             self.assumed.add(j)
+        return rows & (not self._untold[j].harmless)
 
     def _carry_joint(self, j: int, time: Times, tables: Floats, named: Mask) -> Times:
         """Fill the rows that do not name joint number j; return when its value was received."""
