@@ -30,6 +30,7 @@ from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Lim
 from ugv_acceptance.model.clearance import arm_links
 from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Payload, Robot
 
+__all__ = ['Build', 'assumed_numbers', 'checked', 'sentence_of', 'settings_from']
 T = TypeVar('T')
 M = TypeVar('M', bound=BaseModel)
 # Keys of joints.NAME.law in order of Law, with their quantities: of a rotary joint, of a slide.

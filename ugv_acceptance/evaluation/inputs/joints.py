@@ -360,12 +360,12 @@ class JointMerger:
 
     def _assume_rows(self, j: int, time: Times, q: Floats, seen: Times) -> Mask:
         """Take joint number j as held before the first row that names it; return where in doubt."""
-        rows = ((seen == NEVER) | (seen == FOREVER)) & (time - self.began > STARTUP)
+        rows: Mask = ((seen == NEVER) | (seen == FOREVER)) & (time - self.began > STARTUP)
         if rows.any():
             q[rows], seen[rows] = self._untold[j].position, FOREVER
             self.seen[j] = FOREVER
             self.assumed.add(j)
-        return rows & (not self._untold[j].harmless)
+        return np.zeros_like(rows) if self._untold[j].harmless else rows
 
     def _carry_joint(self, j: int, time: Times, tables: Floats, named: Mask) -> Times:
         """Fill the rows that do not name joint number j; return when its value was received."""
