@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import Build, assumed_numbers, checked, settings_from
 from ugv_acceptance.config.contact_check import compared, uneven_tracks
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.files import beside, find, read, text
 from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.strength import worst_torques
 from ugv_acceptance.config.topics import Topics, topics_from
@@ -18,10 +18,7 @@ from ugv_acceptance.evaluation.criteria.not_judged import LEAST
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
-PACKAGE = 'ugv_acceptance'
 DEFAULT = Path('packbot')
-# A larger file (bytes) is not a robot description.
-LARGEST_FILE = 20_000_000
 # Share of the largest torque of any joint from which one without a limit is warned of.
 HEAVY = 0.2
 
@@ -69,13 +66,13 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
     ('turret_joint', 'shoulder_joint')
     """
     at = find(DEFAULT if path is None else Path(path))
-    yaml_bytes = _read(at, 'configuration')
-    document = read_document(_text(yaml_bytes, at), str(at))
+    yaml_bytes = read(at, 'configuration')
+    document = read_document(text(yaml_bytes, at), str(at))
     file = checked(document, File)
     if urdf is None and file.urdf is None:
         raise BadConfig(f'{at}: urdf: expected the path of a URDF here or with --urdf, got none')
-    urdf_at = _beside(at, str(file.urdf)) if urdf is None else Path(urdf)
-    urdf_bytes = _read(urdf_at, 'URDF (give its path with --urdf)')
+    urdf_at = beside(at, str(file.urdf)) if urdf is None else Path(urdf)
+    urdf_bytes = read(urdf_at, 'URDF (give its path with --urdf)')
     model = read_urdf(urdf_bytes, str(urdf_at))
     build = Build(document, file, model, list(model.warnings))
     settings = settings_from(build)
@@ -96,71 +93,6 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
         doubts,
         assumed=assumed_numbers(build),
     )
-
-
-def find(path: Path) -> Path:
-    """Return the file of a path, or of the name of a configuration that ships; else BadConfig."""
-    if path.parent != Path() or path.exists():
-        return path
-    name = path if path.suffix in ('.yaml', '.yml') else Path(f'{path}.yaml')
-    places = [folder / 'msg_configs' / name for folder in _shares()]
-    found = next((place for place in places if place.is_file()), None)
-    if found is None:
-        folders = [place.parent for place in places if place.parent.is_dir()]
-        known = sorted({file.stem for folder in folders for file in folder.glob('*.yaml')})
-        raise BadConfig(
-            f'{path}: expected a file, or one that ships ({", ".join(known) or "none found"})'
-        )
-    return found
-
-
-def _shares() -> list[Path]:
-    """Return the folders our data may be in: the checkout, and the installed share folders."""
-    checkout, ros = Path(__file__).resolve().parents[2], _share_of(PACKAGE)
-    return [checkout, *([ros] if ros else []), Path(sys.prefix) / 'share' / PACKAGE]
-
-
-def _share_of(package: str) -> Path | None:
-    """Return the share folder of a ROS package; None without ROS or without that package."""
-    try:
-        from ament_index_python.packages import (  # noqa: PLC0415 - ROS may be absent
-            get_package_share_directory,
-        )
-
-        return Path(get_package_share_directory(package))
-    except (ImportError, LookupError, OSError, ValueError):  # OSError: no AMENT_PREFIX_PATH
-        return None
-
-
-def _beside(at: Path, urdf: str) -> Path:
-    """Return the path of a URDF: relative to its configuration file, or package://NAME/PATH."""
-    if urdf.startswith('package://'):
-        package, _, inside = urdf.removeprefix('package://').partition('/')
-        share = _share_of(package)
-        if share is None:
-            raise BadConfig(f'{at}: urdf: expected a ROS package of this set-up, got {package}')
-        return share / inside
-    try:
-        return (at.resolve().parent / urdf.removeprefix('file://')).resolve()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise BadConfig(f'{at}: urdf: expected a path, got {error}') from None
-
-
-def _read(path: Path, what: str) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadConfig(f'{path}: expected a {what} below 20 MB, got a larger file')
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise BadConfig(f'{path}: expected a {what}, got: {reason}') from None
-
-
-def _text(content: bytes, path: Path) -> str:
-    try:
-        return content.decode('utf-8')
-    except UnicodeDecodeError as error:
-        raise BadConfig(f'{path}: expected UTF-8 text, got byte {error.start} of another') from None
 
 
 def _check_strength(build: Build, settings: Settings) -> None:
