@@ -1,4 +1,4 @@
-"""Finds and reads the files of a robot: those that ship, in ROS packages, beside a configuration."""
+"""Finds and reads the files of a robot: what ships, what ROS packages hold, what stands beside."""
 
 import sys
 from pathlib import Path
