@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from ugv_acceptance import BadBag, BadSample
 from ugv_acceptance.bag.description import TYPE, string_of
+from ugv_acceptance.bag.encode import string_message
 from ugv_acceptance.bag.mcap_index import McapIndex
 from ugv_acceptance.bag.raw import Logged, messages_of
 from ugv_acceptance.bag.reader import Bag, Topics
@@ -31,6 +32,11 @@ class Described:
     def where(self) -> str:
         """The topics as text."""
         return ' and '.join(self.topics)
+
+
+def description_message(urdf: bytes) -> bytes:
+    """Return a URDF as a serialised std_msgs/String, as robots tell it on /robot_description."""
+    return string_message(urdf.decode('utf-8', 'replace'))
 
 
 def descriptions_in(recording: Recording, name: str) -> Described:

@@ -285,6 +285,12 @@ ALERTS = {
         FailureSource.CONTROL_SYSTEM,
         level=WARN,
     ),
+    'CONFIG_DIFFERS': AlertText(
+        'the robot is not the configured one, by its own description: {detail}',
+        "configure the robot's own URDF, or none, and activate the monitor again",
+        FailureSource.DESIGN,
+        level=WARN,
+    ),
     'INPUT_MALFORMED': AlertText(
         '{subject}: {peak:.0f} messages could not be decoded; the last: {detail}',
         'check the type and the version of the node that publishes it',
