@@ -90,7 +90,6 @@ def feed_of(
 ) -> 'Iterator[tuple[Feed, Callable[[], bool]]]':
     """Yield the feed to show, of a recording or the live robot, and a function for when to end."""
     from ugv_acceptance.bag.recording import open_recording
-    from ugv_acceptance.config import load
     from ugv_acceptance.offline.own_robot import robot_of
 
     # Where no bag is given, click takes --ros-args for it.
@@ -103,8 +102,9 @@ def feed_of(
             yield recording, asked
         return
     from ugv_acceptance.nodes.console_feed import live_feed
+    from ugv_acceptance.nodes.monitor.own_description import load_live
 
-    with live_feed(load(config, urdf=urdf), ros) as (feed, stop):
+    with live_feed(load_live(config, urdf, ros), ros) as (feed, stop):
         yield feed, lambda: stop.asked
 
 

@@ -25,6 +25,7 @@ from ugv_acceptance.config.same_robot import (
 )
 from ugv_acceptance.config.urdf import read_urdf
 from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.executor import ros
 
 # The subject of its alert.
 NAME = 'robot_description'
@@ -65,7 +66,7 @@ class OwnDescription:
         """
         topic = description_topic(path, urdf=urdf)
         if topic is not None:
-            self._listen(topic)
+            self.listen(topic)
         return topic is not None
 
     def complete(self, path: Path, urdf: Path | None, *, wait: bool) -> Config:
@@ -78,10 +79,11 @@ class OwnDescription:
                 self._wait()
             return load(path, urdf_text=self._take())
         config = load(path, urdf=urdf)
-        self._listen(config.topics.robot_description)
+        self.listen(config.topics.robot_description)
         return config
 
-    def _listen(self, topic: str) -> None:
+    def listen(self, topic: str) -> None:
+        """Listen to a topic from now on."""
         name = self._node.resolve_topic_name(topic)
         if name != self.topic:
             self.topic, self._publishers = name, frozenset()
@@ -186,21 +188,41 @@ class OwnDescription:
         for data in self.heard:
             key = (config.urdf_sha256, data)
             if key not in self._compared:
-                self._compared[key] = self._difference(config, data)
+                self._compared[key] = difference_of(config, self.heard[data], self.topic)
             if self._compared[key]:
                 return self._compared[key]
         return ''
 
-    def _difference(self, config: Config, data: bytes) -> str:
-        told = self.heard[data]
-        if isinstance(told, BadSample):
-            return f'{self.topic} cannot be read: {told}'
+
+def difference_of(config: Config, told: str | BadSample, topic: str) -> str:
+    """Return how a description told on a topic differs from the URDF in force; empty: not at all.
+
+    What cannot be read is a difference.
+    """
+    if isinstance(told, BadSample):
+        return f'{topic} cannot be read: {told}'
+    try:
+        other = read_urdf(told.encode(), topic)
+    except BadConfig as error:
+        return str(error)
+    places = FILE_AND_ROBOT if config.description == 'file' else THEN_AND_NOW
+    return difference_words(differences(config.urdf, other, places))
+
+
+def load_live(config: Path | None, urdf: Path | None, args: list[str]) -> Config:
+    """Load a robot's files; where they name no URDF, with the one the robot tells over ROS.
+
+    `args` are ROS arguments. Raises BadConfig where the robot tells none that can be taken.
+    """
+    if description_topic(config, urdf=urdf) is None:
+        return load(config, urdf=urdf)
+    with ros(args):
+        node = Node('robot_description_reader')
         try:
-            other = read_urdf(told.encode(), self.topic)
-        except BadConfig as error:
-            return str(error)
-        places = FILE_AND_ROBOT if config.description == 'file' else THEN_AND_NOW
-        return difference_words(differences(config.urdf, other, places))
+            own = OwnDescription(node, _nothing)
+            return own.complete(config or Path(), urdf, wait=True)
+        finally:
+            node.destroy_node()
 
 
 def _told(data: bytes) -> str | BadSample:
