@@ -131,6 +131,23 @@ def test_a_wrong_option_is_refused(arguments: dict[str, str], sentence: str) -> 
         describe(load(), **arguments)
 
 
+def test_poses_are_listed_and_can_be_taken() -> None:
+    """The tables name each pose with the joints that are not at 0, and --posture takes one."""
+    text = output_of('--config', 'packbot_eod', '--posture', 'STOW,turret_joint=90deg')
+    assert re.search(r'STAIRS +shoulder_joint 20 deg', text)
+    assert re.search(r'turret_joint +any +90 deg', text)
+    assert re.search(r'flipper_joint +any +180 deg', text)
+    assert 'Poses' not in output_of()
+
+
+def test_the_shell_completes_poses() -> None:
+    """--posture ST<Tab> completes to the poses of the --config before it that begin so."""
+    words = 'model --config packbot_eod --posture ST'
+    told = {'_MODEL_COMPLETE': 'complete_bash', 'COMP_WORDS': words, 'COMP_CWORD': '4'}
+    found = runner.invoke(app, [], prog_name='model', env=told)
+    assert found.output.split() == ['STOW', 'STAIRS']
+
+
 def test_a_foreign_robot_needs_its_urdf() -> None:
     """A configuration that ships without its URDF gives an error that names --urdf."""
     with pytest.raises(BadConfig, match='--urdf'):

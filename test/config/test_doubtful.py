@@ -136,6 +136,7 @@ def test_wheels_are_part_of_what_a_robot_stands_on(
     elif kind != 'fixed':
         wheels = ''.join(f'  axle_{n}: {{limit_nm: null}}\n' for n in 'abc')
         yaml = yaml.replace('joints:\n', f'joints:\n{wheels}')
+    yaml += 'links: {wheel_a: {mass_kg: 1}, wheel_b: {mass_kg: 1}, wheel_c: {mass_kg: 1}}\n'
     assert config_of(tmp_path, yaml, urdf).warnings == ()
     wrong = config_of(tmp_path, yaml.replace('[0, -1, 0]', '[0, -2, 0]'), urdf)
     assert len(of(wrong, 'contacts.c.position')) == 1

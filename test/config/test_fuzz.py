@@ -1,7 +1,6 @@
 """Any text gives a configuration or BadConfig, never another exception."""
 
 import tempfile
-from contextlib import suppress
 from pathlib import Path
 
 import yaml
@@ -31,9 +30,13 @@ values = st.recursive(
 
 
 def load_texts(yaml_text: str, urdf_text: str) -> Config | None:
-    """Load two texts as files; None where they are refused."""
-    with tempfile.TemporaryDirectory() as folder, suppress(BadConfig):
-        return load(write_robot(Path(folder), yaml_text, urdf_text))
+    """Load two texts as files; None where they are refused, by one line."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            return load(write_robot(Path(folder), yaml_text, urdf_text))
+        except BadConfig as error:
+            said = str(error)
+    assert len(said.splitlines()) == 1, repr(said)
     return None
 
 
@@ -58,6 +61,26 @@ def test_a_damaged_yaml_is_a_configuration_or_bad(at: int, length: int, new: str
 def test_a_damaged_urdf_is_a_configuration_or_bad(at: int, length: int, new: str) -> None:
     """A URDF with any piece replaced gives a configuration or BadConfig."""
     assert isinstance(load_texts(YAML, write_over(URDF, at, length, new)), Config | None)
+
+
+LEFTOVERS = (
+    '<xacro:property name="a" value="1"/>', '<xacro:if value="1">', '</xacro:if>', '${x}', '<a:b/>',
+    '<joint name="f" type="floating"><parent link="base"/><child link="b"/></joint>', ' xmlns="u"',
+    '<limit lower="-2" upper="-1" effort="0"/>', '<inertial/>', '<mimic joint="lift"/>', '&#10;',
+    '<collision><geometry><mesh filename="x"/></geometry></collision>', '<link name="b"/>', 'inf',
+)  # fmt: skip
+
+
+@settings(max_examples=150)
+@given(st.lists(st.tuples(st.integers(0), st.sampled_from(LEFTOVERS)), max_size=3))
+def test_a_urdf_with_pieces_of_others_is_a_configuration_or_bad(
+    pieces: list[tuple[int, str]],
+) -> None:
+    """A URDF with pieces that belong elsewhere gives a configuration or BadConfig."""
+    urdf = URDF
+    for at, piece in pieces:
+        urdf = write_over(urdf, at, 0, piece)
+    assert isinstance(load_texts(YAML, urdf), Config | None)
 
 
 @settings(max_examples=150)

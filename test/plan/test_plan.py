@@ -1,5 +1,6 @@
 """A plan as a file: what is written is read, what is wrong is said with file and line."""
 
+import math
 import re
 from pathlib import Path
 
@@ -85,6 +86,59 @@ def test_two_steps_of_one_id_are_refused(tmp_path: Path) -> None:
     text = yaml.safe_dump({**PLAN, 'steps': [STEP, STEP]})
     with pytest.raises(BadConfig, match='expected a different id for every step, got one twice'):
         read_plan(written(tmp_path, text))
+
+
+EOD = load('packbot_eod').settings.robot
+POSED = {**STEP, 'posture': 'DRIVE', 'posture_deg': {'turret_joint': 20}}
+
+
+def posed(folder: Path, step: dict[str, object]) -> Plan:
+    """Return a plan of one step, read for a robot that has poses."""
+    plan = {**PLAN, 'home_deg': {'shoulder_joint': 5}, 'steps': [step]}
+    return read_plan(written(folder, yaml.safe_dump(plan)), EOD)
+
+
+def test_a_step_may_name_a_pose_of_the_robot(tmp_path: Path) -> None:
+    """The step has the angles of the pose; its own posture_deg replaces single joints."""
+    (step,) = posed(tmp_path, POSED).steps
+    pose = next(dict(pose.positions) for pose in EOD.poses if pose.name == 'DRIVE')
+    assert math.radians(step.posture_deg['elbow_1_joint']) == pytest.approx(pose['elbow_1_joint'])
+    assert step.posture_deg['turret_joint'] == 20
+    assert set(step.posture_deg) == set(pose)
+    alone = {k: v for k, v in POSED.items() if k != 'posture_deg'}
+    assert posed(tmp_path, alone).steps[0].posture_deg['turret_joint'] == 0
+
+
+def test_a_plan_with_poses_is_written_and_read_again(tmp_path: Path) -> None:
+    """Its record has the angles too, and keeps its hash."""
+    plan = posed(tmp_path, POSED)
+    again = read_plan(written(tmp_path, plan_text(plan)), EOD)
+    assert (again, again.sha256) == (plan, plan.sha256)
+    text = plan_text(Plan.model_validate({**PLAN, 'steps': [{**STEP, 'posture_deg': {}}]}))
+    assert read_plan(written(tmp_path, text)).steps[0].posture_deg == {}
+
+
+def test_other_angles_of_a_pose_change_the_hash(tmp_path: Path) -> None:
+    """A result names the angles that the pose had then."""
+    moved = {**POSED, 'posture_deg': {'turret_joint': 21}}
+    assert posed(tmp_path, moved).sha256 != posed(tmp_path, POSED).sha256
+
+
+@pytest.mark.parametrize(
+    ('posture', 'said'),
+    [
+        ({'posture': 'DRVE'}, r'plan.yaml:\d+: steps.0.posture: expected a pose \(.*DRIVE'),
+        ({'posture': 'DRVE'}, r'did you mean DRIVE\?'),
+        ({}, 'expected posture_deg, or posture with the name of a pose'),
+    ],
+)
+def test_an_unknown_pose_of_a_step_is_said_with_file_and_line(
+    tmp_path: Path, posture: dict[str, object], said: str
+) -> None:
+    """A step names a pose that the robot has, or angles."""
+    bare = {k: v for k, v in STEP.items() if k != 'posture_deg'}
+    with pytest.raises(BadConfig, match=said):
+        posed(tmp_path, {**bare, **posture})
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
+from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile, poses_like
 from ugv_acceptance.evaluation.ground import CARRIED, UPPER_BOUND, ground_words
 from ugv_acceptance.model.stability import RAISED, STATES
 from ugv_acceptance.report.format import number_text
@@ -28,6 +28,7 @@ def print_tables(description: Values) -> None:
     console.print(_links(description))
     console.print(_joints(description))
     _print_carrying(console, description)
+    _print_poses(console, description)
     _print_payload(console, description)
     console.print(_contacts(description))
     _print_stability(console, description)
@@ -108,6 +109,20 @@ def _print_carrying(console: Console, d: Values) -> None:
         'against each other.\n',
         soft_wrap=True,
     )
+
+
+def _print_poses(console: Console, d: Values) -> None:
+    """Print the named postures, with the joints that are not at 0; nothing if there are none."""
+    if not d['poses']:
+        return
+    joints = {joint['name']: joint for joint in d['joints']}
+    table = _table('Poses, for --posture NAME', 'pose', 'joints that are not at 0')
+    table.columns[1].justify = 'left'
+    for pose in d['poses']:
+        at = pose['positions'].items()
+        places = [f'{n} {_place({**joints[n], "position": q})}' for n, q in at if q]
+        table.add_row(escape(pose['name']), escape(', '.join(places) or 'none'))
+    console.print(table)
 
 
 def _share(used: float) -> str:
@@ -221,7 +236,11 @@ def model(
     config: ConfigFile = None,
     urdf: UrdfFile = None,
     posture: Annotated[
-        str, typer.Option(help='Posture: joint=30deg,...; joints left out are at 0.')
+        str,
+        typer.Option(
+            help='POSE or joint=30deg,... or POSE,joint=30deg,...; left out: at 0.',
+            autocompletion=poses_like,
+        ),
     ] = '',
     tilt: Annotated[
         str,
@@ -250,6 +269,7 @@ def model(
     Examples:
       ugv-acceptance model
       ugv-acceptance model --posture shoulder_joint=30deg,flipper_joint=180deg
+      ugv-acceptance model --config packbot_eod --posture STOW,shoulder_joint=90deg
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
       ugv-acceptance model --posture shoulder_joint=60deg --tilt roll=15deg --power-loss
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json

@@ -35,6 +35,18 @@ Overwrite = Annotated[
 ]
 
 
+def poses_like(context: typer.Context, incomplete: str) -> list[str]:
+    """Return the names of the robot's poses that begin so, for the shell's completion."""
+    from ugv_acceptance import AcceptanceError
+    from ugv_acceptance.config import load
+
+    try:
+        poses = load(context.params.get('config')).settings.robot.poses
+    except AcceptanceError:
+        return []
+    return [pose.name for pose in poses if pose.name.startswith(incomplete)]
+
+
 def ros_arguments(context: typer.Context) -> list[str]:
     """Return the arguments for ROS; a usage error for any that is not after --ros-args."""
     if context.args and context.args[0] != '--ros-args':

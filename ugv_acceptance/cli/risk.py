@@ -5,14 +5,17 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import RobotFile
+from ugv_acceptance.cli.options import RobotFile, poses_like
 
 
 def risk(
     config: RobotFile = None,
     posture: Annotated[
         str,
-        typer.Option(help='Posture: joint=30deg,...; if left out, the arm anywhere in its range.'),
+        typer.Option(
+            help='Posture: POSE or joint=30deg,...; if left out, the arm anywhere in its range.',
+            autocompletion=poses_like,
+        ),
     ] = '',
     vary: Annotated[
         list[str] | None,

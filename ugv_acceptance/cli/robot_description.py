@@ -11,6 +11,7 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
+from ugv_acceptance.config.poses import nearest_name, pose_named
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.model.clearance import clearance, lowest_part, nearness_of
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
@@ -60,6 +61,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'links': [_link(config, k) for k in range(len(robot.links))],
         'tilt': {'roll_deg': math.degrees(roll), 'pitch_deg': math.degrees(pitch)},
         'joints': _joints(config, q, reactions_of(mechanics, found, points, gravity)),
+        'poses': _poses(robot),
         'payload': _payload(config, q, gravity, load),
         'total_mass_kg': found.mass,
         'centre_of_gravity_m': list(found.cog),
@@ -79,12 +81,21 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
 
 
 def posture_from(robot: Robot, text: str) -> list[float]:
-    """Return joint positions (rad, m) from 'joint=30deg,...'; those left out are at 0."""
+    """Return joint positions (rad, m) from 'POSE,joint=30deg,...'; those left out are at 0.
+
+    The pose, one of the robot's, may be left out; positions given beside it replace the pose's.
+    Raises BadConfig for a pose or joint that the robot has not, or a value that is no position.
+    """
     q = dict.fromkeys(robot.joint_names, 0.0)
+    first, _, rest = text.partition(',')
+    if first.strip() and '=' not in first and robot.poses:
+        q |= pose_named(robot, first.strip(), '--posture')
+        text = rest
     for name, value in _pairs(text, '--posture'):
         if name not in q:
             known = ', '.join(q) or 'none'
-            raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}')
+            hint = nearest_name(name, q)
+            raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}{hint}')
         kind = 'length' if robot.joint(name).slides else 'angle'
         q[name] = quantity(value, kind, f'--posture {name}={value}')
     return list(q.values())
@@ -175,6 +186,12 @@ def _joints(config: Config, q: list[float], found: Reactions) -> list[Values]:
         _joint(j, places.get(j.name, 0.0)) | {'topic_name': None, 'follows': follows.get(j.name)}
         for j in still
     ]
+
+
+def _poses(robot: Robot) -> list[Values]:
+    """Return the named postures: every measured joint's position (rad, m), 0 where not named."""
+    at_zero = dict.fromkeys(robot.joint_names, 0.0)
+    return [{'name': p.name, 'positions': at_zero | dict(p.positions)} for p in robot.poses]
 
 
 def _carrying(found: Reactions, k: int) -> Values | None:

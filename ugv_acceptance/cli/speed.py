@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import PayloadMass, RobotFile
+from ugv_acceptance.cli.options import PayloadMass, RobotFile, poses_like
 
 if TYPE_CHECKING:
     from ugv_acceptance.model.robot import Robot
@@ -15,7 +15,8 @@ def speed(
     posture: Annotated[
         str,
         typer.Option(
-            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
+            help='Posture held while each joint turns: POSE or joint=30deg,...; by default all.',
+            autocompletion=poses_like,
         ),
     ] = '',
     payload: PayloadMass = '',

@@ -10,8 +10,11 @@ from pydantic import BaseModel, ValidationError
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Document, Path
+from ugv_acceptance.config.masses import check_masses
+from ugv_acceptance.config.mimics import followed
+from ugv_acceptance.config.poses import poses_from
 from ugv_acceptance.config.schema import File, JointSection
-from ugv_acceptance.config.units import EXAMPLES, Given, shown
+from ugv_acceptance.config.units import EXAMPLES, Given, cut, shown
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
@@ -19,7 +22,7 @@ from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
 from ugv_acceptance.model.clearance import arm_links
-from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Mimic, Payload, Robot
+from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Payload, Robot
 
 T = TypeVar('T')
 M = TypeVar('M', bound=BaseModel)
@@ -29,8 +32,6 @@ _LAW_KINDS = {
     'spring': ('stiffness', 'linear stiffness'),
     'rest': ('angle', 'length'),
 }
-# Lighter robots are mistakes of unit.
-LEAST_MASS = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +184,7 @@ def _measured(build: Build) -> dict[str, JointSection]:
 def _known(build: Build, path: Path, name: str, known: Sequence[str], what: str) -> None:
     if name not in known:
         near = get_close_matches(name, known, 1, 0.5)
-        hint = f'did you mean {near[0]}?' if near else f'it has {_list(known)}'
+        hint = f'did you mean {cut(near[0])}?' if near else f'it has {_list(known)}'
         raise build.refuse(path, f'the URDF has no {what} {shown(name)}; {hint}')
 
 
@@ -211,11 +212,12 @@ def assumed_numbers(build: Build) -> tuple[tuple[str, str], ...] | None:
 
 
 def _list(names: Sequence[str]) -> str:
-    return ', '.join(names[:8]) + (', ...' if len(names) > 8 else '') if names else 'none'
+    return ', '.join(map(cut, names[:8])) + ', ...' * (len(names) > 8) if names else 'none'
 
 
 def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
     measured = tuple(sections)
+    stays = {*measured, *build.file.held}
     file, links = build.file, [link.name for link in build.urdf.links]
     for name, contact in file.contacts.items():
         _known(build, ('contacts', name, 'link'), contact.link, links, 'link')
@@ -227,8 +229,7 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         _known(build, ('payload', 'link'), file.payload.link, links, 'link')
     bodies = tuple(_links(build, links))
     load = Payload() if file.payload is None else Payload(file.payload.mass, file.payload.cog)
-    if (total := math.fsum(link.mass for link in bodies)) < LEAST_MASS:
-        raise build.refuse(('urdf',), f'expected a robot with mass, got {total:g} kg in all links')
+    check_masses(bodies, build.urdf.joints, build.urdf.shapes, build.refuse, build.warn)
     robot = Robot(
         file.robot.name,
         bodies,
@@ -241,28 +242,13 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         file.gravity,
         file.ground.height,
         file.ground.tolerance,
-        tuple(m for m in _followed(build, measured) if m.follows in measured),
+        tuple(m for m in followed(build.urdf.mimics, stays) if m.follows in measured),
         tuple(_laws(build, sections)),
     )
+    joints = [robot.joint(name) for name in measured]
+    robot = replace(robot, poses=tuple(poses_from(file.poses, joints, build.refuse)))
     arm = arm_links(robot)
     return replace(robot, shapes=tuple(s for s in build.urdf.shapes if s.link in arm))
-
-
-def _followed(build: Build, measured: tuple[str, ...]) -> Iterable[Mimic]:
-    """Yield each joint that follows another, and which measured or held one it follows in the end.
-
-    One that is measured or held itself does not follow.
-    """
-    stays = {*measured, *build.file.held}
-    of = {mimic.joint: mimic for mimic in build.urdf.mimics if mimic.joint not in stays}
-    for mimic in of.values():
-        found = mimic
-        while found.follows in of:
-            next_one = of[found.follows]
-            factor = found.multiplier * next_one.multiplier
-            offset = found.multiplier * next_one.offset + found.offset
-            found = Mimic(mimic.joint, next_one.follows, factor, offset)
-        yield found
 
 
 def _laws(build: Build, sections: dict[str, JointSection]) -> Iterable[Law]:
@@ -299,7 +285,7 @@ def _links(build: Build, names: list[str]) -> Iterable[Link]:
 def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]]:
     """Yield every movable joint without messages with the position at which it is held."""
     held, silent = build.file.held, []
-    follows = {mimic.joint: mimic for mimic in _followed(build, measured)}
+    follows = {m.joint: m for m in followed(build.urdf.mimics, {*measured, *held})}
     movable = {joint.name: joint for joint in build.urdf.joints if joint.kind != 'fixed'}
     for name in held:
         _known(build, ('held', name), name, list(movable), 'movable joint')
@@ -307,17 +293,37 @@ def _held(build: Build, measured: tuple[str, ...]) -> Iterable[tuple[str, float]
             raise build.refuse(('held', name), 'expected a joint that is not under joints too')
     for name, joint in movable.items():
         if name in held:
-            yield name, _of_joint(build, ('held', name), joint, held[name], 'angle', 'length')
+            yield name, _declared(build, joint)
         elif name in follows:
             of = follows[name]
             if of.follows in measured:
                 continue
-            at = held.get(of.follows)
-            yield name, of.multiplier * (at.value if at else 0.0) + of.offset
+            led = held[of.follows].value if of.follows in held else movable[of.follows].nearest(0.0)
+            yield name, of.multiplier * led + of.offset
         elif name not in measured:
-            silent.append(name)
-    if silent:
-        build.warn(('joints',), f'neither under joints nor held, so held at 0: {_list(silent)}')
+            silent.append(joint)
+    yield from _silent(build, silent)
+
+
+def _declared(build: Build, joint: Joint) -> float:
+    """Return where the file says that a joint is held; one beyond its range is warned of."""
+    path = ('held', joint.name)
+    at = _of_joint(build, path, joint, build.file.held[joint.name], 'angle', 'length')
+    if at != joint.nearest(at):
+        unit = joint.units.position
+        build.warn(path, f'{at:g} is outside its range, {joint.lower:g} .. {joint.upper:g} {unit}')
+    return at
+
+
+def _silent(build: Build, joints: Sequence[Joint]) -> Iterable[tuple[str, float]]:
+    """Yield where joints that nobody tells are held: at 0, or the nearest end of their range."""
+    if joints:
+        names = _list([joint.name for joint in joints])
+        build.warn(('joints',), f'neither under joints nor held, so held at 0: {names}')
+    for joint in joints:
+        if at := joint.nearest(0.0):
+            build.warn(('joints',), f'{joint.name}: its range is without 0, so held at {at:g}')
+            yield joint.name, at
 
 
 def _of_joint(
@@ -381,7 +387,8 @@ def _limit(build: Build, joint: Joint, section: JointSection) -> float:
     if section.passive:
         return math.inf
     if 'limit' not in section.model_fields_set and math.isinf(joint.effort):
-        build.warn(path[:2], 'no limit here and no effort in the URDF: its torque is not judged')
+        given = 'an effort of 0' if joint.name in build.urdf.unlimited else 'no effort'
+        build.warn(path[:2], f'no limit here and {given} in the URDF: its torque is not judged')
     return math.inf if 'limit' in section.model_fields_set else joint.effort
 
 

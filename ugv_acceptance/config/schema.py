@@ -3,6 +3,7 @@
 Values are converted to SI and radians. Defaults not given here are those of evaluation/settings.py.
 """
 
+import re
 from difflib import get_close_matches
 from typing import Annotated, Literal
 
@@ -46,6 +47,22 @@ def _sign(value: object) -> float:
     return float(value)
 
 
+def _pose_name(name: str) -> str:
+    """Refuse what --posture could not tell from joint=value,joint=value."""
+    if not re.fullmatch('[A-Za-z][A-Za-z0-9_-]*', name):
+        text = 'expected a name of letters, digits, - and _, such as STOW'
+        raise ValueError(f'{text}, got {shown(name)}')
+    return name
+
+
+def _pose(joints: object) -> object:
+    if not isinstance(joints, dict):
+        raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
+            f'expected joints with positions, such as lift_joint_deg: 30, got {shown(joints)}'
+        )
+    return joints
+
+
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Number = Annotated[float, _number()]
@@ -63,6 +80,8 @@ Name = Annotated[str, Field(min_length=1, strict=True)]
 TopicName = Annotated[
     str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')
 ]
+PoseName = Annotated[str, AfterValidator(_pose_name)]
+PoseSection = Annotated[dict[Name, object], BeforeValidator(_pose)]
 Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
 
 
@@ -267,6 +286,8 @@ class File(Section):
     joints: dict[str, JointSection] | None = None
     held: dict[str, Place] = {}
     links: dict[str, LinkSection] = {}
+    # Joint, with the unit or without -> position: read by poses.py, which knows the joints.
+    poses: dict[PoseName, PoseSection] = {}
     imu: ImuSection = ImuSection()
     contacts: dict[str, ContactSection] = {}
     ground: GroundSection = GroundSection()

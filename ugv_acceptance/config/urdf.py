@@ -1,19 +1,19 @@
 """Reads a URDF: links, masses, joints, limits and collision geometry; visuals are ignored.
 
-Parsed by defusedxml, which refuses entities and external files.
+urdf_xml.py parses the XML, urdf_tree.py finds the one tree in it.
 """
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from xml.etree.ElementTree import Element, ParseError
+from xml.etree.ElementTree import Element
 
 import numpy as np
-from defusedxml import DefusedXmlException
-from defusedxml.ElementTree import fromstring
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config.units import LARGEST, shown
+from ugv_acceptance.config.units import LARGEST, cut, shown
+from ugv_acceptance.config.urdf_tree import FREE, tree_of
+from ugv_acceptance.config.urdf_xml import bare_links, parse
 from ugv_acceptance.model.robot import (
     IDENTITY,
     NO_INERTIA,
@@ -33,7 +33,8 @@ KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
 class Urdf:
     """The links and joints of a URDF; `mimics` are the joints that follow others.
 
-    `shapes` is the collision geometry of all links.
+    `shapes` is the collision geometry of all links, `unlimited` the joints to which it gives an
+    effort that is no limit, such as 0.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Urdf:
     mimics: tuple[Mimic, ...]
     warnings: tuple[str, ...]
     shapes: tuple[Shape, ...] = ()
+    unlimited: tuple[str, ...] = ()
 
 
 def read_urdf(text: bytes, source: str) -> Urdf:
@@ -49,32 +51,25 @@ def read_urdf(text: bytes, source: str) -> Urdf:
 
     Raises BadConfig if it is not a URDF, a number is unusable, or the joints are not one tree.
     """
-    root = _parse(text, source)
+    root = parse(text, source)
     warnings: list[str] = []
     links = tuple(_link(e, source, warnings) for e in root.findall('link'))
     joints = tuple(_joint(e, source, warnings) for e in root.findall('joint'))
     _check_unique('link', [link.name for link in links], source)
     _check_unique('joint', [joint.name for joint in joints], source)
-    _check_tree(links, joints, source)
+    links, joints = tree_of(links, joints, set(bare_links(root)), source, warnings)
     mimics = tuple(_mimics(root, joints, source))
-    shapes = tuple(_shapes(root))
-    return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings), shapes)
-
-
-def _parse(text: bytes, source: str) -> Element:
-    try:
-        root: Element = fromstring(text, forbid_dtd=True)
-    except DefusedXmlException:
-        raise BadConfig(
-            f'{source}: expected a URDF, got XML with a DTD or entities, which are refused'
-        ) from None
-    except (ParseError, ValueError, LookupError) as error:
-        raise BadConfig(f'{source}: expected a URDF (XML), got {shown(str(error))}') from None
-    if root.tag != 'robot':
-        raise BadConfig(f'{source}: expected the root element <robot>, got <{shown(root.tag)}>')
-    if any(isinstance(e.tag, str) and 'xacro' in e.tag for e in root.iter()):
-        raise BadConfig(f'{source}: expected a URDF, got xacro macros: run xacro on it first')
-    return root
+    names = {link.name for link in links}
+    shapes = tuple(shape for shape in _shapes(root) if shape.link in names)
+    return Urdf(
+        root.get('name') or 'robot',
+        links,
+        joints,
+        mimics,
+        tuple(warnings),
+        shapes,
+        tuple(_without_strength(root)),
+    )
 
 
 def _link(element: Element, source: str, warnings: list[str]) -> Link:
@@ -82,7 +77,7 @@ def _link(element: Element, source: str, warnings: list[str]) -> Link:
     inertial = element.find('inertial')
     if inertial is None:
         return Link(name)
-    where = f'{source}: link {name}: inertial'
+    where = f'{source}: link {cut(name)}: inertial'
     mass = _number(inertial.find('mass'), 'value', f'{where}/mass', None)
     if mass < 0.0:
         raise BadConfig(f'{where}/mass: expected a mass >= 0 kg, got {mass:g}')
@@ -114,13 +109,10 @@ def _is_physical(inertia: Matrix) -> bool:
 
 def _joint(element: Element, source: str, warnings: list[str]) -> Joint:
     name = _name(element, 'joint', source)
-    where = f'{source}: joint {name}'
+    where = f'{source}: joint {cut(name)}'
     kind = element.get('type', '')
-    if kind not in KINDS:
-        raise BadConfig(
-            f'{where}: expected the type {", ".join(KINDS)}, got {shown(kind)}:'
-            ' a joint of several degrees of freedom has to be written as several joints'
-        )
+    if kind not in (*KINDS, *FREE):
+        raise BadConfig(f'{where}: expected the type {", ".join(KINDS)}, got {shown(kind)}')
     ends = []
     for end in ('parent', 'child'):
         child = element.find(end)
@@ -138,12 +130,12 @@ def _joint(element: Element, source: str, warnings: list[str]) -> Joint:
 def _range(
     limit: Element | None, kind: str, where: str, warnings: list[str]
 ) -> tuple[float, float]:
-    if kind in ('continuous', 'fixed'):
+    if kind not in ('revolute', 'prismatic'):
         return -math.inf, math.inf
     if limit is None:
         warnings.append(f'{where}: none given for a {kind} joint: taken as unlimited')
         return -math.inf, math.inf
-    lower, upper = (_number(limit, key, where, 0.0) for key in ('lower', 'upper'))
+    lower, upper = (_boundless(limit, key, where) for key in ('lower', 'upper'))
     if lower > upper:
         raise BadConfig(f'{where}: expected lower <= upper, got {lower:g} and {upper:g}')
     if lower == upper:
@@ -153,13 +145,22 @@ def _range(
 
 
 def _limit(limit: Element | None, key: str, where: str) -> float:
-    """Return an effort or velocity limit; infinite if it is missing or 0."""
+    """Return an effort or velocity limit; infinite if it is missing, 0 or beyond all reason."""
     if limit is None:
         return math.inf
-    value = _number(limit, key, where, 0.0)
+    value = _boundless(limit, key, where)
     if value < 0.0:
         raise BadConfig(f'{where}/{key}: expected a limit >= 0, got {value:g}')
     return value or math.inf
+
+
+def _without_strength(root: Element) -> Iterable[str]:
+    """Yield the joints to which the file gives an effort that is no limit: 0, or beyond reason."""
+    for element in root.findall('joint'):
+        limit = element.find('limit')
+        given = limit is not None and limit.get('effort') is not None
+        if given and math.isinf(_limit(limit, 'effort', '')):
+            yield element.get('name', '')
 
 
 def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[Mimic]:
@@ -170,7 +171,7 @@ def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[M
         mimic, name = element.find('mimic'), element.get('name', '')
         if mimic is None or name not in movable:
             continue
-        where, of = f'{source}: joint {name}/mimic', mimic.get('joint', '')
+        where, of = f'{source}: joint {cut(name)}/mimic', mimic.get('joint', '')
         if of not in movable:
             raise BadConfig(f'{where}: expected a movable joint, got {shown(of)}')
         factor = _number(mimic, 'multiplier', where, 1.0)
@@ -179,7 +180,7 @@ def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[M
         seen = [name]
         while (at := seen[-1]) in follows:
             if follows[at].follows in seen:
-                raise BadConfig(f'{source}: joint {name}/mimic: the joints follow each other')
+                raise BadConfig(f'{source}: joint {cut(name)}/mimic: the joints follow each other')
             seen.append(follows[at].follows)
     return tuple(follows.values())
 
@@ -255,7 +256,7 @@ def _triple(element: Element, key: str, where: str, default: str) -> Vector:
     text = element.get(key, default)
     parts = text.split()
     if len(parts) != 3:
-        raise BadConfig(f'{where}/{key}: expected three numbers, got {shown(text)}')
+        raise BadConfig(f'{where}/{key}: expected three numbers, got {shown(text)}{_comma(text)}')
     x, y, z = (_parsed(part, f'{where}/{key}') for part in parts)
     return (x, y, z)
 
@@ -270,13 +271,33 @@ def _number(element: Element | None, key: str, where: str, default: float | None
 
 
 def _parsed(text: str, where: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
+    number = _float(text)
     if not -LARGEST <= number <= LARGEST:
-        raise BadConfig(f'{where}: expected a finite number below {LARGEST:g}, got {shown(text)}')
+        raise BadConfig(
+            f'{where}: expected a finite number below {LARGEST:g}, got {shown(text)}{_comma(text)}'
+        )
     return number
+
+
+def _boundless(limit: Element, key: str, where: str) -> float:
+    """Return a number of a limit, 0 if missing; infinite beyond LARGEST: exporters write 1e30."""
+    number = _float(limit.get(key, '0'))
+    return (
+        math.copysign(math.inf, number)
+        if abs(number) > LARGEST
+        else _number(limit, key, where, 0.0)
+    )
+
+
+def _float(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _comma(text: str) -> str:
+    return ': numbers have a decimal point, and spaces between them' if ',' in text else ''
 
 
 def _matrix(m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Matrix:
@@ -287,28 +308,6 @@ def _matrix(m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Matrix:
 def _check_unique(what: str, names: list[str], source: str) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise BadConfig(f'{source}: expected {what} names once each, got twice: {", ".join(twice)}')
-
-
-def _check_tree(links: tuple[Link, ...], joints: tuple[Joint, ...], source: str) -> None:
-    """Raise BadConfig for missing links, links with two parents, cycles and several roots."""
-    names = {link.name for link in links}
-    parent_of: dict[str, str] = {}
-    for joint in joints:
-        for end in (joint.parent, joint.child):
-            if end not in names:
-                raise BadConfig(f'{source}: joint {joint.name}: link {shown(end)} does not exist')
-        if joint.child in parent_of:
-            raise BadConfig(f'{source}: joint {joint.name}: link {joint.child} has two parents')
-        parent_of[joint.child] = joint.parent
-    roots = [link.name for link in links if link.name not in parent_of]
-    if len(roots) != 1:
-        got = ', '.join(roots[:5]) or ('none: the joints are a cycle' if links else 'no link')
-        raise BadConfig(f'{source}: expected one root link, got {got}')
-    for name in parent_of:
-        seen, at = {name}, name
-        while at in parent_of:
-            at = parent_of[at]
-            if at in seen:
-                raise BadConfig(f'{source}: joints are a cycle through link {at}')
-            seen.add(at)
+        raise BadConfig(
+            f'{source}: expected {what} names once each, got twice: {", ".join(map(cut, twice))}'
+        )

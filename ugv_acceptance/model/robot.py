@@ -73,6 +73,10 @@ class Joint:
         high = self.upper if math.isfinite(self.upper) else half
         return low, high
 
+    def nearest(self, position: float) -> float:
+        """Return the position (rad, m) of its range that is nearest to `position`."""
+        return min(max(position, self.lower), self.upper)
+
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
@@ -132,6 +136,14 @@ class Payload:
 
 
 @dataclass(frozen=True, slots=True)
+class Pose:
+    """A named posture: measured joints with their positions (rad, m); it may leave some out."""
+
+    name: str
+    positions: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Robot:
     """The physical model of a robot; the root link's frame is `base_link`.
 
@@ -140,7 +152,7 @@ class Robot:
     `held` pairs with their name, else at 0. `laws` are of joints among them.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground. `shapes` is the collision geometry of what
-    is held above the ground (clearance.py).
+    is held above the ground (clearance.py). `poses` are postures that people call by a name.
     """
 
     name: str
@@ -157,6 +169,7 @@ class Robot:
     mimics: tuple[Mimic, ...] = ()
     laws: tuple[Law, ...] = ()
     shapes: tuple[Shape, ...] = ()
+    poses: tuple[Pose, ...] = ()
 
     @property
     def root(self) -> str:

@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.poses import pose_named
 from ugv_acceptance.config.seal import sealed
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
@@ -83,7 +84,9 @@ class Step(_Part):
     tip over. sweep: move on from `via_deg` at `speed_degps`. drive: m/s and deg/s for `hold_s`.
     pull: a person pulls with `force_n`. cycle: the postures of `via_deg` again and again for
     `hold_s`. `expected` are the model's margins, for the reader. With `hand_may_touch` the arm may
-    touch the ground, to pick something up: torques are not judged while it does.
+    touch the ground, to pick something up: torques are not judged while it does. `posture` names a
+    pose of the robot's configuration; `posture_deg` then only has what differs from it, until
+    `read_plan` fills in the pose's own angles.
     """
 
     id: Annotated[str, Field(min_length=1, pattern=r'^[A-Za-z0-9_-]+$')]
@@ -95,7 +98,8 @@ class Step(_Part):
     preparation: tuple[str, ...] = ()
     ground: Ground = Ground()
     payload_kg: Annotated[Finite, Field(ge=0)] = 0.0
-    posture_deg: Posture
+    posture: str = ''
+    posture_deg: Posture = {}
     via_deg: tuple[Posture, ...] = ()
     speed_degps: Positive = 20.0
     hold_s: Positive = 3.0
@@ -109,6 +113,10 @@ class Step(_Part):
 
     @model_validator(mode='after')
     def _whole(self) -> 'Step':
+        if not self.posture and 'posture_deg' not in self.model_fields_set:
+            raise ValueError(
+                'expected posture_deg, or posture with the name of a pose, got neither'
+            )
         if self.action == 'drive' and self.drive is None:
             raise ValueError('expected drive: [m/s, deg/s] in a step of action drive, got none')
         if self.action == 'pull' and self.force_n is None:
@@ -145,6 +153,8 @@ class Plan(_Part):
         """SHA-256 of the plan's content; comments and the order of keys do not change it."""
         plain = self.model_dump(mode='json')
         for step in plain['steps']:  # keys that a plan may leave out; old plans keep their hash
+            if not step['posture']:
+                del step['posture']
             for key in ('kind', 'accept', 'reason'):
                 if step['ground'][key] is None:
                     del step['ground'][key]
@@ -171,7 +181,8 @@ def matches(pattern: str, level: str, code: str, subject: str) -> bool:
 def read_plan(path: Path, robot: Robot | None = None) -> Plan:
     """Return the plan in a YAML file. Raises BadConfig with file, line and field.
 
-    With `robot`, every joint named in a posture must be one of this robot's.
+    With `robot`, every joint named in a posture must be one of this robot's, and so must be every
+    pose, whose angles the steps that name it then have.
     """
     try:
         text = path.read_text('utf-8')
@@ -180,13 +191,28 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
         raise BadConfig(f'{path}: expected a plan, got: {got}') from None
     document = read_document(text, str(path))
     plan = checked(document, Plan)
-    for k, step in enumerate(plan.steps):
+    if robot is None:
+        return plan
+    posed = [
+        _posed(step, robot, document.where(('steps', k, 'posture')))
+        for k, step in enumerate(plan.steps)
+    ]
+    for k, step in enumerate(posed):
         for posture in (step.posture_deg, *step.via_deg, plan.home_deg):
-            unknown = sorted(set(posture) - set(robot.joint_names)) if robot else []
+            unknown = sorted(set(posture) - set(robot.joint_names))
             if unknown:
                 where = document.where(('steps', k, 'posture_deg'))
                 raise BadConfig(f'{where}: expected joints of {plan.robot}, got {unknown[0]}')
-    return plan
+    return plan.model_copy(update={'steps': tuple(posed)})
+
+
+def _posed(step: Step, robot: Robot, where: str) -> Step:
+    """Return a step with the angles of the pose that it names, if any, beside its own."""
+    if not step.posture:
+        return step
+    pose = pose_named(robot, step.posture, where)
+    angles = {name: math.degrees(at) for name, at in pose.items()}
+    return step.model_copy(update={'posture_deg': {**angles, **step.posture_deg}})
 
 
 def plan_text(plan: Plan) -> str:
@@ -195,6 +221,7 @@ def plan_text(plan: Plan) -> str:
     for step, whole in zip(data['steps'], plan.steps, strict=True):
         step['alerts'] = whole.alerts.model_dump(mode='json')
         step['where'] = whole.where
+        step.setdefault('posture_deg', {})
     body = yaml.safe_dump(data, sort_keys=False, width=100, allow_unicode=True)
     return sealed(f'{HEAD}\n{body}')
 
