@@ -252,18 +252,20 @@ def _corners(name: str, meshes: Meshes) -> Floats | str:
     if path.suffix.lower() not in FORMATS:
         return f'expected a mesh in STL, OBJ or DAE, got {shown(path.suffix)}'
     try:
-        import trimesh  # noqa: PLC0415 - an extra that only meshes need
-    except ImportError:
-        return f'expected trimesh ({pip_install("init")})'
-    try:
         if path.stat().st_size > LARGEST:
             return 'expected a mesh below 200 MB'
-        scene: Any = trimesh.load(str(path), force='scene', process=False)
-        return _merged([_part(scene, node) for node in scene.graph.nodes_geometry])
+        return _loaded(path)
     except ImportError as error:
         return f'expected the package {error.name or error} ({pip_install("init")})'
     except Exception as error:  # noqa: BLE001 - a damaged mesh may raise anything
         return f'expected a mesh, got: {shown(str(error) or type(error).__name__)}'
+
+
+def _loaded(path: Path) -> Floats | str:
+    import trimesh  # noqa: PLC0415 - an extra that only meshes need
+
+    scene: Any = trimesh.load(str(path), force='scene', process=False)
+    return _merged([_part(scene, node) for node in scene.graph.nodes_geometry])
 
 
 def _part(scene: Any, node: str) -> Floats:  # noqa: ANN401 - trimesh's own types vary by version
