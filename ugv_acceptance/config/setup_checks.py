@@ -87,7 +87,7 @@ def setup_doubts(
     if face is not None and not any(k in moves for k in carrying):
         found += _tilt(robot, face, 'contacts.tilt' in known)
     near = carrying if face else list(range(len(points)))
-    found += _balance(robot, tree, [points[k] for k in near], cog, given_posture=bool(posture))
+    found += _balance(robot, tree, [points[k] for k in near], cog, given_posture=posture is not None)
     return tuple(found)
 
 
@@ -227,5 +227,5 @@ def _off_lowest(arm: Any, axle: Any, size: Vector) -> str | None:  # noqa: ANN40
     high = float(arm[2]) + radius
     if ahead <= slack and abs(high) <= slack:
         return None
-    side = 'above' if high > 0.0 else 'below'
+    side = 'above' if high > -5e-4 else 'below'
     return f'{1e3 * ahead:.0f} mm off along the ground and {1e3 * abs(high):.0f} mm {side} it'
