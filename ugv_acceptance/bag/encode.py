@@ -1,4 +1,4 @@
-"""Encodes JointState, Imu, InertiaStamped, String and TFMessage messages as CDR, without ROS."""
+"""Encodes JointState, Imu, InertiaStamped and String messages as CDR, without ROS."""
 
 import struct
 from collections.abc import Sequence
@@ -95,24 +95,6 @@ def string_message(text: str) -> bytes:
     """Encode a std_msgs/String, such as a robot's URDF on /robot_description."""
     out = bytearray(_HEAD)
     put_text(out, text)
-    return bytes(out)
-
-
-def tf_message(transforms: Sequence[tuple[str, str, Numbers, Numbers]], stamp_ns: int = 0) -> bytes:
-    """Encode a tf2_msgs/TFMessage, such as /tf_static.
-
-    A transform is its frame, its child frame, the child's place in the frame (x, y, z in m) and
-    how the child's axes are turned there (quaternion x, y, z, w).
-    """
-    out = bytearray(_HEAD)
-    put_count(out, len(transforms))
-    for frame, child, place, rotation in transforms:
-        out += bytes(-len(out) % 4)
-        out += _STAMP.pack(*divmod(stamp_ns, _NS))
-        for name in (frame, child):
-            put_text(out, name)
-        put_floats(out, place, 3)
-        put_floats(out, rotation, 4)
     return bytes(out)
 
 
