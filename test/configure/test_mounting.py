@@ -250,6 +250,25 @@ def test_the_mounting_of_others_robots_is_right_or_asked_for() -> None:
     assert (sure.rotation.value, sure.rotation.grade) == (IDENTITY, CERTAIN)
 
 
+@pytest.mark.skipif(not SHARED.is_dir(), reason="../shared is absent: others' robots")
+def test_no_mounting_of_others_robots_is_wrong_in_silence() -> None:
+    """Whether drivers send the axes of the IMU's link, the robot's, or others: right, or asked."""
+    wrong = []
+    for path in sorted((SHARED.parent / 'robots').glob('*/*.urdf')):
+        robot = of(path.read_text(encoding='utf-8'))
+        chain = derive_mounting(robot, None, {})
+        if not chain.frame:
+            continue  # an arm alone has none
+        said = Rotation.from_matrix(np.array(chain.rotation.value))
+        ways = (said, LEVEL, *(mounted(*rpy) for rpy in ((90, 0, 0), (180, 0, 0), (0, 90, 0))))
+        for true in ways:
+            mounting = derive_mounting(robot, seen(imu(true, frame=chain.frame)), {})
+            right = np.allclose(mounting.rotation.value or (), true.as_matrix(), atol=1e-3)
+            if not right and mounting.rotation.grade != ASK:
+                wrong.append((path.stem, true.as_euler('xyz', degrees=True).tolist()))
+    assert not wrong
+
+
 def test_rpy_gives_the_rotation_back() -> None:
     """Also where the pitch is a right angle."""
     rng = np.random.default_rng(3)

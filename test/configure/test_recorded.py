@@ -103,6 +103,13 @@ def test_a_joint_that_never_rests_is_told(tmp_path: Path) -> None:
     assert any('never rest' in doubt for doubt in found.doubts)
 
 
+def test_a_posture_that_is_told_once_is_at_rest(tmp_path: Path) -> None:
+    """As of a driver that sends its joint states when they change alone."""
+    once = ARM.states().kept(slice(1))
+    found = evidence_of(recorded(tmp_path / 'run.mcap', once))
+    assert (at_rest(found), found.doubts) == (ARM.joints, ())
+
+
 def test_wheels_that_turn_leave_an_arm_at_rest(tmp_path: Path) -> None:
     """The posture of a robot that drives all the time is that of its other joints."""
     sent = Sent({'lift': 0.4, 'wheel': 0.0})

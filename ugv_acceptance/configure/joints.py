@@ -9,6 +9,7 @@ from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Derived, DerivedJoint, Joints
 from ugv_acceptance.configure.evidence import Evidence, SeenJoint
 from ugv_acceptance.configure.names import Matched, match_names
+from ugv_acceptance.configure.seen_joints import NEVER_RESTS
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.model.robot import Joint
 
@@ -92,7 +93,7 @@ def rest_posture(urdf: Urdf, evidence: Evidence | None) -> dict[str, Derived[flo
             held = _held(joint, known)
             found[joint.name] = Derived(held.value, ASK if odd else held.grade, odd or held.source)
             continue
-        moves = any(doubt.startswith(f'{evidence.joint_states}: ') for doubt in evidence.doubts)
+        moves = any(doubt.endswith(NEVER_RESTS) for doubt in evidence.doubts)
         at = math.remainder(told.at_rest, math.tau) if joint.kind == 'continuous' else told.at_rest
         source = f'{"median" if moves else "at rest"} in {evidence.place}'
         found[joint.name] = Derived(at, CHECK if moves else CERTAIN, source)

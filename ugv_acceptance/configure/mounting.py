@@ -144,7 +144,7 @@ def _decided(place: Placed, up: Up, evidence: Evidence) -> _Decided:
         )
     if len(fit) > 1:
         return _several_fit(fit, where, remarks)
-    source = f'{best.says}, and {where} agrees'
+    source = f'{best.says}; {where} agrees, but cannot tell yaw'
     if best is not found[0]:
         question = (
             f'How is the IMU mounted? Gravity at rest denies what {found[0].says} says and fits '
@@ -178,7 +178,7 @@ def _several_fit(fit: list[_Candidate], where: str, remarks: list[str]) -> _Deci
     """Return the first of several mountings between which gravity cannot decide."""
     best = fit[0]
     if all(turn_between(best.rotation, other.rotation) <= FITS for other in fit):
-        source = f'{best.says}, and {where} agrees'
+        source = f'{best.says}; {where} agrees, but cannot tell yaw'
         return _Decided(Derived(best.rotation, CHECK, source), '', tuple(remarks))
     either = ' or '.join(f'{c.says} ({rpy_words(c.rotation)})' for c in fit)
     question = f'In which axes does the IMU send: {either}? Both fit gravity at rest, but {_YAW}.'
