@@ -60,7 +60,7 @@ def test_names_that_differ_in_separators_are_found() -> None:
     text = ARM.replace('lift_joint"', 'arm.1_Joint"')
     found = derive_joints(of(text), told('arm_1_joint', 'bend_joint'))
     assert names_of(found) == {'arm.1_Joint': 'arm_1_joint', 'bend_joint': 'bend_joint'}
-    assert 'arm.1_Joint is told as arm_1_joint' in found.remarks
+    assert 'arm.1_Joint is called arm_1_joint in the messages' in found.remarks
 
 
 def test_equal_names_are_taken_before_prefixed_ones() -> None:
@@ -68,7 +68,7 @@ def test_equal_names_are_taken_before_prefixed_ones() -> None:
     names = ('lift_joint', 'bend_joint', 'r2_lift_joint', 'r2_bend_joint')
     found = derive_joints(of(ARM), told(*names))
     assert names_of(found) == {'lift_joint': 'lift_joint', 'bend_joint': 'bend_joint'}
-    (foreign,) = (remark for remark in found.remarks if 'no joint of the URDF' in remark)
+    (foreign,) = (remark for remark in found.remarks if 'URDF does not have' in remark)
     assert 'r2_lift_joint, r2_bend_joint' in foreign
 
 
@@ -111,7 +111,7 @@ def test_what_nobody_tells_is_held_and_told_in_one_line() -> None:
     held = {name: (value.value, value.grade) for name, value in found.held}
     assert held['knee'] == (-1.5, CHECK)
     assert held['caster_0_joint'] == held['wheel'] == (0.0, CERTAIN)
-    assert '4 caster joints and 1 wheel joint and knee are told by nobody: held at 0, or the ' in (
+    assert '4 caster joints and 1 wheel joint and knee are in no message: held at 0, or the ' in (
         ' '.join(found.remarks)
     )
 
@@ -122,7 +122,7 @@ def test_a_joint_that_follows_another_is_neither_measured_nor_held() -> None:
     found = derive_joints(of(urdf_of(LIFT, mimic)), told('lift_joint', 'right'))
     assert names_of(found) == {'lift_joint': 'lift_joint'}
     assert found.held == ()
-    assert not any('no joint of the URDF' in remark for remark in found.remarks)
+    assert not any('URDF does not have' in remark for remark in found.remarks)
 
 
 @pytest.mark.parametrize(
