@@ -194,6 +194,14 @@ def test_what_an_imu_does_not_hold_is_none(tmp_path: Path) -> None:
     assert (seen.specific_force, seen.orientation) == (None, None)
 
 
+def test_an_input_that_begins_after_that_minute_is_read(tmp_path: Path) -> None:
+    """As of an arm that is switched on later."""
+    long = Sent({'x': 0.0}, seconds=80.0, hz=2).imu()
+    late = replace(ARM.states(), log=ARM.time + 75 * NS)
+    found = evidence_of(recorded(tmp_path / 'run.mcap', long, late))
+    assert at_rest(found) == ARM.joints
+
+
 def test_no_more_than_a_minute_of_a_topic_is_read(tmp_path: Path) -> None:
     """But a URDF that comes later is."""
     long = Sent({'lift': 0.0}, seconds=80.0, hz=2)

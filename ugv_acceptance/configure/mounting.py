@@ -181,7 +181,10 @@ def _several_fit(fit: list[_Candidate], where: str, remarks: list[str]) -> _Deci
         source = f'{best.says}; {where} agrees, but does not show yaw'
         return _Decided(Derived(best.rotation, CHECK, source), '', tuple(remarks))
     either = ' or '.join(f'{c.says} ({rpy_words(c.rotation)})' for c in fit)
-    question = f'In which axes are the messages of the IMU: {either}? Both fit gravity at rest, but {_YAW}.'
+    question = (
+        f'In which axes are the messages of the IMU: {either}? Both fit gravity at rest, but '
+        f'{_YAW}.'
+    )
     source = f'{best.says}; {where} fits {fit[1].says} as well'
     return _Decided(Derived(best.rotation, ASK, source), question, tuple(remarks))
 
