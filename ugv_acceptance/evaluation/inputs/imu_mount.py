@@ -123,7 +123,8 @@ class ImuMount:
         if self.found is None:
             if frame and not self.frame and self.settings.imu.placed == AUTO:
                 self._decide(frame)
-                self._reason()
+                if self.found is None:
+                    self._reason()
             if self.found is None:
                 if not self.signal.raw:
                     self._reason()
