@@ -19,6 +19,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
 )
 from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
@@ -233,7 +234,7 @@ class LiveEvaluator:
 
         After one that cannot be used margins are unknown until a good one comes.
         """
-        robot = self.settings.robot
+        robot, frame = self.settings.robot, without_prefix(frame, self.settings.frame_prefix)
         payload = payload_from(robot, mass, com, frame)
         self.watch.declared(now, '' if payload else payload_fault(robot, mass, com, frame))
         self.load_known = payload is not None
