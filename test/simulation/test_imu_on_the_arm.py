@@ -79,7 +79,7 @@ def on_the_chassis() -> Floats:
 def test_gravity_is_as_by_an_imu_on_the_chassis(link: str, on_the_chassis: Floats) -> None:
     """To what the joints turn between their messages; by the acceleration to what shakes it."""
     found = recorded(link)
-    for attitude, most in (('orientation', 0.1), ('accelerometer', 1.5)):
+    for attitude, most in (('orientation', 0.1), ('accelerometer', 2.5)):
         imu = ImuInput(mounting=turned(), position=PLACE, link=link, attitude=attitude,
                        noise_free=True)
         told = replace(SETTINGS, imu=imu)
