@@ -116,7 +116,7 @@ def test_a_mounting_that_gravity_denies_is_told_and_not_believed(
     assert found['verdict'] == 'INCONCLUSIVE'
     text = ' '.join(found['reasons'])
     assert 'imu.mounting_rpy_deg: [0, -90, 0]' in text
-    assert 'taken from the URDF (imu_link - base_link)' in text
+    assert 'imu.mounting: auto took it from the URDF (imu_link - base_link)' in text
 
 
 def test_an_imu_on_the_arm_is_judged_with_a_word(tmp_path: Path, repository: Path) -> None:

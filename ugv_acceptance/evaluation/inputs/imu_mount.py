@@ -207,7 +207,7 @@ class ImuMount:
             of = found.link, found.rotation, found.xyz
             self._turn = Turn(self.settings, found.joints, *of)
         if found is not None and self.settings.imu.placed == AUTO:
-            self.doubt.detail = f'how it is mounted was taken from {source_words(found)}'
+            self.doubt.detail = f'imu.mounting: auto took it from {source_words(found)}'
 
 
 def source_words(found: Mounted) -> str:
