@@ -43,9 +43,7 @@ def test_a_file_says_where_the_imu_is(tmp_path: Path, imu: str, placed: str, lin
         ('{link: imu_lnk}', 'no link "imu_lnk"; did you mean imu_link'),
     ],
 )
-def test_what_is_said_twice_or_of_no_link_is_refused(
-    tmp_path: Path, imu: str, words: str
-) -> None:
+def test_what_is_said_twice_or_of_no_link_is_refused(tmp_path: Path, imu: str, words: str) -> None:
     """With the place in the file: one of the two would silently not count."""
     with pytest.raises(BadConfig, match=f'framed.yaml:3: imu.*{words}'):
         loaded(tmp_path, imu)
@@ -74,7 +72,7 @@ def test_a_base_frame_that_is_no_link_is_told(tmp_path: Path) -> None:
 
 def test_a_base_frame_that_moves_is_refused(tmp_path: Path) -> None:
     """Shapes in it would jump about."""
-    with pytest.raises(BadConfig, match='robot.base_frame: .*arm_link, on arm_joint'):
+    with pytest.raises(BadConfig, match=r'robot\.base_frame: .*arm_link, on arm_joint'):
         loaded(tmp_path, '{}', ', base_frame: arm_link')
 
 

@@ -127,9 +127,7 @@ def test_an_imu_on_the_arm_is_judged_with_a_word(tmp_path: Path, repository: Pat
     assert found['imu_mounting']['moved_by'] == ['arm_joint']
     assert found['imu_mounting']['link'] == 'hand_imu'
     assert any('while arm_joint moves' in one['what'] for one in found['not_checked'])
-    still = judged(
-        recorded(tmp_path / 'base', 'imu_link', IMU), robot_files(tmp_path), repository
-    )
+    still = judged(recorded(tmp_path / 'base', 'imu_link', IMU), robot_files(tmp_path), repository)
     least = [result['stability']['min_angle_deg'] for result in (found, still)]
     assert least[0] == pytest.approx(least[1], abs=0.1)
 
@@ -140,9 +138,9 @@ def test_margins_do_not_depend_on_the_root_link(tmp_path: Path, root: str, frame
     """base_footprint, or a world in which base_link is shifted: the same torques and angles."""
     sensor = IMU if frame == 'imu_link' else Rotation.from_rotvec([0.0, -ARM, 0.0]) * HAND
     run = recorded(tmp_path / 'run', frame, sensor)
-    found = []
-    for one in ('base_link', root):
-        found.append(ugv.evaluate(run, config=robot_files(tmp_path, one)).margins)
+    found = [
+        ugv.evaluate(run, config=robot_files(tmp_path, one)).margins for one in ('base_link', root)
+    ]
     known = found[0].known
     assert known.sum() > 700
     np.testing.assert_array_equal(found[1].known, known)
@@ -160,7 +158,9 @@ def test_the_husky_of_a_real_recording_is_not_believed_by_its_urdf(
     wheels = [f'{a}_{b}_wheel' for a in ('front', 'rear') for b in ('left', 'right')]
     feet = ''.join(
         f'  {name}: {{link: base_link, position_m: [{x}, {y}, -0.13228]}}\n'
-        for name, x, y in zip(wheels, (0.256, 0.256, -0.256, -0.256), (0.285, -0.285) * 2, strict=True)
+        for name, x, y in zip(
+            wheels, (0.256, 0.256, -0.256, -0.256), (0.285, -0.285) * 2, strict=True
+        )
     )
     config = tmp_path / 'husky.yaml'
     config.write_text(

@@ -44,7 +44,7 @@ def turned() -> Matrix:
 
 
 def gravity_of(told: Settings, joints: JointLog, imu: ImuLog) -> tuple[Floats, list[str]]:
-    """Return gravity at each IMU message (n, 3), in base axes, and the codes of the IMU's alerts."""
+    """Return gravity at each IMU message (n, 3), in base axes, and the IMU's alerts."""
     evaluator = RecordedEvaluator(told)
     start = 1_700_000_000_000_000_000
     evaluator.start(start)
@@ -80,8 +80,9 @@ def test_gravity_is_as_by_an_imu_on_the_chassis(link: str, on_the_chassis: Float
     """To what the joints turn between their messages; by the acceleration to what shakes it."""
     found = recorded(link)
     for attitude, most in (('orientation', 0.1), ('accelerometer', 2.5)):
-        imu = ImuInput(mounting=turned(), position=PLACE, link=link, attitude=attitude,
-                       noise_free=True)
+        imu = ImuInput(
+            mounting=turned(), position=PLACE, link=link, attitude=attitude, noise_free=True
+        )
         told = replace(SETTINGS, imu=imu)
         gravity, codes = gravity_of(told, found.joints, found.imu)
         cosine = (gravity * on_the_chassis).sum(axis=1) / 9.81**2

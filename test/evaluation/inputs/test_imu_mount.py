@@ -134,9 +134,7 @@ def test_messages_without_a_frame_are_not_believed_until_one_names_it() -> None:
     """Then the mounting is known from that message on."""
     run = run_of(4.0, imu=measured(LEANING, SIDEWAYS))
     half = T0 + 3 * S
-    messages = [
-        replace(m, frame='') if isinstance(m, Imu) and m.time < half else m for m in run
-    ]
+    messages = [replace(m, frame='') if isinstance(m, Imu) and m.time < half else m for m in run]
     found, alerts = gravities(with_imu(settings(AUTO)), messages)
     first = next(k for k, m in enumerate(messages) if isinstance(m, Imu) and m.time >= half)
     assert set(found[:first]) == {None}
@@ -278,7 +276,7 @@ def test_limits_can_change_while_the_mounting_stays() -> None:
     evaluator.start(T0)
     last: Margins | None = None
     for message in run_of(1.0, imu=measured(LEANING, SIDEWAYS)):
-        last = give(evaluator, message) if isinstance(message, Imu) else give(evaluator, message)
+        last = give(evaluator, message)
         evaluator.adopt(replace(told, limits=replace(told.limits, tip_warn=0.3)))
     assert last is not None
     np.testing.assert_allclose(last.gravity, down(LEANING), atol=1e-9)

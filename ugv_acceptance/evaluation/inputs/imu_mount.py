@@ -162,7 +162,7 @@ class ImuMount:
         names, every = in_order(columns)
         time = every.log_time
         first = int(np.argmax(names != '')) if (names != '').any() else len(names)
-        if self.found is None and not self.frame and 0 < first:
+        if self.found is None and not self.frame and first > 0:
             yield self._part(names[:first], rows_of(every, slice(None, first)), joints)
             names, every = names[first:], rows_of(every, slice(first, None))
             time = time[first:]
