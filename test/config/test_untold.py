@@ -93,6 +93,22 @@ def test_what_cannot_matter_may_be_untold(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize(
+    ('imu', 'must'),
+    [
+        ('imu: {link: eye}', {'pan'}),
+        ('imu: {link: base}', set()),
+        ('imu: {mounting: auto}', {'pan', 'finger'}),  # its frame may be anywhere but on a wheel
+        ('imu: {mounting: auto}\ntopics: {imu: {name: imu/data, frame_id: eye}}', {'pan'}),
+        ('imu: {mounting: auto}\ntopics: {imu: {name: imu/data, frame_id: base}}', set()),
+    ],
+)
+def test_a_joint_that_may_carry_the_imu_is_told(tmp_path: Path, imu: str, must: set[str]) -> None:
+    """Else the tilt of the base would follow from a guess."""
+    found = untold(tmp_path, f'{HEAD}{CONTACTS}{imu}\n')
+    assert {name for name, of in found.items() if of is None} == {'torso', 'lift'} | must
+
+
 def test_a_joint_that_the_file_lists_is_told(tmp_path: Path) -> None:
     """Under `joints` the user says that messages tell it: margins are not known without it."""
     yaml = f'{HEAD}{CONTACTS}joints: {{{", ".join(f"{name}: {{}}" for name in NAMES)}}}\n'
@@ -211,7 +227,7 @@ def test_live_a_joint_is_taken_as_held_after_half_a_second(tmp_path: Path) -> No
     assert stream(evaluator, without('caster'), (0, 0.4)) is None
     known = stream(evaluator, without('caster'), (0.4, 2))
     assert known.q[settings.robot.joint_names.index('caster')] == 0.0
-    assert evaluator.assumed == ['caster']
+    assert evaluator.joints.never_told == ['caster']
     assert [a.rule.code for a in evaluator.watch.active] == ['INPUT_INCOMPLETE']
     assert evaluator.level == 3
     told = stream(evaluator, NAMES, (2, 4))
@@ -225,4 +241,4 @@ def test_live_a_harmless_joint_raises_no_alert(tmp_path: Path) -> None:
     evaluator = LiveEvaluator(settings)
     evaluator.start(T0)
     assert stream(evaluator, without('wheel', 'pan'), (0, 2)) is not None
-    assert (evaluator.assumed, evaluator.level) == (['wheel', 'pan'], 0)
+    assert (evaluator.joints.never_told, evaluator.level) == (['wheel', 'pan'], 0)

@@ -15,18 +15,18 @@ from ugv_acceptance.config.combining import listed as _list
 from ugv_acceptance.config.combining import of_joint as _of_joint
 from ugv_acceptance.config.document import Document
 from ugv_acceptance.config.held import held_joints
+from ugv_acceptance.config.imu_place import base_frame_from, imu_from
 from ugv_acceptance.config.masses import check_masses
 from ugv_acceptance.config.mimics import followed
 from ugv_acceptance.config.poses import poses_from
-from ugv_acceptance.config.schema import File, JointSection
+from ugv_acceptance.config.schema import JointSection
 from ugv_acceptance.config.units import shown
 from ugv_acceptance.config.untold import untold_of
-from ugv_acceptance.config.urdf import rotation_from_rpy
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
-from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.frames import same_frame, without_prefix
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
-from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.evaluation.settings import Delays, JointInput, Limits, Settings
 from ugv_acceptance.model.clearance import arm_links
 from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Payload, Robot
 
@@ -78,7 +78,7 @@ def settings_from(build: Build) -> Settings:
     settings = Settings(
         robot,
         tuple(_input(build, joints[name], section) for name, section in measured.items()),
-        _imu(build.file),
+        imu_from(build.file, robot, build.refuse),
         _limits(build, [(joints[name], section) for name, section in measured.items()]),
         Delays(**build.file.delays.model_dump()),
         build.file.unsafe_limits or '',
@@ -86,11 +86,13 @@ def settings_from(build: Build) -> Settings:
         Ground(build.file.ground.kind, build.file.ground.pitch),
         tuple(name for name, section in measured.items() if section.passive),
         stands.moved,
+        base_frame=base_frame_from(build.file, robot, build.refuse, build.warn),
+        frame_prefix=build.file.robot.frame_prefix,
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)
     if build.file.joints is None:  # implied by the URDF: not all of them need to be told
-        settings = replace(settings, untold=untold_of(robot, settings.limits.torque))
+        settings = replace(settings, untold=untold_of(robot, settings.limits.torque, settings.imu))
     return settings
 
 
@@ -143,7 +145,8 @@ def _check_inputs(build: Build, settings: Settings) -> None:
             ('topics',), 'expected joint states or an IMU: nothing is left that could be measured'
         )
     frame, link = topics.payload.frame_id, settings.robot.payload_link
-    if frame and link and not same_frame(frame, link):
+    bare = without_prefix(frame or '', settings.frame_prefix)
+    if frame and link and not same_frame(bare, link):
         build.warn(
             ('topics', 'payload', 'frame_id'),
             f'{frame} is not the payload link, {link}: loads declared in it cannot be used',
@@ -271,13 +274,6 @@ def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:
         section.effort_sign,
         section.effort_scale,
     )
-
-
-def _imu(file: File) -> ImuInput:
-    values = file.imu.model_dump()
-    mounting = rotation_from_rpy(values.pop('mounting_rpy'))
-    named = file.topics.imu.frame_id if file.topics.imu else None
-    return ImuInput(mounting=mounting, frame=(named or '').lstrip('/'), **values)
 
 
 def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:

@@ -77,6 +77,9 @@ Place = Annotated[Given, _given('angle', 'length')]
 Effort = Annotated[Given | None, _given('torque', 'force')]
 Rate = Annotated[Given | None, _given('angular rate', 'rate')]
 Name = Annotated[str, Field(min_length=1, strict=True)]
+TopicName = Annotated[
+    str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')
+]
 PoseName = Annotated[str, AfterValidator(_pose_name)]
 PoseSection = Annotated[dict[Name, object], BeforeValidator(_pose)]
 Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
@@ -140,21 +143,31 @@ class QosSection(Section):
 class TopicSection(Section):
     """A topic's name, type, QoS and frame; defaults for missing keys are in topics.py."""
 
-    name: Annotated[str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')]
+    name: TopicName
     type: str | None = None
     qos: QosSection | None = None
     frame_id: str | None = None
+
+
+class DescriptionSection(Section):
+    """The name of the topic on which the robot tells its URDF."""
+
+    name: TopicName = 'robot_description'
 
 
 JOINT_STATES, IMU_DATA = TopicSection(name='joint_states'), TopicSection(name='imu/data')
 
 
 class TopicsSection(Section):
-    """The topics of the inputs: joint states, IMU, payload; null: the robot has no such input."""
+    """The topics of the inputs: joint states, IMU, payload; null: the robot has no such input.
+
+    And the topic on which the robot tells its URDF.
+    """
 
     joint_states: TopicSection | None = JOINT_STATES
     imu: TopicSection | None = IMU_DATA
     payload: TopicSection = TopicSection(name='payload')
+    robot_description: DescriptionSection = DescriptionSection()
 
 
 class LawSection(Section):
@@ -187,9 +200,14 @@ class LinkSection(Section):
 
 
 class ImuSection(Section):
-    """Mounting, position and use of the IMU, as in evaluation.settings.ImuInput."""
+    """Mounting, position and use of the IMU, as in evaluation.settings.ImuInput.
 
+    `mounting` is what stands in place of numbers: found by the frame of its messages, or unknown.
+    """
+
+    mounting: Literal['auto', 'unknown'] | None = None
     mounting_rpy: Angles = (0.0, 0.0, 0.0)
+    link: Name | None = None
     position: Position = _IMU.position
     attitude: Literal['auto', 'orientation', 'accelerometer', 'level'] = 'auto'
     specific_force: Annotated[bool, Field(strict=True)] = _IMU.specific_force
@@ -258,10 +276,12 @@ class DelaysSection(Section):
 
 
 class RobotSection(Section):
-    """Name and serial number of the robot."""
+    """Name and serial number of the robot, and how its frames are named for viewers."""
 
     name: Name
     serial: Annotated[str, Field(strict=True)] | None = None
+    base_frame: Name | None = None
+    frame_prefix: Annotated[str, Field(strict=True)] = ''
 
 
 class File(Section):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ugv_acceptance.evaluation.settings import Untold
+from ugv_acceptance.evaluation.settings import AUTO, GIVEN, LEVEL, ImuInput, Untold
 from ugv_acceptance.model.robot import Joint, Robot
 from ugv_acceptance.model.tree import Tree, tree_of
 from ugv_acceptance.type_aliases import Floats
@@ -41,12 +41,12 @@ class _Reach:
     arm: float
 
 
-def untold_of(robot: Robot, limits: Sequence[float]) -> tuple[Untold | None, ...]:
+def untold_of(robot: Robot, limits: Sequence[float], imu: ImuInput) -> tuple[Untold | None, ...]:
     """Return for each measured joint how it is held if no message tells it; None: it must be told.
 
-    `limits` (j,) are those of the torques (N m; N). Joints are taken in the order of what they can
-    do, as long as all of them together can turn the line to the centre of gravity by less than
-    DOUBTED_TILT; MOST_TILT if they are harmless.
+    `limits` (j,) are those of the torques (N m; N). A joint that may carry the IMU must be told.
+    Joints are taken in the order of what they can do, as long as all of them together can turn the
+    line to the centre of gravity by less than DOUBTED_TILT; MOST_TILT if they are harmless.
     """
     bodies = _Bodies(robot, tree_of(robot))
     reach = [bodies.reach(k) for k in range(len(robot.joint_names))]
@@ -54,7 +54,7 @@ def untold_of(robot: Robot, limits: Sequence[float]) -> tuple[Untold | None, ...
     most, used = math.tan(DOUBTED_TILT) * bodies.height, 0.0
     for k in sorted(range(len(reach)), key=lambda k: reach[k].shift):
         light = used + reach[k].shift <= most and not bodies.strains(k, reach, limits)
-        if light and not bodies.carries_payload(k):
+        if light and not bodies.carries_payload(k) and not bodies.carries_imu(k, imu):
             used += reach[k].shift
             sure = used <= math.tan(MOST_TILT) * bodies.height
             near = reach[k].contact <= CONTACT_OFF and reach[k].arm <= ARM_OFF
@@ -171,6 +171,21 @@ class _Bodies:
         """Yield the moving bodies on which a body hangs."""
         while body := self.tree.bodies[body].parent:
             yield body
+
+    def carries_imu(self, k: int, imu: ImuInput) -> bool:
+        """Return whether the IMU is on joint number k, or may be where only its messages tell."""
+        joint = self.robot.joint(self.robot.joint_names[k])
+        below = {b for body, _, _ in self.driven(k) for b in self.below(body)}
+        name = imu.link if imu.placed == GIVEN else imu.frame
+        if name in self.tree.frames or imu.placed == GIVEN:
+            return self.tree.frames[name or self.robot.root][0] in below
+        if imu.placed != AUTO or imu.attitude == LEVEL:
+            return False
+        # Wheels, and what stands on the ground, carry none.
+        links = [link for link in self.robot.links if self.tree.frames[link.name][0] in below]
+        wheel = joint.kind == 'continuous' and all(link.mass for link in links)
+        stands = any(self.tree.frames[c.link][0] in below for c in self.robot.contacts)
+        return not stands and not (wheel and self.reach(k).shift == 0.0)
 
     def carries_payload(self, k: int) -> bool:
         """Return whether the payload hangs on joint number k."""

@@ -1,4 +1,4 @@
-"""Reads a URDF: links, masses, joints, limits and collision geometry; visuals are ignored.
+"""Reads a URDF: links, masses, joints, limits, collision and visual geometry.
 
 urdf_xml.py parses the XML, urdf_tree.py finds the one tree in it.
 """
@@ -27,6 +27,7 @@ from ugv_acceptance.model.robot import (
 )
 
 KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
+ONE: Vector = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Urdf:
     """The links and joints of a URDF; `mimics` are the joints that follow others.
 
     `shapes` is the collision geometry of all links, `unlimited` the joints to which it gives an
-    effort that is no limit, such as 0.
+    effort that is no limit, such as 0; `visuals` is the geometry that links are drawn with.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Urdf:
     warnings: tuple[str, ...]
     shapes: tuple[Shape, ...] = ()
     unlimited: tuple[str, ...] = ()
+    visuals: tuple[Shape, ...] = ()
 
 
 def read_urdf(text: bytes, source: str) -> Urdf:
@@ -60,7 +62,10 @@ def read_urdf(text: bytes, source: str) -> Urdf:
     links, joints = tree_of(links, joints, set(bare_links(root)), source, warnings)
     mimics = tuple(_mimics(root, joints, source))
     names = {link.name for link in links}
-    shapes = tuple(shape for shape in _shapes(root) if shape.link in names)
+    shapes, visuals = (
+        tuple(shape for shape in _shapes(root, of) if shape.link in names)
+        for of in ('collision', 'visual')
+    )
     return Urdf(
         root.get('name') or 'robot',
         links,
@@ -69,6 +74,7 @@ def read_urdf(text: bytes, source: str) -> Urdf:
         tuple(warnings),
         shapes,
         tuple(_without_strength(root)),
+        visuals,
     )
 
 
@@ -185,21 +191,25 @@ def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[M
     return tuple(follows.values())
 
 
-def _shapes(root: Element) -> Iterable[Shape]:
-    """Yield the collision geometry of all links; what cannot be read is no error, but unread."""
+def _shapes(root: Element, tag: str) -> Iterable[Shape]:
+    """Yield the geometry of all links; what cannot be read is no error, but unread."""
     for link in root.findall('link'):
         name = link.get('name', '')
-        for collision in link.findall('collision'):
-            geometry = collision.find('geometry')
+        for element in link.findall(tag):
+            geometry = element.find('geometry')
             found = None if geometry is None else next(iter(geometry), None)
             kind = 'none' if found is None else str(found.tag)
+            mesh = found.get('filename') if found is not None and kind == 'mesh' else None
             try:
-                xyz, rotation = _origin(collision, '')
+                xyz, rotation = _origin(element, '')
                 size = None if found is None else _size(kind, found)
+                scale = (
+                    ONE if mesh is None or found is None else _triple(found, 'scale', '', '1 1 1')
+                )
             except BadConfig:
                 yield Shape(name, kind, ZERO, IDENTITY, None)
             else:
-                yield Shape(name, kind, xyz, rotation, size)
+                yield Shape(name, kind, xyz, rotation, size, mesh, scale)
 
 
 def _size(kind: str, element: Element) -> Vector | None:

@@ -1,8 +1,12 @@
 """What a recording or a running robot tells beside its URDF, as plain values."""
 
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from ugv_acceptance.model.robot import Matrix, Vector
+
+# Where it was seen, if not in a recording.
+LIVE = 'live'
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +61,9 @@ class StaticTransform:
 class Evidence:
     """What was seen of a robot: `where` is the recording's path, or 'live'.
 
-    `urdf` is the text of /robot_description. `joint_states` and `imus` are of the topics that fit.
+    `urdf` is the text of /robot_description. `joints` are those of the topic `joint_states`, which
+    fits the URDF best; `rivals` are the topics that fit as well. `imus` are all IMUs, one a topic
+    and frame.
     """
 
     where: str
@@ -68,3 +74,9 @@ class Evidence:
     joints: tuple[SeenJoint, ...] = ()
     imus: tuple[SeenImu, ...] = ()
     doubts: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it was seen, in short: the recording's name, or the running robot."""
+        return 'the running robot' if self.where == LIVE else PurePath(self.where).name

@@ -19,7 +19,9 @@ from ugv_acceptance.evaluation.chassis.motion import (
 )
 from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
+from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
@@ -68,7 +70,7 @@ class LiveEvaluator:
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
     newest that could be used; while not `load_known`, the newest declared could not. `ground` says
-    whether the arm touches the ground.
+    whether the arm touches the ground, `joints` merges joint states.
     """
 
     settings: Settings
@@ -78,7 +80,8 @@ class LiveEvaluator:
     margins: Margins | None = None
     evaluated: int = 0
     _mechanics: Mechanics = field(init=False)
-    _joints: JointMerger = field(init=False)
+    joints: JointMerger = field(init=False)
+    mount: ImuMount = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisMotion = field(init=False)
     ground: GroundContact = field(init=False)
@@ -94,9 +97,12 @@ class LiveEvaluator:
         self.watch = RuleSet(self.settings)
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
-        self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self._chassis = ChassisMotion(self.settings, self.watch.chassis)
+        self.joints = JointMerger(self.settings, self.watch.jump_signals)
+        self.mount = ImuMount(self.settings, *self.watch.mounting)
+        placed = self.mount.applied(self.settings)
+        self._imu = ImuTracker(placed, self.watch.attitude)
+        self._chassis = ChassisMotion(placed, self.watch.chassis)
+        self.mount.settle = (self._imu.adopt, self._chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
@@ -127,7 +133,7 @@ class LiveEvaluator:
 
         A message that names none of the robot's joints is ignored.
         """
-        joints, watch = self._joints, self.watch
+        joints, watch = self.joints, self.watch
         if not joints.merge(now, names, position, velocity, effort, stamp):
             return self.margins
         self._arrived(0, now, stamp, watch.joints)
@@ -143,8 +149,8 @@ class LiveEvaluator:
         limit = self._fresh[0].limit
         oldest = min(joints.seen)
         # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
-        old = now - oldest > limit and (oldest != NEVER or now - joints.began > STARTUP)
-        old = old or joints.doubted
+        late = oldest != NEVER or now - joints.began > STARTUP
+        old = (late and now - oldest > limit) or joints.doubted
         if old or not watch.missing.quiet:
             if old and not watch.missing.raw:
                 watch.missing.detail = words.what_is_missing(joints, now, limit)
@@ -166,10 +172,10 @@ class LiveEvaluator:
         if not self.load_known:
             self._posture, self._stances = None, ()
             return
-        self._posture = posture_of(self._mechanics, self._joints.q, load.mass, load.cog)
+        self._posture = posture_of(self._mechanics, self.joints.q, load.mass, load.cog)
         self._stances = stances_of(self._mechanics, self._posture)
-        self._chassis.pose = tuple(self._joints.q), load
-        self.ground.stands(self._joints.q, load.cog)
+        self._chassis.pose = tuple(self.joints.q), load
+        self.ground.stands(self.joints.q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -190,9 +196,16 @@ class LiveEvaluator:
         if self._level:
             return self.margins
         self._arrived(1, now, stamp, self.watch.imu)
+        mount = self.mount
+        if mount.busy:
+            felt = orientation, covariance_0, omega, acceleration
+            felt = mount.one(now, frame, felt, self.joints.q, self.joints.qd)
+            orientation, covariance_0, omega, acceleration = felt
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame
         )
+        if not mount.told:
+            gravity, unusable = NOWHERE, False
         invalid = self.watch.imu.invalid
         if unusable or not invalid.quiet:
             invalid.step(now, 1.0 if unusable else 0.0)
@@ -222,7 +235,7 @@ class LiveEvaluator:
 
         After one that cannot be used margins are unknown until a good one comes.
         """
-        robot = self.settings.robot
+        robot, frame = self.settings.robot, without_prefix(frame, self.settings.frame_prefix)
         payload = payload_from(robot, mass, com, frame)
         self.watch.declared(now, '' if payload else payload_fault(robot, mass, com, frame))
         self.load_known = payload is not None
@@ -240,7 +253,8 @@ class LiveEvaluator:
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
         self.settings = self.watch.settings = self.ground.settings = settings
-        self._imu.adopt(settings)
+        self.mount.learn(settings)
+        self._imu.adopt(self.mount.applied(settings))
         self.watch.trend.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
@@ -264,17 +278,7 @@ class LiveEvaluator:
     @property
     def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Newest rates and efforts of the joints (rad/s, N m; m/s, N); NaN where not reported."""
-        return tuple(self._joints.qd), tuple(self._joints.effort)
-
-    @property
-    def assumed(self) -> list[str]:
-        """Names of the joints that were taken as held for want of messages, now or before."""
-        return [self.settings.robot.joint_names[j] for j in sorted(self._joints.assumed)]
-
-    @property
-    def doubted(self) -> bool:
-        """Whether a joint is taken as held which may be elsewhere: margins are for information."""
-        return self._joints.doubted
+        return tuple(self.joints.qd), tuple(self.joints.effort)
 
     @property
     def orientations(self) -> dict[str, int]:
@@ -325,14 +329,14 @@ class LiveEvaluator:
         due = self._fresh[which].deadline
         if due is not None and now > due:
             if which == 0 and not stale.raw:
-                stale.detail = words.why_foreign(self._joints, due)
+                stale.detail = words.why_foreign(self.joints, due)
             stale.set(due, 1.0)
 
     def _alive_until(self) -> int:
         """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
         joints, imu = self._fresh
-        seen = min(self._joints.seen, default=FOREVER)
-        if seen == NEVER or imu.last is None or self._joints.repeating:
+        seen = min(self.joints.seen, default=FOREVER)
+        if seen == NEVER or imu.last is None or self.joints.repeating:
             return NEVER
         return min(seen + joints.limit, imu.last + imu.limit)
 
@@ -362,12 +366,12 @@ class LiveEvaluator:
             torque = (math.nan,) * len(torque)
         stability = NOT_KNOWN if self._level else stability_of(stance, gravity)
         self._watch(now, torque, stability)
-        q = tuple(self._joints.q)
+        q = tuple(self.joints.q)
         self.margins = Margins(now, stamp, q, gravity, torque, stability)
         self.evaluated += 1
         prediction = self.watch.prediction
         if now >= prediction.due:
-            prediction.keep(now, stability.angle, torque, self._joints.effort, q)
+            prediction.keep(now, stability.angle, torque, self.joints.effort, q)
             pose = self._chassis.pose
             if pose is not None and not self._level:
                 self.watch.trend.keep(now, stability.angle, q, gravity, pose[1])

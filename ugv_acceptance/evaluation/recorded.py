@@ -16,7 +16,9 @@ from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.ground_contact import GroundContact, blanked
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
+from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount, felt_by
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
@@ -77,14 +79,15 @@ class RecordedEvaluator:
 
     Moments, energies and ZMP are computed only with `detail`. `fresh` are the timeouts and `gaps`
     the periods of silence (ns) of joint states and IMU, `first_payload` is the first payload that
-    was declared, and when (ns), `carrying` are the joints (numbers) that carried the robot.
+    was declared, and when (ns), `carrying` are joints (numbers) that carried; `joints` merges.
     """
 
     settings: Settings
     detail: bool = False
     watch: RuleSet = field(init=False)
     _mechanics: Mechanics = field(init=False)
-    _joints: JointMerger = field(init=False)
+    joints: JointMerger = field(init=False)
+    mount: ImuMount = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisColumns = field(init=False)
     _ground: GroundContact = field(init=False)
@@ -101,9 +104,12 @@ class RecordedEvaluator:
         self.watch = RuleSet(self.settings)
         robot = self.settings.robot
         self._mechanics = mechanics_of(robot)
-        self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self._chassis = ChassisColumns(ChassisMotion(self.settings, self.watch.chassis))
+        self.joints = JointMerger(self.settings, self.watch.jump_signals)
+        self.mount = ImuMount(self.settings, *self.watch.mounting)
+        placed = self.mount.applied(self.settings)
+        self._imu = ImuTracker(placed, self.watch.attitude)
+        self._chassis = ChassisColumns(ChassisMotion(placed, self.watch.chassis))
+        self.mount.settle = (self._imu.adopt, self._chassis.place)
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         self._payload = PayloadHistory(robot.payload)
@@ -130,11 +136,6 @@ class RecordedEvaluator:
         return dict(zip(ORIENTATIONS, self._imu.taken, strict=True))
 
     @property
-    def assumed(self) -> list[str]:
-        """Names of the joints that were taken as held for want of messages, now or before."""
-        return [self.settings.robot.joint_names[j] for j in sorted(self._joints.assumed)]
-
-    @property
     def imu(self) -> ImuTracker:
         """The tracker of the IMU, with what its checks judged."""
         return self._imu
@@ -142,7 +143,7 @@ class RecordedEvaluator:
     @property
     def rates(self) -> list[JointRate]:
         """How far the reported rate of each joint can be believed."""
-        return self._joints.rates
+        return self.joints.rates
 
     def start(self, now: int) -> None:
         """Begin at the recording's start, `now` (ns): an input without messages becomes stale."""
@@ -171,13 +172,14 @@ class RecordedEvaluator:
         It is when an input becomes stale, unless the next batch brings a message before.
         """
         felt = batch.imu if self.settings.hears_imu else ()
-        imu = self._imu.columns(felt)
         if self.settings.hears_joints:
-            joints = self._joints.merge_columns(batch.joints)
+            joints = self.joints.merge_columns(batch.joints)
+            felt, imu = felt_by(self.mount, self._imu, felt, (self._carry.joints, joints))
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
             self._watch_joints(joints, joint_limits)
-            until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
+            until = np.where(self.joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
+            felt, imu = felt_by(self.mount, self._imu, felt, (self._carry.joints,))
             joints = without_joints(imu)
             until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
@@ -226,20 +228,19 @@ class RecordedEvaluator:
     def _silent(self, stale: Signal, due: int) -> None:
         """Take that an input was silent from `due` (ns) on."""
         if stale is self.watch.joints.stale and not stale.raw:
-            stale.detail = words.why_foreign(self._joints, due)
+            stale.detail = words.why_foreign(self.joints, due)
         stale.set(due, 1.0)
 
     def _watch_joints(self, joints: JointRows, limits: Times) -> None:
-        merger, time = self._joints, joints.time
+        merger, time = self.joints, joints.time
         feed(
             self.watch.joints.invalid,
             time,
             joints.unusable,
             lambda row: words.why_unusable(merger, row),
         )
-        old = time - joints.oldest > limits
-        old &= (joints.oldest != NEVER) | (time - merger.began > STARTUP)
-        old |= merger.told.doubted
+        late = (joints.oldest != NEVER) | (time - merger.began > STARTUP)
+        old = (late & (time - joints.oldest > limits)) | merger.told.doubted
         feed(
             self.watch.missing, time, old,
             lambda row: words.what_is_missing(merger, int(time[row]), int(limits[row]), row),
@@ -252,7 +253,8 @@ class RecordedEvaluator:
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
-            told = self.settings.robot, s.mass[k], s.com[k], s.frame_id
+            frame = without_prefix(s.frame_id, self.settings.frame_prefix)
+            told = self.settings.robot, s.mass[k], s.com[k], frame
             payload = payload_from(*told)
             self.watch.declared(when, '' if payload else payload_fault(*told))
             self._payload.declare(when, payload)

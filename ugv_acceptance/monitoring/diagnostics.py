@@ -11,6 +11,7 @@ from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
+from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
@@ -107,15 +108,15 @@ def _limits(session: Session) -> dict[str, object]:
         values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
     if session.settings.hand_may_touch:
         values['hand_may_touch'] = True
-    if session.evaluator.assumed:
-        values['untold_joints'] = held_words(session.settings, session.evaluator.assumed)
+    if session.evaluator.joints.never_told:
+        values['untold_joints'] = held_words(session.settings, session.evaluator.joints.never_told)
     return values
 
 
 def _untold(session: Session) -> Iterator[str]:
     """Yield which joints are taken as held because no message told them, if any are."""
-    if session.evaluator.assumed:
-        yield f'never told, taken as held: {names_words(session.evaluator.assumed)}'
+    if session.evaluator.joints.never_told:
+        yield f'never told, taken as held: {names_words(session.evaluator.joints.never_told)}'
 
 
 def _now(alert: Alert, session: Session) -> Alert:
@@ -303,7 +304,7 @@ def diagnostics_of(
         active = session.active
         moving = session.evaluator.moving
         found = margin_statuses(session.evaluator, active, moving)
-        statuses += map(_doubted, found) if session.evaluator.doubted else found
+        statuses += map(_doubted, found) if session.evaluator.joints.doubted else found
         statuses += [_input(name, session, inputs, active) for name in session.counts]
     return statuses
 
@@ -315,6 +316,8 @@ def _monitor(verdict: Status, config: Config | None, session: Session | None) ->
             'robot': config.name,
             'config': config.path,
             'sha256': config.sha256,
+            'urdf_sha256': config.urdf_sha256,
+            'description': config.description,
             'warnings': len(config.warnings),
         }
     if session is not None:
@@ -348,6 +351,8 @@ def _input(
     if name == 'imu':
         of = session.evaluator.orientations
         values |= {f'orientation_{how}': number for how, number in of.items()}
+        mount = session.evaluator.mount
+        values['mounting'] = mounting_words(mount.settings, mount.found, mount.why)
     if count.reason:
         values['last_malformed'] = count.reason
     level = max([a.rule.level for a in mine], default=OK)

@@ -207,7 +207,7 @@ class Session:
             margins = evaluate(now, local, *fields(sample))
             if margins is not None:
                 see(margins)
-                if not self.evaluator.doubted:
+                if not self.evaluator.joints.doubted:
                     self.on_margins(stamp, margins)
             if (margins is not None) is not self._known or alarm_tracker.changed():
                 self._look()

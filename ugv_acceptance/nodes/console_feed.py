@@ -226,7 +226,7 @@ class ConsoleNode(Node):
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)
-        margins, joints = evaluator.margins, evaluator._joints  # noqa: SLF001 - only looked at
+        margins, joints = evaluator.margins, evaluator.joints
         alerts = tuple(map(self._newest, self.book.also(self._own.values())))
         told = () if problem and self.verdict is None else alerts
         moment, rows = self.session.clock.now(), self._rows

@@ -18,10 +18,11 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 )
 from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.ground_statement import GroundExamination
+from ugv_acceptance.evaluation.criteria.imu_mounting import MountExamination
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu, untold_joints
-from ugv_acceptance.evaluation.criteria.statement import Examination
+from ugv_acceptance.evaluation.criteria.statement import Examination, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
@@ -37,6 +38,7 @@ from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.offline.evaluation import Judgement
+from ugv_acceptance.offline.recorded_transforms import with_transforms
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
@@ -75,13 +77,16 @@ def judge(
     criteria: CriteriaSet | None = None,
     sources: tuple[Source, ...] = (),
     options: Options = DEFAULTS,
+    statements: Sequence[Statement] = (),
 ) -> tuple[Json, Judgement]:
     """Read a recording once; return its result for JSON and the objects it was made from.
 
     The result holds what follows from margins, alerts and data, without robot, software and
-    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
+    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty;
+    `statements` are about the recording as a whole, found before it is read.
     """
     bag, topics = recording.bag, recording.chosen(imu_required=False)
+    settings = with_transforms(settings, bag)
     span = bag.start_ns, bag.end_ns
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
@@ -100,9 +105,9 @@ def judge(
         'bag': _bag_result(bag, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
     }
-    statements = [e.statement(*span) for e in reading.examinations]
+    statements = [*statements, *(e.statement(*span) for e in reading.examinations)]
     statements.append(absent_imu(settings, topics.imu))
-    statements.append(untold_joints(settings, evaluator.assumed))
+    statements.append(untold_joints(settings, evaluator.joints.never_told))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
         data |= statement.result
@@ -128,6 +133,7 @@ def _examinations(
     return (
         ModelCheck(settings, sources, lambda: evaluator.carrying),
         ImuExamination(evaluator.imu),
+        MountExamination(evaluator.mount, evaluator.imu),
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),

@@ -159,6 +159,11 @@ class JointMerger:
                 self.assumed.add(j)
                 self.doubted = self._doubts()
 
+    @property
+    def never_told(self) -> list[str]:
+        """Names of the joints that were ever taken as held for want of messages."""
+        return [self.settings.robot.joint_names[j] for j in sorted(self.assumed)]
+
     def _doubts(self) -> bool:
         return any(self.seen[j] == FOREVER and not of.harmless for j, of in self._untold.items())
 

@@ -19,7 +19,6 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.diagnostics import Status
 from ugv_acceptance.monitoring.drawing import (
-    FRAME,
     LIFETIME,
     PERIOD,
     Figure,
@@ -162,7 +161,7 @@ class MarkerOutput:
         if session is None or not self._publisher.get_subscription_count():
             return
         settings, margins = session.settings, session.evaluator.margins
-        if margins is None or session.evaluator.doubted:
+        if margins is None or session.evaluator.joints.doubted:
             return
         if self._figure is None or self._figure.mechanics.robot is not settings.robot:
             self._figure = figure_of(settings.robot)
@@ -171,4 +170,4 @@ class MarkerOutput:
         if skeleton is not None:
             stamp = self._node.get_clock().now().nanoseconds
             shapes = shapes_of(skeleton, margins, settings)
-            self._publisher.publish(markers_cdr(stamp, FRAME, LIFETIME, shapes))
+            self._publisher.publish(markers_cdr(stamp, settings.frame, LIFETIME, shapes))
