@@ -123,6 +123,8 @@ WHEEL = """<joint name="{name}_axle" type="continuous"><origin xyz="{x} {y} 0.1"
   <link name="{name}"><inertial><mass value="1"/>
     <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><origin rpy="1.5707963 0 0"/>
+    <geometry><cylinder radius="0.08" length="0.06"/></geometry></collision>
+    <collision><origin rpy="1.5707963 0 0"/>
     <geometry><cylinder radius="0.1" length="0.04"/></geometry></collision></link>
 """
 
