@@ -103,6 +103,7 @@ def test_a_mesh_in_centimetres_is_read_in_metres(tmp_path: Path) -> None:
         ('bad.stl', b'no mesh', 'expected a mesh'),
         ('bad.dae', b'<COLLADA', 'expected a mesh, got'),
         ('empty.obj', b'v 0 0 0\n', 'expected a mesh'),
+        ('far.obj', b'v 0 0 0\nv 1 0 1e300\nv 0 1 nan\nf 1 2 3\n', 'expected'),
         ('part.step', b'ISO-10303-21;', 'expected a mesh'),
     ],
 )
