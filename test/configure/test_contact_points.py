@@ -1,6 +1,7 @@
 """Contact points derived of small robots: what carries is found, what is doubtful is asked."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -298,9 +299,16 @@ def test_tracks_stand_on_the_ends_of_their_flat_run() -> None:
     }
     assert {one.on for one in found.points} == {'track chassis_link'}
     assert (found.question, found.ground.value) == ('', 0.0)
-    assert any(
-        'flipper_link can reach the ground as flipper_joint turns' in r for r in found.remarks
-    )
+
+
+def test_where_flippers_come_to_the_ground_is_told() -> None:
+    """The points that PackBot's configuration has, at the angle that its comment names."""
+    found = derived((ROOT / 'urdf' / 'packbot.urdf').read_text('utf-8'))
+    (told,) = [one for one in found.remarks if 'flipper_link reaches the ground' in one]
+    assert 'as flipper_joint turns by -14.9 deg' in told
+    points = [[float(x) for x in one.split(',')] for one in re.findall(r'\[(.*?)\]', told)]
+    flippers = [c for c in load('packbot').settings.robot.contacts if c.link == 'flipper_link']
+    assert points == [pytest.approx(one.position, abs=2e-5) for one in flippers]
 
 
 @pytest.mark.parametrize('geometry', [shape(box(0.6, 0.4, 0.2)), shape(mesh('body.stl'))])
