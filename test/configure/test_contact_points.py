@@ -266,7 +266,7 @@ def test_wheels_whose_geometry_is_not_read_are_asked_about() -> None:
         (x, y, round(0.1 - radius, 5)) for x in (0.2, -0.2) for y in (0.2, -0.2)
     }
     assert {one.grade for one in found.points} == {ASK}
-    assert f'a radius of {1e3 * radius:.1f} mm: is it that?' in found.question
+    assert f'gives a radius of {1e3 * radius:.1f} mm: is it that?' in found.question
 
 
 def test_wheels_that_nothing_tells_of_are_asked_about() -> None:
@@ -274,7 +274,7 @@ def test_wheels_that_nothing_tells_of_are_asked_about() -> None:
     bare = four(shape(mesh('wheel.dae'))).replace('<mass value="1.0"/>', '<mass value="0"/>')
     found = derived(rover('', bare))
     assert (found.points, found.ground.value) == ((), None)
-    assert found.question.startswith('Nothing tells the radius of front_left, front_right')
+    assert found.question.startswith('The radius of front_left, front_right')
 
 
 def test_a_wheel_at_the_end_of_an_arm_carries_nothing() -> None:
@@ -415,7 +415,7 @@ def test_an_arm_alone_stands_on_nothing() -> None:
         parent = f'arm{k}'
     found = derived(rover(shape(box(0.1, 0.1, 0.05)), text))
     assert (found.points, found.ground.grade) == ((), ASK)
-    assert 'an arm alone stands on nothing' in found.question
+    assert 'only an arm: what is it mounted on?' in found.question
 
 
 @pytest.mark.parametrize('masses', ['', 'base'])

@@ -162,7 +162,7 @@ def _doubted(one: DerivedContact) -> DerivedContact:
 
 def _ground(posture: Posture, points: Sequence[DerivedContact]) -> Derived[float]:
     if not points:
-        return Derived(None, ASK, 'no contact point tells it')
+        return Derived(None, ASK, 'no contact point is known')
     heights = []
     for one in points:
         rotation, origin = posture.frames[one.contact.link]

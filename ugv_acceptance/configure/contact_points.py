@@ -77,7 +77,7 @@ def _standing(posture: Posture, notes: Notes) -> list[Wheel]:
     unsized = [wheel for wheel in wheels_of(posture) if not wheel.radius]
     if unsized:
         notes.questions.append(
-            f'Nothing tells the radius of {listed([w.joint.child for w in unsized])} '
+            f'The radius of {listed([w.joint.child for w in unsized])} is not known '
             f'({unsized[0].source}): where does it touch the ground?'
         )
     if not wheels:
@@ -257,8 +257,8 @@ class _Rolling:
             radii = dict.fromkeys(mm(wheel.radius) for wheel in guessed)
             notes.questions.append(
                 f'The geometry of {listed([w.joint.child for w in guessed])} was not read '
-                f'({guessed[0].source.split("; ")[-1]}); as even discs their inertia tells a '
-                f'radius of {", ".join(radii)}: is it that?'
+                f'({guessed[0].source.split("; ")[-1]}); taken as uniform discs, their inertia '
+                f'gives a radius of {", ".join(radii)}: is it that?'
             )
         for wheel in self._wheels:
             self._say_of_carrier(wheel)

@@ -103,7 +103,7 @@ def _wheel(posture: Posture, joint: Joint) -> Wheel | None:
     if solid.kind == 'mesh':
         source += f', radius {1e3 * radius:.4g} mm, tread {1e3 * (span[-1] - span[0]):.4g} mm wide'
     if solid.kind == 'sphere':
-        source, grade = f'{source}; it tells no width: one point in its middle', CHECK
+        source, grade = f'{source}; a sphere has no width: one point, in its middle', CHECK
     if solid.drawn:
         source, grade = f'{source}, as it is drawn: it has no collision geometry', CHECK
     if unread:
@@ -184,5 +184,5 @@ def _guessed(posture: Posture, joint: Joint, links: Sequence[str]) -> Wheel | No
     what = next(one for one in posture.unread if one.link in links)
     source = f'{what.what} of {joint.child} is not read: {what.why}'
     if radius:
-        source = f'radius {1e3 * radius:.4g} mm from its inertia, as an even disc; {source}'
+        source = f'radius {1e3 * radius:.4g} mm from its inertia, taken as a uniform disc; {source}'
     return Wheel(joint, centre, axis, radius, (middle,), source, ASK, guess=True)

@@ -43,8 +43,8 @@ def stands_on_geometry(posture: Posture, notes: Notes) -> Contacts:
     base = set(posture.rigid(posture.root))
     if _is_arm(posture, solids, base):
         notes.questions.append(
-            f'No wheels, feet or tracks were found under {posture.root}: an arm alone stands on '
-            'nothing that its URDF tells. What is it mounted on?'
+            f'No wheels, feet or tracks were found under {posture.root}, only an arm: '
+            'what is it mounted on?'
         )
         return contacts_of(posture, (), None, notes)
     face = face_of_solids(solids, posture)
