@@ -83,6 +83,16 @@ def derived(
     return derive_contacts(read_urdf(urdf.encode(), 'test.urdf'), posture or {}, meshes)
 
 
+def files_in(folder: Path) -> Callable[[str], Path | None]:
+    """Return what finds a mesh in a folder by the last part of its name."""
+
+    def find(name: str) -> Path | None:
+        path = folder / name.rpartition('/')[2]
+        return path if path.is_file() else None
+
+    return find
+
+
 def block(
     x: float, y: float, z: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> list[Triangle]:

@@ -11,6 +11,7 @@ from configure.small_robots import (
     box,
     derived,
     drum,
+    files_in,
     four,
     joint,
     link,
@@ -27,7 +28,7 @@ from configure.small_robots import (
 
 from ugv_acceptance.config import load
 from ugv_acceptance.config.urdf import read_urdf
-from ugv_acceptance.configure.collision import geometry_of, mesh_finder
+from ugv_acceptance.configure.collision import geometry_of
 from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Contacts
 from ugv_acceptance.configure.posture import posture_of
 
@@ -63,8 +64,7 @@ def test_a_wheel_that_is_a_mesh_stands_across_its_tread(tmp_path: Path, suffix: 
     write = {'stl': write_stl, 'obj': write_obj, 'dae': write_dae}[suffix]
     write(tmp_path / f'wheel.{suffix}', drum(0.1, 0.04))
     geometry = shape(mesh(f'package://rover/wheel.{suffix}'))
-    find = mesh_finder([tmp_path])
-    (tmp_path / 'rover').symlink_to(tmp_path)
+    find = files_in(tmp_path)
     found = derived(rover(BODY, four(geometry)), meshes=find)
     points = {(x, y, 0.0) for x in (0.2, -0.2) for y in (0.22, 0.18, -0.18, -0.22)}
     assert rounded(found) == points
@@ -153,7 +153,7 @@ def test_casters_inside_a_mesh_of_the_body_are_asked_about(tmp_path: Path) -> No
     parts = [*block(0.5, 0.3, 0.1, (0.0, 0.0, 0.15)), *block(0.02, 0.02, 0.1, (-0.2, 0.0, 0.05))]
     write_stl(tmp_path / 'base.stl', parts)
     urdf = rover(shape(mesh('base.stl')), PAIR)
-    seen = derived(urdf, meshes=mesh_finder([tmp_path]))
+    seen = derived(urdf, meshes=files_in(tmp_path))
     assert seen.question.startswith('Only left, right were found to carry')
     grades = {one.on: one.grade for one in seen.points}
     assert grades == {'wheel left': CERTAIN, 'wheel right': CERTAIN, 'body base_link': ASK}
@@ -315,7 +315,7 @@ def test_where_flippers_come_to_the_ground_is_told() -> None:
 def test_a_body_without_wheels_is_asked_about(tmp_path: Path, geometry: str) -> None:
     """One shape, a box or a mesh, may have its tracks inside: its corners are a guess."""
     write_stl(tmp_path / 'body.stl', block(0.6, 0.4, 0.2))
-    found = derived(rover(geometry, ''), meshes=mesh_finder([tmp_path]))
+    found = derived(rover(geometry, ''), meshes=files_in(tmp_path))
     assert rounded(found) == {(x, y, -0.1) for x in (0.3, -0.3) for y in (0.2, -0.2)}
     assert {one.grade for one in found.points} == {ASK}
     assert 'does the robot stand on its corners?' in found.question

@@ -5,7 +5,7 @@ Where a link has no collision geometry, what it is drawn with stands in its plac
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -170,52 +170,6 @@ def geometry_of(urdf: Urdf, meshes: Meshes) -> Geometry:
             else:
                 unread.append(found)
     return Geometry(tuple(solids), tuple(unread))
-
-
-def mesh_finder(
-    folders: Sequence[Path], share_of: Callable[[str], Path | None] = lambda _: None
-) -> Meshes:
-    """Return what finds the file of a mesh by its name in a URDF.
-
-    package://NAME/PATH (model:// too): PATH in the share folder that `share_of` tells for NAME, or
-    in a folder NAME in, at or above one of `folders`. file:// and other names: as a path, else
-    beside one of `folders`.
-    """
-
-    def find(name: str) -> Path | None:
-        return next((path for path in _places(name, folders, share_of) if _is_file(path)), None)
-
-    return find
-
-
-def _places(
-    name: str, folders: Sequence[Path], share_of: Callable[[str], Path | None]
-) -> Iterator[Path]:
-    scheme, found, rest = name.partition('://')
-    if not found:
-        scheme, rest = 'file', name
-    if scheme == 'file':
-        yield Path(rest)
-        yield from (folder / rest.lstrip('/') for folder in folders)
-        return
-    if scheme not in ('package', 'model'):
-        return
-    package, _, inside = rest.partition('/')
-    share = share_of(package)
-    if share is not None:
-        yield share / inside
-    for folder in folders:
-        for base in (folder, *folder.resolve().parents):
-            yield base / package / inside
-            if base.name == package:
-                yield base / inside
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def _solid(
