@@ -180,13 +180,26 @@ def test_a_centre_of_gravity_outside_of_the_wheels_is_asked_about() -> None:
 
 
 def test_a_wheel_above_the_plane_of_the_others_is_asked_about() -> None:
-    """One that hangs 30 mm high is not taken in silence; one of 5 mm is taken, to be checked."""
-    middle = wheel('middle', '0 0.2 {z}', WHEEL)
-    high = derived(rover(BODY, four(WHEEL), middle.format(z=0.13)))
-    assert 'wheel middle is 30.0 mm above the plane of the others: does it' in high.question
-    near = derived(rover(BODY, four(WHEEL), middle.format(z=0.105)))
+    """One of 5 mm is to be checked; one of 10 mm is asked about; one of 30 mm is not taken."""
+    middle = wheel('middle', '0 0.2 {z}', tyre(0.09, 0.04))
+    rover_of = [rover(BODY, four(WHEEL), middle.format(z=0.09 + z)) for z in (0.005, 0.01, 0.03)]
+    near, far, high = map(derived, rover_of)
     assert (near.question, len(near.points)) == ('', 10)
     assert {one.grade for one in near.points if one.on == 'wheel middle'} == {CHECK}
+    assert 'wheel middle is 10.0 mm above the plane of the others: does it' in far.question
+    assert len(far.points) == 10
+    assert 'wheel middle is 30.0 mm above' in high.question
+    assert len(high.points) == 8
+
+
+@pytest.mark.parametrize('suffix', ['cylinder', 'stl'])
+def test_wheels_that_overlap_are_asked_about(tmp_path: Path, suffix: str) -> None:
+    """As where a radius, or a mesh without a scale, is in millimetres."""
+    write_stl(tmp_path / 'wheel.stl', drum(100.0, 40.0))
+    geometry = tyre(100.0, 40.0) if suffix == 'cylinder' else shape(mesh('wheel.stl'))
+    found = derived(rover(BODY, four(geometry)), meshes=files_in(tmp_path))
+    assert 'front_left (radius 100000.0 mm) and front_right' in found.question
+    assert 'overlap: which number is wrong?' in found.question
 
 
 def test_a_wheel_that_swivels_stands_on_the_link_that_swivels() -> None:

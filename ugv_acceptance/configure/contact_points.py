@@ -8,6 +8,7 @@ Nothing doubtful is passed on in silence: it becomes a question.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -45,6 +46,8 @@ from ugv_acceptance.type_aliases import Floats
 # A wheel so far (m) above the lowest is none that the robot stands on; one so far above the plane
 # of the others is still one.
 HIGH, SPRUNG = 0.1, 0.02
+# From here (m) that is asked about; so much (m) two wheels may overlap.
+UNEVEN, OVERLAP = 0.0055, 0.005
 # How far (m) the body may reach below the wheels' plane, as collision geometry is rough, and below
 # a robot's lowest wheels before these carry nothing.
 ROUGH, BELOW = 0.010, 0.030
@@ -172,12 +175,14 @@ class _Rolling:
         """Return the contact points of what is within `slack` (m) of the plane."""
         points = list(part.points(up))
         height = min(face.height(p.tolist()) for p in points)
-        if height > slack:
+        rolls = slack == SPRUNG
+        if height > (UNEVEN if rolls else slack):
             said = f'{part.on} is {mm(height)} above the plane of the others'
-            if slack == SPRUNG:
+            if rolls:
                 self._notes.questions.append(f'{said}: does it touch the ground?')
             else:
                 self._notes.remarks.append(f'{said}: it was not taken')
+        if height > slack:
             return []
         source, grade = part.source, part.grade
         if abs(height) > 1e-4:
@@ -263,6 +268,13 @@ class _Rolling:
         for wheel in self._wheels:
             self._say_of_carrier(wheel)
         self._ask_of_unround()
+        for a, b in combinations(self._wheels, 2):
+            if a.overlaps(b, OVERLAP):
+                notes.questions.append(
+                    f'{a.joint.child} (radius {mm(a.radius)}) and {b.joint.child} (radius '
+                    f'{mm(b.radius)}) overlap: which number is wrong?'
+                )
+                break
 
     def _say_of_carrier(self, wheel: Wheel) -> None:
         """Say what moves the link that carries a wheel: its contact point goes with it."""

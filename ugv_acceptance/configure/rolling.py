@@ -59,6 +59,16 @@ class Wheel:
         down = -self.radius / float(np.linalg.norm(across)) * across
         return self.centre + np.outer(np.array(self.ends), self.axis) + down
 
+    def overlaps(self, other: 'Wheel', slack: float) -> bool:
+        """Return whether two wheels are in one place by more than `slack` (m)."""
+        way = other.centre - self.centre
+        along = float(way @ self.axis)
+        turned = math.copysign(1.0, float(self.axis @ other.axis))
+        own, others = self.ends, [along + turned * end for end in other.ends]
+        beside = max(min(own), min(others)) > min(max(own), max(others)) - slack
+        away = float(np.linalg.norm(_across(way, self.axis)))
+        return not beside and away < self.radius + other.radius - slack
+
 
 def wheels_of(posture: Posture) -> tuple[Wheel, ...]:
     """Return the wheels, the outermost where one carries others, as its rollers."""
