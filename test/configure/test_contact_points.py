@@ -179,6 +179,14 @@ def test_a_centre_of_gravity_outside_of_the_wheels_is_asked_about() -> None:
     assert len(found.points) == 8
 
 
+def test_an_arm_that_would_tip_a_rover_leaves_it_on_its_wheels() -> None:
+    """Stretched out it has the centre of gravity outside of them, which is said."""
+    arm = link('arm', shape(box(2.0, 0.1, 0.1), '1 0 0'), 20.0, '1 0 0')
+    found = derived(rover(BODY, four(WHEEL), arm + joint('arm', '0 0 0.4', 'revolute')))
+    assert (len(found.points), found.question) == (8, '')
+    assert any('the arm has the centre of gravity' in one for one in found.remarks)
+
+
 def test_a_wheel_above_the_plane_of_the_others_is_asked_about() -> None:
     """One of 5 mm is to be checked; one of 10 mm is asked about; one of 30 mm is not taken."""
     middle = wheel('middle', '0 0.2 {z}', tyre(0.09, 0.04))
@@ -312,6 +320,20 @@ def test_tracks_stand_on_the_ends_of_their_flat_run() -> None:
     }
     assert {one.on for one in found.points} == {'track chassis_link'}
     assert (found.question, found.ground.value) == ('', 0.0)
+
+
+TRACKS = ''.join(shape(box(0.6, 0.1, 0.2), f'0 {y} 0.1') for y in (0.2, -0.2))
+
+
+@pytest.mark.parametrize('angle', [0.0, 0.2])
+def test_an_arm_that_would_tip_the_robot_leaves_it_on_its_tracks(angle: float) -> None:
+    """Stretched out it carries nothing; where it is below the ground that is asked about."""
+    arm = link('arm', shape(box(2.0, 0.1, 0.1), '1 0 0'), 20.0, '1 0 0')
+    found = derived(rover(TRACKS, arm + joint('arm', '0 0 0.25', 'revolute')), {'arm_joint': angle})
+    assert rounded(found) == {(x, y, 0.0) for x in (0.3, -0.3) for y in (0.25, -0.25)}
+    assert any('the centre of gravity is' in one for one in found.remarks)
+    below = 'In this posture arm is' in found.question and 'below the ground' in found.question
+    assert below == (angle > 0.0)
 
 
 def test_where_flippers_come_to_the_ground_is_told() -> None:
