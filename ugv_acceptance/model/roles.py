@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from ugv_acceptance.model.robot import Contact, Joint, Robot, Vector
-from ugv_acceptance.model.tree import Tree, rotate, tree_of
+from ugv_acceptance.model.tree import Tree, tree_of
 from ugv_acceptance.type_aliases import Floats
 
 # Cosine of the angle to the vertical up to which an axis lies across gravity (45 deg, so that an
@@ -118,7 +118,8 @@ def chain_to(robot: Robot, link: str) -> tuple[str, ...]:
 def place_of(robot: Robot, link: str, point: Vector) -> Floats:
     """Return where a point (m, in the axes of `link`) is in the zero posture (3,), `base_link`."""
     _, rotation, origin = _still(robot).frames[link]
-    return np.array(rotation) @ np.array(point) + np.array(origin)
+    place: Floats = np.array(rotation) @ np.array(point) + np.array(origin)
+    return place
 
 
 @lru_cache(maxsize=64)
@@ -128,8 +129,8 @@ def _still(robot: Robot) -> Tree:
 
 
 def _axis(robot: Robot, joint: Joint) -> Vector:
-    x, y, z = rotate(_still(robot).frames[joint.child][1], joint.axis)
-    return float(x), float(y), float(z)
+    x, y, z = (np.array(_still(robot).frames[joint.child][1]) @ np.array(joint.axis)).tolist()
+    return x, y, z
 
 
 def _upright(robot: Robot, joint: Joint) -> bool:
