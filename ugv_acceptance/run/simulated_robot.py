@@ -89,7 +89,7 @@ class VirtualRobot:
         """Pull backwards with a force (N) at a hitch, `height` (m) above the middle of the base."""
         simulation, yaw = self.remote.simulation, self._yaw()
         back = (-force * math.cos(yaw), -force * math.sin(yaw), 0.0)
-        base = simulation.data.body(self.config.settings.robot.root)
+        base = simulation.data.body(simulation.vehicle.root)
         arm = base.xpos + np.array((0.0, 0.0, height)) - base.xipos
         base.xfrc_applied[:] = (*back, *np.cross(arm, back))
 

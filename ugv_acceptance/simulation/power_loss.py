@@ -15,7 +15,7 @@ from ugv_acceptance import AcceptanceError
 from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import OVER, TIPPED, attitude, settled, turn
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, vehicle_of
+from ugv_acceptance.simulation.vehicle import Build, Vehicle, body_name, vehicle_of
 from ugv_acceptance.type_aliases import Floats
 
 TIPS, MAY_TIP, NOT_SEEN_TO_TIP = 'TIPS', 'MAY TIP', 'NOT SEEN TO TIP'
@@ -260,7 +260,7 @@ def _brake(vehicle: Vehicle, data: mujoco.MjData, down: Floats, k: int, name: st
 
 def _is_below(model: mujoco.MjModel, link: str, body: int) -> bool:
     """Return whether a link is this body or hangs on it."""
-    k = int(model.body(link).id)
+    k = int(model.body(body_name(link)).id)
     while k and k != body:
         k = int(model.body_parentid[k])
     return k == body

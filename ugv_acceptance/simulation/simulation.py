@@ -17,6 +17,7 @@ from ugv_acceptance.simulation.scenario import Command
 from ugv_acceptance.simulation.vehicle import (
     SERVO,
     Build,
+    drive,
     gravity_on_slope,
     set_brakes,
     set_payload,
@@ -183,14 +184,17 @@ class Simulation:
         if self._braked != (forward == yaw == 0.0):
             self._braked = not self._braked
             set_brakes(vehicle, on=self._braked)
-        for wheel, y in vehicle.wheels:
-            control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
-        mass = self._mass.at(time)[0]
-        borne = vehicle.model.body_mass[vehicle.payload]
-        if abs(mass - borne) > _NOTICED or (over and mass != borne):
-            set_payload(vehicle, replace(self._load, mass=mass))
+        drive(vehicle, control, forward, yaw)
+        if vehicle.payload >= 0:
+            self._bear(self._mass.at(time)[0], over=over)
         gravity = gravity_on_slope(self.robot.gravity, *self._slope_at(time))
         vehicle.model.opt.gravity[:] = gravity
+
+    def _bear(self, mass: float, *, over: bool) -> None:
+        """Put a mass (kg) into the gripper, if it differs enough or all changes are `over`."""
+        borne = self.vehicle.model.body_mass[self.vehicle.payload]
+        if abs(mass - borne) > _NOTICED or (over and mass != borne):
+            set_payload(self.vehicle, replace(self._load, mass=mass))
 
     def slope(self) -> tuple[float, float]:
         """Return tilt and heading (rad) of the ground."""

@@ -13,7 +13,13 @@ from ugv_acceptance.model.stability import stability, stances_of, standing
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
+from ugv_acceptance.simulation.vehicle import (
+    Build,
+    Vehicle,
+    body_name,
+    gravity_on_slope,
+    vehicle_of,
+)
 from ugv_acceptance.type_aliases import Floats
 
 # Step (rad) of the grid of tilts on which the model's tilt is looked for, then interpolated.
@@ -84,7 +90,7 @@ def clear_of_ground(vehicle: Vehicle, q: Floats) -> bool:
     data.qpos[vehicle.position] = q
     mujoco.mj_kinematics(model, data)
     feet = {c.link for c in robot.contacts}
-    bodies = [model.body(link.name).id for link in robot.links if link.name not in feet]
+    bodies = [model.body(body_name(link.name)).id for link in robot.links if link.name not in feet]
     return bool((data.xpos[bodies, 2] > 0.0).all() and (data.xipos[bodies, 2] > 0.0).all())
 
 
