@@ -95,6 +95,7 @@ class Simulation:
         self.data = mujoco.MjData(self.vehicle.model)
         first = dict(start)
         _check_joints(robot, first)
+        self._wheels = {roller.joint for _, roller in self.vehicle.wheels}
         self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
         self._slope = [_Move(part) for part in _parts(*slope)]
         self._load, self._mass = load, _Move(load.mass)
@@ -124,13 +125,16 @@ class Simulation:
         return float(self.data.time)
 
     def apply(self, command: Command) -> None:
-        """Carry out a command now. Raises BadConfig for a joint that the robot does not move."""
+        """Carry out a command now; a wheel's target is left out, as `drive` turns it.
+
+        Raises BadConfig for a joint that the robot does not move.
+        """
         targets = dict(command.joints)
         _check_joints(self.robot, targets)
         now = self.time
         self._steered_until = now
         for k, name in enumerate(self.robot.joint_names):
-            if name in targets:
+            if name in targets and name not in self._wheels:
                 at = self._moves[k].at(now)[0]
                 self._moves[k] = _move(at, targets[name], command.speed, now)
         for k, speed in enumerate(command.drive or ()):
