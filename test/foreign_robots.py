@@ -1,7 +1,11 @@
-"""Robots of other makes for tests: a rover, an arm of six joints on wheels, a walking one."""
+"""Robots of other makes for tests, and their files: a rover, an arm on wheels, tracks, legs."""
 
-from math import pi
+from collections.abc import Iterable
+from math import isfinite, pi
+from pathlib import Path
+from typing import Any
 
+import yaml
 from robots import box
 
 from ugv_acceptance.model.robot import IDENTITY, Contact, Joint, Link, Matrix, Payload, Robot
@@ -123,3 +127,107 @@ def walker() -> Robot:
         tuple(contacts),
         ground=-0.4,
     )
+
+
+def tracks_and_flippers() -> Robot:
+    """Return a tracked robot half as long as PackBot, with a crane of two axes and four flippers.
+
+    The flippers in front and those behind have a joint each; zero points them outwards.
+    """
+    links = [
+        Link('hull', 12.0, (0.0, 0.0, 0.06), box(12.0, 0.4, 0.25, 0.1)),
+        Link('post', 0.8, (0.0, 0.0, 0.02), box(0.8, 0.06, 0.06, 0.04)),
+        Link('boom', 0.9, (0.15, 0.0, 0.0), box(0.9, 0.3, 0.04, 0.04)),
+        Link('jib', 0.6, (0.12, 0.0, 0.0), box(0.6, 0.25, 0.03, 0.03)),
+        Link('hook'),
+        Link('bow', 0.6, (0.06, 0.0, 0.0), box(0.6, 0.15, 0.3, 0.04)),
+        Link('stern', 0.6, (-0.06, 0.0, 0.0), box(0.6, 0.15, 0.3, 0.04)),
+    ]
+    up, travel = (0.0, -1.0, 0.0), {'lower': -2.8, 'upper': 2.8}
+    joints = [
+        Joint('slew', 'continuous', 'hull', 'post', (0.0, 0.0, 0.12), axis=UP),
+        Joint('luff', 'revolute', 'post', 'boom', (0.0, 0.0, 0.04), axis=up, effort=16.0, **travel),
+        Joint('fold', 'revolute', 'boom', 'jib', (0.3, 0.0, 0.0), axis=up, effort=8.0, **travel),
+        Joint('hang', 'fixed', 'jib', 'hook', (0.25, 0.0, 0.0)),
+        Joint('bow_drive', 'continuous', 'hull', 'bow', (0.13, 0.0, 0.05), axis=up),
+        Joint('stern_drive', 'continuous', 'hull', 'stern', (-0.13, 0.0, 0.05), axis=ACROSS),
+    ]
+    contacts = [
+        Contact(f'{end}_{side}', 'hull', (x, y, 0.0))
+        for end, x in (('front', 0.13), ('rear', -0.13))
+        for side, y in (('left', 0.12), ('right', -0.12))
+    ]
+    contacts += [
+        Contact(f'{link}_{side}', link, (x, y, -0.02))
+        for link, x in (('bow', 0.14), ('stern', -0.14))
+        for side, y in (('left', 0.15), ('right', -0.15))
+    ]
+    return Robot(
+        'tracks_and_flippers',
+        tuple(links),
+        tuple(joints),
+        ('slew', 'luff', 'fold', 'bow_drive', 'stern_drive'),
+        tuple(contacts),
+        payload_link='hook',
+        payload=Payload(0.5),
+        contact_tolerance=0.002,
+    )
+
+
+def write_robot(folder: Path, robot: Robot) -> Path:
+    """Write a robot as a URDF and a configuration that a stranger could have written."""
+    parts = [f'<robot name="{robot.name}">']
+    for link in robot.links:
+        (a, b, c), (_, d, e), (_, _, f) = link.inertia
+        parts.append(
+            f'<link name="{link.name}"><inertial><origin xyz="{_text(link.cog)}"/>'
+            f'<mass value="{link.mass}"/>'
+            f'<inertia ixx="{a}" ixy="{b}" ixz="{c}" iyy="{d}" iyz="{e}" izz="{f}"/>'
+            '</inertial></link>'
+            if link.mass
+            else f'<link name="{link.name}"/>'
+        )
+    parts += [
+        f'<joint name="{joint.name}" type="{joint.kind}"><parent link="{joint.parent}"/>'
+        f'<child link="{joint.child}"/><origin xyz="{_text(joint.xyz)}"/>'
+        f'<axis xyz="{_text(joint.axis)}"/>{_limit(joint)}</joint>'
+        for joint in robot.joints
+    ]
+    (folder / f'{robot.name}.urdf').write_text('\n'.join([*parts, '</robot>']), encoding='utf-8')
+    document: dict[str, Any] = {
+        'robot': {'name': robot.name},
+        'urdf': f'{robot.name}.urdf',
+        'joints': {name: {} for name in robot.joint_names},
+        'contacts': {
+            c.name: {'link': c.link, 'position_m': list(c.position)} for c in robot.contacts
+        },
+        'ground': {'height_m': robot.ground, 'tolerance_m': robot.contact_tolerance},
+        'topics': {'joint_states': {'name': 'drives/state'}, 'imu': {'name': 'sensors/imu'}},
+        'imu': {'position_m': [0.0, 0.0, 0.1]},
+    }
+    if robot.held:
+        document['held'] = dict(robot.held)
+    if not robot.joint_names:
+        document['topics']['joint_states'] = None
+    if robot.payload_link is not None:
+        load = {'mass_kg': robot.payload.mass, 'cog_m': list(robot.payload.cog)}
+        document['payload'] = {'link': robot.payload_link, **load}
+        document['topics']['payload'] = {'name': 'load', 'frame_id': robot.payload_link}
+    path = folder / f'{robot.name}.yaml'
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding='utf-8')
+    return path
+
+
+def _text(values: Iterable[float]) -> str:
+    return ' '.join(map(repr, values))
+
+
+def _limit(joint: Joint) -> str:
+    numbers = {
+        'lower': joint.lower,
+        'upper': joint.upper,
+        'effort': joint.effort,
+        'velocity': joint.velocity,
+    }
+    told = ' '.join(f'{key}="{value}"' for key, value in numbers.items() if isfinite(value))
+    return f'<limit {told}/>' if told else ''

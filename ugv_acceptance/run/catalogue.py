@@ -10,7 +10,7 @@ from ugv_acceptance.model.roles import ARM_ALONE, LEGGED, NONE, roles_of
 from ugv_acceptance.simulation.faults import KINDS as FAULTS
 from ugv_acceptance.simulation.faults import PHYSICAL, Fault, fault_of
 from ugv_acceptance.simulation.repertoire import KINDS, SECONDS
-from ugv_acceptance.simulation.scenario import Scenario
+from ugv_acceptance.simulation.scenario import Scenario, noise_of
 from ugv_acceptance.simulation.scenarios import SCENARIOS, scenario_of
 
 # When (s) the fault of a fault-KIND run sets in.
@@ -62,13 +62,15 @@ def case_of(
         raise BadConfig(f'scenario: expected one of {", ".join(known)}, got {name!r}')
     check_drives(robot)
     _check_needs(name, robot)
+    noise = noise_of(robot)
     if name in KINDS:
         length = SECONDS[name] if seconds is None else seconds
-        return Case(KINDS[name](robot, np.random.default_rng(seed), length), faults)
+        drawn = KINDS[name](robot, np.random.default_rng(seed), length)
+        return Case(replace(drawn, noise=noise), faults)
     if name.startswith(FAULT_PREFIX):
         faults = (_usual(name.removeprefix(FAULT_PREFIX), robot), *faults)
         name = 'gentle'
-    scenario = scenario_of(name, robot)
+    scenario = replace(scenario_of(name, robot), noise=noise)
     return Case(scenario if seconds is None else replace(scenario, duration=seconds), faults)
 
 

@@ -19,7 +19,7 @@ from ugv_acceptance.simulation.corruption import Corruption, overload
 from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
 from ugv_acceptance.simulation.faults import Fault
 from ugv_acceptance.simulation.poses import stowed_of
-from ugv_acceptance.simulation.scenario import Noise, Scenario
+from ugv_acceptance.simulation.scenario import Scenario, noise_of
 from ugv_acceptance.simulation.stretches import Rows, Sensors, stride_of
 
 # Source ('joint_states' or 'imu') and serialised content of a message.
@@ -59,9 +59,9 @@ class VirtualRobot:
         real = real_robot(self.config, self.faults)
         self.remote = RemoteRobot(real, build, self._start(), overload(self.faults))
         corruption = Corruption(self.faults, robot.joint_names)
-        self._driver = Driver(self.config, corruption, Noise(), self.epoch)
+        self._driver = Driver(self.config, corruption, noise_of(robot), self.epoch)
         self._rng = np.random.default_rng(self.seed)
-        self._sensors = Sensors(Noise(), np.random.default_rng(self.seed))
+        self._sensors = Sensors(noise_of(robot), np.random.default_rng(self.seed))
 
     def _start(self) -> tuple[tuple[str, float], ...]:
         robot = self.config.settings.robot

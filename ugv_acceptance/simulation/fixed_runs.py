@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,11 +51,12 @@ def gentle(robot: Robot) -> Scenario:
 def overreach(robot: Robot) -> Scenario:
     """On a side slope with too heavy a load: the arm reaches out, then turns downhill with it."""
     grid = grid_of(robot)
-    out, near = grid.outstretched, grid.stowed
-    down = (0.0, 0.0, -robot.gravity)
+    out, down = grid.outstretched, (0.0, 0.0, -robot.gravity)
     holds = float(payload_capacity(robot, out, down, limits_of(robot)))
     mass = holds if 0.0 < holds < math.inf else grid.capacity
     load = Payload(TOO_HEAVY * max(mass, grid.capacity), robot.payload.cog)
+    _, share = grid.looked(grid.rows[:, None, :], 0.0, load)
+    near = grid.rows[int(share.argmin())]
     ahead, across = (grid.turned(out[None], heading)[0] for heading in (0.0, RIGHT))
     turned = grid.turned(near[None], RIGHT)[0]
     commands = (
@@ -65,7 +67,8 @@ def overreach(robot: Robot) -> Scenario:
         _move(17.0, robot, near, turned, 3.0),
         _move(21.0, robot, turned, across, 4.0),
     )
-    return _run('overreach', 29.0, grid, Payload(0.0, robot.payload.cog), commands)
+    empty = Payload(0.0, robot.payload.cog)
+    return replace(_run('overreach', 29.0, grid, empty, commands), start=named(robot, near))
 
 
 def fetch(robot: Robot) -> Scenario:

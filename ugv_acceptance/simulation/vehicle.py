@@ -30,8 +30,9 @@ from ugv_acceptance.simulation.shape import numbers
 from ugv_acceptance.type_aliases import Floats
 
 # Natural frequency (rad/s) of the position servos on the inertia of the zero posture, or on
-# this (kg m2, kg) if that is more: a flipper's drive also lifts the robot.
-SERVO, SERVO_INERTIA = 50.0, 2.0
+# this (kg m2, kg) if that is more: a flipper's drive also lifts the robot. That of a motor below
+# 10 N m is WEAK times its limit squared, or a light joint's servo rattles from limit to limit.
+SERVO, SERVO_INERTIA, WEAK = 50.0, 2.0, 0.02
 # Names of bodies in MuJoCo that a link of a URDF may have as well.
 TAKEN = ('world', 'payload')
 # A hull between wheels is this share of their radius above the ground, at least.
@@ -111,7 +112,10 @@ def tune(vehicle: Vehicle, frequency: float) -> None:
     model, driven = vehicle.model, [k for k, _ in vehicle.wheels]
     holds = ~np.isin(vehicle.motor, driven)
     motor = vehicle.motor[holds]
-    inertia = np.maximum(model.dof_M0[vehicle.rate[holds]], SERVO_INERTIA)
+    names = [n for n, held in zip(vehicle.robot.joint_names, holds, strict=True) if held]
+    limits = np.array([vehicle.robot.joint(name).effort for name in names])
+    least = np.minimum(SERVO_INERTIA, WEAK * limits**2)
+    inertia = np.maximum(model.dof_M0[vehicle.rate[holds]], least)
     model.actuator_gainprm[motor, 0] = inertia * frequency**2
     model.actuator_biasprm[motor, 1] = -inertia * frequency**2
     model.actuator_biasprm[motor, 2] = -2.0 * inertia * frequency
