@@ -143,11 +143,31 @@ def tracks_and_flippers() -> Robot:
         Link('bow', 0.6, (0.06, 0.0, 0.0), box(0.6, 0.15, 0.3, 0.04)),
         Link('stern', 0.6, (-0.06, 0.0, 0.0), box(0.6, 0.15, 0.3, 0.04)),
     ]
-    up, travel = (0.0, -1.0, 0.0), {'lower': -2.8, 'upper': 2.8}
+    up = (0.0, -1.0, 0.0)
     joints = [
         Joint('slew', 'continuous', 'hull', 'post', (0.0, 0.0, 0.12), axis=UP),
-        Joint('luff', 'revolute', 'post', 'boom', (0.0, 0.0, 0.04), axis=up, effort=16.0, **travel),
-        Joint('fold', 'revolute', 'boom', 'jib', (0.3, 0.0, 0.0), axis=up, effort=8.0, **travel),
+        Joint(
+            'luff',
+            'revolute',
+            'post',
+            'boom',
+            (0.0, 0.0, 0.04),
+            axis=up,
+            lower=-2.8,
+            upper=2.8,
+            effort=16.0,
+        ),
+        Joint(
+            'fold',
+            'revolute',
+            'boom',
+            'jib',
+            (0.3, 0.0, 0.0),
+            axis=up,
+            lower=-2.8,
+            upper=2.8,
+            effort=8.0,
+        ),
         Joint('hang', 'fixed', 'jib', 'hook', (0.25, 0.0, 0.0)),
         Joint('bow_drive', 'continuous', 'hull', 'bow', (0.13, 0.0, 0.05), axis=up),
         Joint('stern_drive', 'continuous', 'hull', 'stern', (-0.13, 0.0, 0.05), axis=ACROSS),

@@ -34,7 +34,7 @@ def posture(robot: Robot, joints: tuple[tuple[str, float], ...]) -> np.ndarray:
 
 def height(robot: Robot, q: np.ndarray) -> float:
     """Return how high the arm is above the ground (m)."""
-    return float(clearance(mechanics_of(robot), None, q.tolist(), robot.payload.cog))  # type: ignore[arg-type]
+    return float(clearance(mechanics_of(robot), None, q.tolist(), robot.payload.cog))
 
 
 def test_packbot_keeps_its_own() -> None:

@@ -1,6 +1,7 @@
 """Tests of robots of other makes in MuJoCo: their wheels, inertias, names and loads."""
 
 from dataclasses import replace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,7 +24,7 @@ NO_TRIANGLE: Matrix = ((0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.5))
 NOT_POSITIVE: Matrix = ((2e-8, 6e-8, 1e-8), (6e-8, 3e-8, 8e-9), (1e-8, 8e-9, 4e-8))
 
 
-def with_axles(robot: Robot, **changes: object) -> Robot:
+def with_axles(robot: Robot, **changes: Any) -> Robot:
     """Return the robot with its axles changed."""
     joints = (replace(j, **changes) if j.name.endswith('_axle') else j for j in robot.joints)
     return replace(robot, joints=tuple(joints))

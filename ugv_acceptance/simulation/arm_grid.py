@@ -7,6 +7,7 @@ all other joints stay at zero, or at the end of their travel that is nearest to 
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,7 +142,7 @@ class ArmGrid:
 
     def near(self, q: Floats) -> Mask:
         """Return the rows (n,) within a moderate motion of posture `q` (j,)."""
-        near: Mask = (np.abs(self.rows - q) < NEAR).all(axis=-1)
+        near: Mask = np.all(np.abs(self.rows - q) < NEAR, axis=-1)
         return near
 
 
@@ -223,7 +224,7 @@ def grip_of(robot: Robot, roles: Roles, q: Floats) -> Floats:
 def _points(robot: Robot, q: Floats, link: str, point: Vector) -> Floats:
     """Return where a point of a link is (n, 3) for postures (n, j), m, `base_link`."""
     tree = tree_of(robot)
-    columns = [np.asarray(x) for x in np.moveaxis(q, -1, 0)]
+    columns: list[Any] = [np.asarray(x) for x in np.moveaxis(q, -1, 0)]
     pose = pose_of(tree, body_positions(drives_of(robot, tree), columns))
     at = point_of(tree, pose, link, point)[1]
     found: Floats = np.stack([np.broadcast_to(np.asarray(x), len(q)) for x in at], axis=-1)

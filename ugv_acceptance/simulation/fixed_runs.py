@@ -131,7 +131,8 @@ def _reached(
     for k in order[:TRIED]:
         row = grid.rows[k] if heading is None else grid.turned(grid.rows[k][None], heading)[0]
         if rows[k] and poses.passes(folded, row) and poses.keeps(way(folded, row), load, 0.0):
-            return row
+            found: Floats = row
+            return found
     return folded
 
 
