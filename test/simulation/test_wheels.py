@@ -119,7 +119,7 @@ def test_a_wheel_bears_at_both_edges_of_its_tyre() -> None:
 
 
 def test_points_that_no_wheel_stands_on_roll_along() -> None:
-    """A robot on two wheels and casters drives as fast as told, and holds on a slope."""
+    """A robot on two wheels and casters drives as fast as told; braked it holds on a slope."""
     robot = rover(measured=False)
     links = [k for k in robot.links if not k.name.startswith('rear')]
     joints = [j for j in robot.joints if not j.name.startswith('rear')]
@@ -133,7 +133,7 @@ def test_points_that_no_wheel_stands_on_roll_along() -> None:
     simulation.apply(Command(0.0, drive=(0.3, 0.0)))
     simulation.advance(4.0)
     assert simulation.base()[0][0] == pytest.approx(0.3 * 4.0 - 0.05, abs=0.03)
-    simulation.apply(Command(0.0, drive=(0.0, 0.0), slope=(0.15, 0.0)))
+    simulation.apply(Command(0.0, drive=(0.0, 0.0), slope=(0.5, 0.0), slope_rate=0.2))
     simulation.advance(6.0)
     there = simulation.base()[0][0]
     simulation.advance(1.0)

@@ -163,15 +163,16 @@ def add_blocks(world: ET.Element, blocks: Iterable[Block]) -> None:
 
 
 def add_pairs(
-    root: ET.Element, friction: Mapping[str, float], blocks: int, contact_time: float
+    root: ET.Element, friction: Mapping[str, float], grounds: Iterable[str], contact_time: float
 ) -> None:
     """Let geometries, each with its friction, slip on ground and obstacles without bouncing."""
     contact = ET.SubElement(root, 'contact')
     for name, slides in friction.items():
-        for ground in ('ground', *(f'block:{k}' for k in range(blocks))):
+        for ground in grounds:
             ET.SubElement(
                 contact,
                 'pair',
+                name=f'{name}:{ground}',
                 geom1=name,
                 geom2=ground,
                 condim='3',

@@ -72,7 +72,8 @@ class Vehicle:
     """A compiled MuJoCo model with the indices of its parts; joints as in `robot.joint_names`.
 
     `model` is an mujoco.MjModel. `position`, `rate` and `motor` index qpos, qvel and ctrl; `wheels`
-    are the driven wheels, each with its index of ctrl. `payload` is the load's body, -1 without.
+    are the driven wheels, each with its index of ctrl. `payload` is the load's body, -1 without;
+    `casters` are the contact pairs of what rolls along.
     """
 
     robot: Robot
@@ -84,12 +85,14 @@ class Vehicle:
     wheels: tuple[tuple[int, Roller], ...]
     root: int
     payload: int
+    casters: tuple[int, ...] = ()
 
 
 def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
     """Return the MuJoCo model of a robot, standing level on the lowest of its contacts."""
     model = mujoco.MjModel.from_xml_string(mjcf_of(robot, build))
     joints = [model.joint(name) for name in robot.joint_names]
+    casters = casters_of(robot) if build.wheels else ()
     motors = [model.actuator(name).id for name in robot.joint_names] if build.motors else []
     vehicle = Vehicle(
         robot,
@@ -101,6 +104,7 @@ def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
         tuple((model.actuator(r.name).id, r) for r in _rollers(robot, build)),
         model.body(body_name(robot.root)).id,
         -1 if robot.payload_link is None else model.body('payload').id,
+        tuple(model.pair(f'contact:{c.name}:{g}').id for c in casters for g in _grounds(build)),
     )
     if build.motors:
         tune(vehicle, SERVO)
@@ -156,11 +160,16 @@ def mjcf_of(robot: Robot, build: Build) -> str:
         shape.add_blocks(world, build.blocks)
     _add_bodies(world, robot, build)
     if build.wheels:
-        shape.add_pairs(root, _friction(robot, build), len(build.blocks), build.contact_time)
+        shape.add_pairs(root, _friction(robot, build), _grounds(build), build.contact_time)
     _add_mimics(root, robot)
     _add_motors(root, robot, build)
     _add_sensors(root, robot)
     return ET.tostring(root, encoding='unicode')
+
+
+def _grounds(build: Build) -> tuple[str, ...]:
+    """Return the names of the geometries that a robot stands and drives on."""
+    return ('ground', *(f'block:{k}' for k in range(len(build.blocks))))
 
 
 def _friction(robot: Robot, build: Build) -> dict[str, float]:
@@ -323,8 +332,10 @@ def _add_sensors(root: ET.Element, robot: Robot) -> None:
 
 
 def set_brakes(vehicle: Vehicle, *, on: bool) -> None:
-    """Apply the wheels' brakes or release them."""
+    """Apply the wheels' brakes or release them; casters hold as if chocked, or roll again."""
     model = vehicle.model
+    for pair in vehicle.casters:
+        model.pair_friction[pair, :2] = vehicle.build.friction if on else CASTER_FRICTION
     for k, roller in vehicle.wheels:
         joint = model.actuator_trnid[k, 0]
         model.dof_frictionloss[model.jnt_dofadr[joint]] = roller.brake if on else 0.0
