@@ -41,7 +41,7 @@ def plan(
 ) -> None:
     """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
 
-    Steps that would exceed a limit are marked for simulation only. Without --out the steps are
+    Of a robot without an arm: ramps in every direction and driving. Steps that would exceed a limit are marked for simulation only. Without --out the steps are
     just listed.
 
     \b
@@ -53,17 +53,21 @@ def plan(
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.config import load
-    from ugv_acceptance.plan.derive import Wanted, derive
+    from ugv_acceptance.cli.robot_description import warn
+    from ugv_acceptance.plan.derive import Wanted, derive, notes_of
     from ugv_acceptance.plan.plan import plan_text, read_plan
+    from ugv_acceptance.studies.axes import check_drives
 
     loaded = load(config)
     outputs = [Output('--out', out, kinds.PLAN), Output('--card', card, kinds.CARD)]
     check_outputs(outputs, inputs_of(loaded, plan=existing), overwrite=overwrite)
+    check_drives(loaded.settings.robot, 'plan')
     if existing is not None:
         made = read_plan(existing, loaded.settings.robot)
     else:
         wanted = Wanted(_ramp(tilt), points=points, endurance=hours * 3600.0, short=short)
         made = derive(loaded, wanted)
+        warn(f'{loaded.name}: {note}' for note in notes_of(loaded))
     _print(made)
     if out is not None:
         write_text(out, plan_text(made))

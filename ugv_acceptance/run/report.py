@@ -11,7 +11,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.maps import safe_maps
 from ugv_acceptance.plan.plan import Plan
-from ugv_acceptance.plan.search import STEP_DEG, Arm, roles_of
+from ugv_acceptance.plan.search import STEP_DEG, Arm
 from ugv_acceptance.run.step_verdict import Seen
 from ugv_acceptance.type_aliases import Floats
 
@@ -32,7 +32,7 @@ held on level ground with that load; H: home.</p>
 
 def html_of(text: str, plan: Plan, config: Config, coverage: Mapping[str, Any]) -> str:
     """Return a run's report as one HTML page: its text and the maps with the visited cells."""
-    arm = Arm(config.settings, roles_of(config.settings))
+    arm = Arm(config.settings)
     figures = [
         f'<figure>{m["svg"]}<figcaption>{escape(m["caption"])}</figcaption></figure>'
         for m in safe_maps(arm, plan, coverage['visited_deg'])
@@ -111,15 +111,15 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     are the closest approaches to the torque limit of each joint (a share of it) and to the tilt
     limit on each of SIDES (deg); None on a side the run was never on.
     """
-    arm = Arm(config.settings, roles_of(config.settings))
-    axes = [arm.robot.joint_names.index(name) for name in arm.roles.axes]
-    reachable = cells(arm.grid[:, axes])
+    arm = Arm(config.settings)
+    axes = arm.columns
+    reachable = cells(arm.grid[:, axes]) if axes else set()
     visited: set[tuple[int, int]] = set()
     names = arm.robot.joint_names
     use, tilt = [np.empty((0, len(names)))], [np.empty((0, len(SIDES)))]
     for one in seen:
         _, q, used, left = one.joined()
-        visited |= cells(q[:, axes])
+        visited |= cells(q[:, axes]) if axes else set()
         use.append(used)
         tilt.append(left)
     limits = config.settings.limits
@@ -131,7 +131,7 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     limited = [(n, k) for k, n in enumerate(names) if math.isfinite(limits.torque[k])]
     return {
         'cell_deg': STEP_DEG,
-        'joints': list(arm.roles.axes),
+        'joints': list(arm.varied),
         'cells_reachable': len(reachable),
         'cells_visited': len(visited & reachable),
         'share': round(len(visited & reachable) / max(len(reachable), 1), 4),
