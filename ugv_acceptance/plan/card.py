@@ -14,7 +14,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WAR
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.plan.derive import notes_of
-from ugv_acceptance.plan.maps import safe_maps
+from ugv_acceptance.plan.maps import safe_maps, standing_words
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
 from ugv_acceptance.plan.search import Arm
@@ -134,16 +134,6 @@ def card_of(plan: Plan, config: Config) -> str:
         standing=standing_words(arm),
         notes=notes_of(config),
     )
-
-
-def standing_words(arm: Arm) -> str:
-    """Return how the joints stand that the safe map does not vary."""
-    turret = 'turret ahead' if arm.turret_joint is not None else ''
-    others = sorted({*arm.robot.joint_names} - {*arm.varied, *arm.roles.flippers})
-    rest = 'the other joints at rest' if len(others) > bool(turret) else ''
-    flippers = 'flippers folded' if arm.roles.flippers else ''
-    words = ', '.join(word for word in (turret, flippers, rest, 'level ground') if word)
-    return words[0].upper() + words[1:]
 
 
 def _first(plan: Plan, group: str) -> int:

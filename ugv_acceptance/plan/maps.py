@@ -47,6 +47,16 @@ def safe_maps(
     return maps
 
 
+def standing_words(arm: Arm) -> str:
+    """Return how the joints stand that the safe map does not vary."""
+    turret = 'turret ahead' if arm.turret_joint is not None else ''
+    others = sorted({*arm.robot.joint_names} - {*arm.varied, *arm.roles.flippers})
+    rest = 'the other joints at rest' if len(others) > bool(turret) else ''
+    flippers = 'flippers folded' if arm.roles.flippers else ''
+    words = ', '.join(word for word in (turret, flippers, rest, 'level ground') if word)
+    return words[0].upper() + words[1:]
+
+
 def _axis(joint: Joint) -> Floats:
     """Return the positions (n,) in rad of a joint along a map: its range, one turn at most."""
     low, high = (math.degrees(end) for end in (joint.lower, joint.upper))

@@ -24,7 +24,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.plan.motions import hitch_of
 from ugv_acceptance.run.simulated_robot import VirtualRobot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
@@ -103,8 +103,9 @@ class Offline:
         """Begin to record all messages into a new folder."""
         self.bag = BagWriter(folder, simulated=True)
         sensor = Qos(reliability='best_effort')
-        for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
-            self.bag.add_topic(topic, kind, qos)
+        for source, topic in self._topics().items():
+            kind = self.config.topics.used[source].type
+            self.bag.add_topic(topic, kind, Qos() if source == 'payload' else sensor)
         self.bag.flush()  # from now on it can be read, whatever happens
 
     def stop_recording(self) -> None:
@@ -113,19 +114,17 @@ class Offline:
         if bag is not None:
             bag.close()
 
-    def _topics(self) -> tuple[tuple[str, str], ...]:
-        topics = self.config.topics
-        return (
-            (_absolute(topics.joint_states.name), 'sensor_msgs/msg/JointState'),
-            (_absolute(topics.imu.name), 'sensor_msgs/msg/Imu'),
-            (_absolute(topics.payload.name), 'geometry_msgs/msg/InertiaStamped'),
-        )
+    def _topics(self) -> dict[str, str]:
+        """Return the names of the topics that the robot has, by what they tell."""
+        return {k: _absolute(topic.name) for k, topic in self.config.topics.used.items()}
 
     # The monitor
 
     def _receive(self, source: str, data: bytes) -> None:
         now, evaluator = self.stamp(), self.evaluator
-        topic = self._topics()[0 if source == 'joint_states' else 1][0]
+        topic = self._topics().get(source)
+        if topic is None:
+            return
         if self.bag is not None:
             self.bag.write(topic, now, data)
         try:
@@ -156,7 +155,7 @@ class Offline:
         topics, cog = self.config.topics, self.config.settings.robot.payload.cog
         frame, now = topics.payload.frame_id or '', self.stamp()
         if self.bag is not None:
-            self.bag.write(self._topics()[2][0], now, inertia_cdr(now, frame, mass, cog))
+            self.bag.write(self._topics()['payload'], now, inertia_cdr(now, frame, mass, cog))
         self.evaluator.carry(now, mass, cog, frame)
 
     def stand_on(self, kind: str | None) -> None:
@@ -211,7 +210,7 @@ class OfflineCommands:
 
     def pull(self, force: float) -> None:
         """Pull backwards at the hitch (N) until told otherwise."""
-        self.world.virtual.pull(force, HITCH)
+        self.world.virtual.pull(force, hitch_of(self.world.config.settings.robot))
 
     def stand_up(self) -> None:
         """Reset the robot to its start: on level ground, the gripper empty."""

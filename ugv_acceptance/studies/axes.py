@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.roles import ARM_ALONE, LEGGED, NONE, roles_of
+from ugv_acceptance.studies.bilinear import why_not_alone
 
 # What every robot has, whatever it stands on.
 FOR_ALL = 'model, evaluate, monitor and console are for every robot'
@@ -25,16 +26,15 @@ def arm_axes(robot: Robot) -> tuple[str, ...]:
 def map_axes(robot: Robot, limits: Sequence[float]) -> tuple[str, ...]:
     """Return the two joints of a map: of the arm, else others, those with a limit first.
 
-    `limits` (j,) are the torque limits. Wheels are left out; fewer than two where there are no
-    more joints.
+    `limits` (j,) are the torque limits. Left out are wheels, joints of legs, and those that a map
+    cannot vary alone (bilinear.py); fewer than two where there are no more joints.
     """
-    found = arm_axes(robot)
-    if found:
-        return found
-    wheels = roles_of(robot).wheels
+    roles, first = roles_of(robot), arm_axes(robot)
     pairs = zip(robot.joint_names, limits, strict=True)
-    others = [(not math.isfinite(limit), name) for name, limit in pairs if name not in wheels]
-    return tuple(name for _, name in sorted(others, key=lambda pair: pair[0])[:2])
+    left = {*roles.wheels, *roles.legs, *first}
+    others = [(not math.isfinite(limit), name) for name, limit in pairs if name not in left]
+    names = (*first, *(name for _, name in sorted(others, key=lambda pair: pair[0])))
+    return tuple(name for name in names if not why_not_alone(robot, name))[:2]
 
 
 def check_stands_still(robot: Robot, verb: str) -> None:
