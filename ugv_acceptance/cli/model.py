@@ -221,7 +221,10 @@ def model(
     config: ConfigFile = None,
     urdf: UrdfFile = None,
     posture: Annotated[
-        str, typer.Option(help='Posture: joint=30deg,...; joints left out are at 0.')
+        str,
+        typer.Option(
+            help='Posture: joint=30deg,...; joints left out are at 0, or amid a range without it.'
+        ),
     ] = '',
     tilt: Annotated[
         str,

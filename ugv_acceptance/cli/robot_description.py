@@ -28,6 +28,7 @@ from ugv_acceptance.model.stability import (
 )
 from ugv_acceptance.model.statics import payload_capacity
 from ugv_acceptance.report.format import number_text
+from ugv_acceptance.studies.postures import rest_posture
 
 VERSION = 1
 
@@ -79,8 +80,11 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
 
 
 def posture_from(robot: Robot, text: str) -> list[float]:
-    """Return joint positions (rad, m) from 'joint=30deg,...'; those left out are at 0."""
-    q = dict.fromkeys(robot.joint_names, 0.0)
+    """Return joint positions (rad, m) from 'joint=30deg,...'; those left out are at rest.
+
+    At rest is 0, or the middle of a range without it.
+    """
+    q = dict(zip(robot.joint_names, rest_posture(robot).tolist(), strict=True))
     for name, value in _pairs(text, '--posture'):
         if name not in q:
             known = ', '.join(q) or 'none'
