@@ -94,15 +94,15 @@ def record(config: Config, folder: Path) -> None:
     up = mounting.T @ (0.0, 0.0, robot.gravity)
     rng = np.random.default_rng(1)
     with BagWriter(folder) as bag:
-        for topic, kind in ((topics.joint_states, 'JointState'), (topics.imu, 'Imu')):
-            if topic is not None:
-                bag.add_topic(f'/{topic.name.lstrip("/")}', f'sensor_msgs/msg/{kind}')
+        for topic in (topics.joint_states, topics.imu):
+            if topic.used:
+                bag.add_topic(f'/{topic.name.lstrip("/")}', topic.type)
         for time in np.arange(0.0, SECONDS, PERIOD).tolist():
             stamp = START + round(time * 1e9)
-            if topics.joint_states is not None:
+            if topics.joint_states.used:
                 data = joint_state_cdr(stamp, '', names, told, [0.0] * len(names))
                 bag.write(f'/{topics.joint_states.name.lstrip("/")}', stamp, data)
-            if topics.imu is not None:
+            if topics.imu.used:
                 rate, force = rng.normal(0.0, 1e-3, 3), up + rng.normal(0.0, 1e-2, 3)
                 frame = topics.imu.frame_id or 'imu_link'
                 data = imu_cdr(stamp, frame, turned, rate, force)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 # Columns of the table where the output is no terminal.
 _WIDE = 160
+# Letters of a step's id in one line of the table.
+_ID = 72
 
 
 def plan(
@@ -99,8 +101,11 @@ def _print(made: 'Plan') -> None:
     from ugv_acceptance.report.format import time_text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2))
-    for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
-        table.add_column(heading, no_wrap=heading == 'step')
+    # Longer ids, of joints with long names, are folded before they push the rest off the table.
+    long = max(len(step.id) for step in made.steps) > _ID
+    table.add_column('step', no_wrap=not long, overflow='fold', max_width=_ID if long else None)
+    for heading in ('where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
+        table.add_column(heading)
     for step in made.steps:
         use, tilt = step.expected.get('use'), step.expected.get('tilt_left_deg')
         table.add_row(
