@@ -128,17 +128,18 @@ def _still(robot: Robot) -> Tree:
     return tree_of(replace(robot, joint_names=(), mimics=(), laws=()))
 
 
-def _axis(robot: Robot, joint: Joint) -> Vector:
+def direction_of(robot: Robot, joint: Joint) -> Vector:
+    """Return the axis of a joint in the zero posture, a unit vector in `base_link`."""
     x, y, z = (np.array(_still(robot).frames[joint.child][1]) @ np.array(joint.axis)).tolist()
     return x, y, z
 
 
 def _upright(robot: Robot, joint: Joint) -> bool:
-    return not joint.slides and abs(_axis(robot, joint)[2]) > UPRIGHT
+    return not joint.slides and abs(direction_of(robot, joint)[2]) > UPRIGHT
 
 
 def _across(robot: Robot, joint: Joint) -> bool:
-    return not joint.slides and abs(_axis(robot, joint)[2]) < ACROSS
+    return not joint.slides and abs(direction_of(robot, joint)[2]) < ACROSS
 
 
 def _chain(robot: Robot, link: str | None) -> tuple[str, ...]:
@@ -162,7 +163,7 @@ def _wheel(robot: Robot, joint: Joint) -> Wheel | None:
     if any(j.parent in links and j.kind != 'fixed' for j in robot.joints):
         return None
     x, y, z = place_of(robot, joint.child, (0.0, 0.0, 0.0)).tolist()
-    return Wheel(joint.name, joint.parent, (x, y, z), _axis(robot, joint))
+    return Wheel(joint.name, joint.parent, (x, y, z), direction_of(robot, joint))
 
 
 def _away(robot: Robot, wheel: Wheel, contact: Contact) -> tuple[float, float, float]:
@@ -219,7 +220,7 @@ def _axes(robot: Robot, arm: Sequence[str]) -> tuple[str, ...]:
 
 def _moment(robot: Robot, joint: Joint) -> float:
     """Return the moment (kg m) about a joint if all it carries lay to one side of its axis."""
-    at, axis = place_of(robot, joint.child, (0.0, 0.0, 0.0)), np.array(_axis(robot, joint))
+    at, axis = place_of(robot, joint.child, (0.0, 0.0, 0.0)), np.array(direction_of(robot, joint))
     links = _carried(robot, joint)
     parts = [(link.mass, link.name, link.cog) for link in robot.links if link.name in links]
     if robot.payload_link in links:

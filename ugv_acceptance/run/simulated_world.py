@@ -17,7 +17,7 @@ from ugv_acceptance.bag.cdr import (
     joint_state_decoder,
 )
 from ugv_acceptance.bag.encode import inertia_cdr
-from ugv_acceptance.bag.writer import BagWriter, Qos
+from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
@@ -25,6 +25,8 @@ from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.plan.motions import hitch_of
+from ugv_acceptance.run.messages import TYPES, topics_of
+from ugv_acceptance.run.record import QOS
 from ugv_acceptance.run.simulated_robot import VirtualRobot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
@@ -102,10 +104,8 @@ class Offline:
     def record(self, folder: Path) -> None:
         """Begin to record all messages into a new folder."""
         self.bag = BagWriter(folder, simulated=True)
-        sensor = Qos(reliability='best_effort')
         for source, topic in self._topics().items():
-            kind = self.config.topics.used[source].type
-            self.bag.add_topic(topic, kind, Qos() if source == 'payload' else sensor)
+            self.bag.add_topic(topic, TYPES[source], QOS[source])
         self.bag.flush()  # from now on it can be read, whatever happens
 
     def stop_recording(self) -> None:
@@ -115,17 +115,14 @@ class Offline:
             bag.close()
 
     def _topics(self) -> dict[str, str]:
-        """Return the names of the topics that the robot has, by what they tell."""
-        return {k: _absolute(topic.name) for k, topic in self.config.topics.used.items()}
+        return topics_of(self.config)
 
     # The monitor
 
     def _receive(self, source: str, data: bytes) -> None:
         now, evaluator = self.stamp(), self.evaluator
         topic = self._topics().get(source)
-        if topic is None:
-            return
-        if self.bag is not None:
+        if self.bag is not None and topic is not None:
             self.bag.write(topic, now, data)
         try:
             if source == 'joint_states':
@@ -154,8 +151,8 @@ class Offline:
         """Declare a load (kg) to the evaluation, as to the monitor, and record it."""
         topics, cog = self.config.topics, self.config.settings.robot.payload.cog
         frame, now = topics.payload.frame_id or '', self.stamp()
-        if self.bag is not None:
-            self.bag.write(self._topics()['payload'], now, inertia_cdr(now, frame, mass, cog))
+        if self.bag is not None and (topic := self._topics().get('payload')) is not None:
+            self.bag.write(topic, now, inertia_cdr(now, frame, mass, cog))
         self.evaluator.carry(now, mass, cog, frame)
 
     def stand_on(self, kind: str | None) -> None:
@@ -215,10 +212,6 @@ class OfflineCommands:
     def stand_up(self) -> None:
         """Reset the robot to its start: on level ground, the gripper empty."""
         self.world.virtual.remote.reset()
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith('/') else f'/{name}'
 
 
 def _key(alert: Alert) -> tuple[str, str, str]:
