@@ -164,3 +164,15 @@ def test_long_names_leave_a_map_its_room(long_names: Path, tmp_path: Path) -> No
     out = tmp_path / 'map.svg'
     done = ugv('map', 'rollover', '-c', long_names, '--steps', '21', '--out', out)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_short_plan_of_a_rover_runs_on_a_simulated_one(tmp_path: Path) -> None:
+    """It drives, is tilted and judged by its IMU alone; no map of an arm is spoken of."""
+    out = tmp_path / 'run'
+    done = ugv('run', '--sim', '--fast', '-c', rover(tmp_path), '--out', out)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((out / 'result.json').read_text())
+    assert [step['verdict'] for step in result['steps']] == ['PASS', 'PASS']
+    text = (out / 'report.txt').read_text() + (out / 'report.html').read_text()
+    assert 'failure map' not in text
+    assert 'turret' not in text.lower()

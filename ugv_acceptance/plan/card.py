@@ -9,7 +9,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.messages import ALERTS, level_words, pattern_words
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, advice, level_words, pattern_words
+from ugv_acceptance.evaluation.alerts.robot_words import of_robot
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.model.robot import Robot
@@ -125,7 +126,10 @@ def card_of(plan: Plan, config: Config) -> str:
         version=__version__,
         groups=groups,
         levels=[(level_words(level), text, do) for level, text, do in LEVELS],
-        meanings=[(code, ALERTS[code].meaning, ALERTS[code].to_do) for code in SHOWN],
+        meanings=[
+            (code, of_robot(ALERTS[code].meaning, arm.robot), advice(code, arm.robot))
+            for code in SHOWN
+        ],
         maps=safe_maps(arm, plan),
         ground=ground_words(config.settings.ground.kind),
         length=time_text(duration(plan), digits=2),

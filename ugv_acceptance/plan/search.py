@@ -125,7 +125,9 @@ class Arm:
         assert self._turret is not None  # noqa: S101 - asked for a turret only
         joint = self.robot.joint(self.robot.joint_names[self._turret])
         origin = place_of(self.robot, joint.child, (0.0, 0.0, 0.0))
-        sign = math.copysign(1.0, float((place_of(self.robot, joint.child, joint.axis) - origin)[2]))
+        sign = math.copysign(
+            1.0, float((place_of(self.robot, joint.child, joint.axis) - origin)[2])
+        )
         rest = rest_posture(self.robot)
         hand = self.points(self._every(rest))[..., len(self.ends), :2] - origin[:2]
         reach = np.linalg.norm(hand, axis=-1)

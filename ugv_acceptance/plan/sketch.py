@@ -30,9 +30,7 @@ def sketch(arm: Arm, q: Floats, step: Step) -> str:
     axis = 1 if aside else 0
     sign = -1.0 if aside else 1.0
     ground = arm.robot.ground
-    points = [
-        (sign * float(p[axis]) / size, (float(p[2]) - ground) / size) for p in arm.chain(q)
-    ]
+    points = [(sign * float(p[axis]) / size, (float(p[2]) - ground) / size) for p in arm.chain(q)]
     ends = (arm.feet[:, axis].min(), arm.feet[:, axis].max())
     low, high = sorted(sign * float(f) / size for f in ends)
     lean = _lean(step, aside=aside)

@@ -11,9 +11,7 @@ from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
 
 # The stop rule of a step that a robot survives; of a robot without an arm.
-ROVER_STOP = (
-    'stop at any DANGER or NO DATA alert that is not expected, or when anybody says stop'
-)
+ROVER_STOP = 'stop at any DANGER or NO DATA alert that is not expected, or when anybody says stop'
 SAFE_STOP = (
     'stop and freeze the arm at any DANGER or NO DATA alert that is not expected, when the posture'
     ' is not reached, or when anybody says stop'

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
-from ugv_acceptance.evaluation.alerts.robot_words import height, moving, tilt_left
+from ugv_acceptance.evaluation.alerts.robot_words import height, moving, of_robot, tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import TURNING
+from ugv_acceptance.model.robot import TURNING, Robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,7 +350,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
-    text = ALERTS[rule.code].happened
+    text = of_robot(ALERTS[rule.code].happened, robot)
     if alert.detail and '{detail}' not in text:
         text += ': {detail}'
     return text.format(
@@ -389,9 +389,9 @@ def _torque(subject: str, settings: Settings) -> float:
     return settings.limits.torque[names.index(subject)] if subject in names else math.inf
 
 
-def advice(code: str) -> str:
-    """Return what to do about an alert."""
-    return ALERTS[code].to_do
+def advice(code: str, robot: Robot | None = None) -> str:
+    """Return what to do about an alert, of `robot` or of a tracked one with an arm."""
+    return of_robot(ALERTS[code].to_do, robot) if robot else ALERTS[code].to_do
 
 
 def suspect_of(code: str) -> str:
