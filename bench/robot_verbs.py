@@ -9,7 +9,6 @@ a traceback, refused in more than one line, or ended with a code that no verb ha
 """
 
 import argparse
-import math
 import os
 import select
 import subprocess

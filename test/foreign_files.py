@@ -4,7 +4,7 @@ Each function writes a URDF and a configuration into a folder and returns the co
 `prefix` stands before every name of a link or joint.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import yaml
@@ -138,20 +138,18 @@ def rover(folder: Path, *, prefix: str = '') -> Path:
 def arm_alone(folder: Path) -> Path:
     """Write an arm that stands on nothing, its second lifting joint below zero only."""
     parts = tuple(
-        Part(**{**vars_of(p), 'parent': 'hull' if k == 0 else p.parent,
-                'ends': (-2.6, -0.2) if p.joint == 'mid_lift' else p.ends})
-        for k, p in enumerate(ARM)
-    )  # fmt: skip
+        replace(
+            part,
+            parent='hull' if part is ARM[0] else part.parent,
+            ends=(-2.6, -0.2) if part.joint == 'mid_lift' else part.ends,
+        )
+        for part in ARM
+    )
     urdf = urdf_of('hull', 5.0, parts)
-    joints = {p.joint: {} for p in ARM}
+    joints: dict[str, object] = {p.joint: {} for p in ARM}
     level = {'topics': {'imu': None}, 'imu': {'attitude': 'level'}}
     load = {'payload': {'link': 'claw', 'mass_kg': 1}}
     return written(folder, 'arm_alone', urdf, joints=joints, **level, **load)
-
-
-def vars_of(part: Part) -> dict[str, object]:
-    """Return the fields of a part."""
-    return {name: getattr(part, name) for name in Part.__dataclass_fields__}
 
 
 def walker(folder: Path) -> Path:

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from foreign_files import arm_alone, mobile_arm, rover, walker
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.config import Config, load
+from ugv_acceptance.report.format import short_name
 
 LONG = 'a_name_as_long_as_any_that_a_generator_of_descriptions_writes__'
 START = 1_748_854_800_000_000_000
@@ -31,7 +31,7 @@ def recorded(config: Config, folder: Path) -> Path:
             if config.topics.joint_states.used:
                 bag.write('/joint_states', at, joint_state_cdr(at, '', robot.joint_names, rest))
             if config.topics.imu.used:
-                force = (0.0, 0.0, 9.81) + rng.normal(0.0, 0.01, 3)
+                force = np.array((0.0, 0.0, 9.81)) + rng.normal(0.0, 0.01, 3)
                 rate = rng.normal(0.0, 0.001, 3)
                 bag.write('/imu/data', at, imu_cdr(at, 'imu', (0, 0, 0, 1), rate, force))
     return folder
@@ -136,9 +136,9 @@ def test_a_recording_of_a_foreign_robot_is_judged_and_shown(make: object, tmp_pa
 
 
 @pytest.fixture(scope='module')
-def long_names(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def long_names(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the configuration of a mobile arm with names of over sixty letters."""
-    yield mobile_arm(tmp_path_factory.mktemp('long'), prefix=LONG)
+    return mobile_arm(tmp_path_factory.mktemp('long'), prefix=LONG)
 
 
 @pytest.mark.parametrize('verb', ['model', 'speed', 'risk --samples 2000', 'plan --short'])
@@ -156,8 +156,6 @@ def test_long_names_leave_tables_whole(verb: str, long_names: Path) -> None:
 
 def test_long_names_leave_a_map_its_room(long_names: Path, tmp_path: Path) -> None:
     """Axes are labelled with the ends of the names, so that the map keeps its size."""
-    from ugv_acceptance.report.format import short_name
-
     name = f'{LONG}big_lift'
     assert len(short_name(name, 48)) == 48
     assert short_name(name, 48).endswith('big_lift')

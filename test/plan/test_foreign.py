@@ -1,4 +1,4 @@
-"""Plans of robots that are no PackBot: an arm of six joints on wheels, a rover, and who has none."""
+"""Plans of robots that are no PackBot: an arm of six joints on wheels, a rover, those without."""
 
 import math
 import re

@@ -43,8 +43,8 @@ def plan(
 ) -> None:
     """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
 
-    Of a robot without an arm: ramps in every direction and driving. Steps that would exceed a limit are marked for simulation only. Without --out the steps are
-    just listed.
+    Of a robot without an arm: ramps in every direction and driving. Steps that would exceed a
+    limit are marked for simulation only. Without --out the steps are just listed.
 
     \b
     Examples:
@@ -54,8 +54,8 @@ def plan(
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.cli import output_kinds as kinds
-    from ugv_acceptance.config import load
     from ugv_acceptance.cli.robot_description import warn
+    from ugv_acceptance.config import load
     from ugv_acceptance.plan.derive import Wanted, derive, notes_of
     from ugv_acceptance.plan.plan import plan_text, read_plan
     from ugv_acceptance.studies.axes import check_drives

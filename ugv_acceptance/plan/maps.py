@@ -89,14 +89,14 @@ def _drawn(
 ) -> dict[str, str]:
     marks, cells = on_it
     made = figure(7.4, 3.1)
-    names = [short_name(name.removesuffix('_joint'), 40) for name in arm.varied]
+    first, second = (short_name(name.removesuffix('_joint'), 40) for name in arm.varied)
     for k, (title, (margin, levels)) in enumerate(
         zip(('tip-over', 'motor torque'), fields, strict=True), 1
     ):
         axes = made.add_subplot(1, 2, k)
         x_deg, y_deg = (np.degrees(values) for values in axis)
         draw_regions(axes, x_deg, y_deg, margin, levels)
-        degree_axes(axes, *names)
+        degree_axes(axes, first, second)
         axes.set_title(title)
         if cells:
             x, y = (np.array(cells) + STEP_DEG / 2.0).T

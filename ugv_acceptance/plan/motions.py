@@ -111,7 +111,7 @@ def _reach(arm: Arm) -> Floats:
 
 
 def _off(along: Floats, rise: float) -> Floats:
-    """Return how far (n,) directions (n, 3) are from one that leads ahead and up by `rise` (rad)."""
+    """Return how far (n,) directions (n, 3) are from one ahead that rises by `rise` (rad)."""
     wanted = np.array((math.cos(rise), 0.0, math.sin(rise)))
     size = np.linalg.norm(along, axis=-1, keepdims=True)
     away: Floats = np.linalg.norm(along / np.maximum(size, 1e-9) - wanted, axis=-1)

@@ -172,7 +172,7 @@ class Arm:
 
     @cached_property
     def feet(self) -> Floats:
-        """The contact points (n, 3) in m, `base_link`, that no joint moves; all if there is none."""
+        """The contact points (n, 3) in m, `base_link`, that no joint moves; all if all move."""
         robot = self.robot
         points = [(c, place_of(robot, c.link, c.position)) for c in robot.contacts]
         still = [p for c, p in points if not {*chain_to(robot, c.link)} & {*robot.joint_names}]

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ugv_acceptance.model.robot import Robot
-from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.report.format import short_name
+from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.report.regions import draw_regions, figure, legend, png_of, svg_of
 from ugv_acceptance.studies.maps import CLASSES, classes
 from ugv_acceptance.type_aliases import Floats
@@ -93,9 +93,8 @@ def draw_map(scene: Scene, data: MapData, track: Floats | None = None) -> Figure
     if track is not None:
         _draw_track(axes, scene, track)
     _axis(axes, scene)
-    axes.set_title(
-        f'{short_name(robot.name, _LONGEST)}: {data.what}\n{_wrapped(assumptions(scene, data.kind))}', fontsize=9.5
-    )
+    words = _wrapped(assumptions(scene, data.kind))
+    axes.set_title(f'{short_name(robot.name, _LONGEST)}: {data.what}\n{words}', fontsize=9.5)
     more = axes.get_legend_handles_labels()[0]
     legend(made, WORDS[data.kind], more, loc='outside lower center', ncols=3)
     return made

@@ -10,7 +10,7 @@ from ugv_acceptance.type_aliases import Floats
 
 
 def rest_posture(robot: Robot) -> Floats:
-    """Return the posture (j,) with each joint at 0, in the middle of a range without it (rad, m)."""
+    """Return the posture (j,) in rad (m) with each joint at 0, or amid a range without it."""
     found = []
     for name in robot.joint_names:
         low, high = robot.joint(name).travel()

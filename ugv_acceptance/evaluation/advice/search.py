@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,8 +55,9 @@ def _upright(robot: Robot, q: Sequence[float], joint: str) -> float:
     """Return the height of a joint's axis, a unit vector in `base_link`, in a posture (j,)."""
     tree = mechanics_of(robot).tree
     pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
-    axes = {body.joint: axis for body, axis in zip(tree.bodies, pose.axis, strict=True)}
-    return float(axes[joint][2])
+    number = next(k for k, body in enumerate(tree.bodies) if body.joint == joint)
+    upright: Any = pose.axis[number][2]
+    return float(upright)
 
 
 def turn_words(amount: float, gravity: Floats) -> str:
