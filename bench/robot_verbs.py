@@ -192,9 +192,24 @@ def robots(paths: list[Path], configs: Path | None, out: Path) -> list[Robot]:
             robot.path = (configs or out) / f'{name}.yaml'
             if not robot.path.is_file():
                 robot.path = robot.folder / f'{name}.yaml'
-                robot.did['init'] = did(robot.folder, 'init', path, '-o', robot.path)
+                begin(robot, path)
         found.append(robot)
     return found
+
+
+def begin(robot: Robot, urdf: Path) -> None:
+    """Write the configuration by `init`.
+
+    Where the URDF alone does not tell what the robot stands on, a recording of its joints helps.
+    """
+    words = ('-o', robot.path, '--overwrite')
+    robot.did['init'] = did(robot.folder, 'init', urdf, *words)
+    if robot.path.is_file() and not load(robot.path).settings.robot.contacts:
+        bare = robot.folder / 'bare.yaml'
+        bare.write_text(f'robot: {{name: {robot.name}}}\nurdf: {urdf}\n', 'utf-8')
+        bag = robot.folder / 'told'
+        record(load(bare), bag)
+        robot.did['init'] = did(robot.folder, 'init', urdf, bag, *words)
 
 
 def files_of(path: Path) -> list[Path]:
