@@ -24,7 +24,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.plan.motions import hitch_of
 from ugv_acceptance.run.messages import TYPES, topics_of
 from ugv_acceptance.run.own_description import tell_robot
 from ugv_acceptance.run.record import QOS
@@ -209,7 +209,7 @@ class OfflineCommands:
 
     def pull(self, force: float) -> None:
         """Pull backwards at the hitch (N) until told otherwise."""
-        self.world.virtual.pull(force, HITCH)
+        self.world.virtual.pull(force, hitch_of(self.world.config.settings.robot))
 
     def stand_up(self) -> None:
         """Reset the robot to its start: on level ground, the gripper empty."""
