@@ -12,6 +12,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Document, Path
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
+from ugv_acceptance.config.unknown import known_of
 from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
@@ -81,6 +82,8 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
 
 def settings_from(build: Build) -> Settings:
     """Return the settings of an evaluation; BadConfig if file and URDF do not fit each other."""
+    file, unknown = known_of(build.file, build.refuse)
+    build = replace(build, file=file)
     measured = _measured(build)
     stands = on_axles(robot := _robot(build, measured), build.refuse)
     robot = replace(robot, contacts=stands.contacts)
@@ -96,6 +99,7 @@ def settings_from(build: Build) -> Settings:
         Ground(build.file.ground.kind, build.file.ground.pitch),
         tuple(name for name, section in measured.items() if section.passive),
         stands.moved,
+        unknown=unknown,
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)

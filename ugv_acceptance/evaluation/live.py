@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
-from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Signal
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Signal
 from ugv_acceptance.evaluation.alerts.tipping_watch import NOT_KNOWN as NO_TREND
 from ugv_acceptance.evaluation.chassis.motion import (
     NO_RATE,
@@ -274,11 +274,13 @@ class LiveEvaluator:
     def level(self) -> int:
         """The most severe level of the active alerts; at least STALE while margins are unknown.
 
-        On ground that is not flat also while it is not known whether the robot begins to tip.
+        On ground that is not flat also while it is not known whether the robot begins to tip; and
+        always, but for an ERROR, where the configuration says `unknown` of what margins need.
         """
         active = [alert.rule.level for alert in self.watch.active]
         known = self.margins is not None and not self.waits_for_trend
-        return max([*active, OK if known else STALE])
+        worst = max([*active, OK if known else STALE])
+        return worst if worst >= ERROR or not self.settings.unknown else STALE
 
     @property
     def carried(self) -> bool:
@@ -289,7 +291,7 @@ class LiveEvaluator:
     @property
     def waits_for_trend(self) -> bool:
         """Whether the ground is not flat, and it is not known yet if the robot begins to tip."""
-        judged = self.settings.ground.rough and not self._level
+        judged = self.settings.ground.rough and self.settings.judges_tilt
         return judged and self.watch.trend.level == NO_TREND
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
@@ -371,7 +373,7 @@ class LiveEvaluator:
                 value = -math.inf if math.isnan(value) else value  # not known is not too much
                 warn.step(now, value)
                 error.step(now, value)
-        if self._level:
+        if not self.settings.judges_tilt:
             return
         for (warn, error), angle in zip(watch.tip, angles, strict=True):
             if -angle >= warn.on or not (warn.quiet and error.quiet):

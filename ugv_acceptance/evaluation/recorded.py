@@ -365,7 +365,7 @@ class RecordedEvaluator:
             worse = with_lost(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
-        if self.settings.hears_imu:
+        if self.settings.judges_tilt:
             self._watch_stand(rows, time, lost)
         self.watch.predict_rows(rows)
 

@@ -11,6 +11,8 @@ from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
 LEVEL = 'level'
+# Keys in `Settings.unknown`; that of a joint's limit is joints.NAME.limit.
+CONTACTS, PAYLOAD_LINK = 'contacts', 'payload.link'
 # The times in which the hand may touch the ground, if it always may.
 ALWAYS = ((0.0, float('inf')),)
 
@@ -110,7 +112,8 @@ class Settings:
     or a stop holds: their limits are infinite. `moved_contacts` says of contact points that the
     file puts on a wheel what they are taken for. `hand_may_touch` are the times (from, to in s
     since the start) in which the arm may touch the ground, to pick something up: torques are not
-    known while it does.
+    known while it does. `unknown` are keys of values that the configuration does not know
+    (contacts, payload.link, joints.NAME.limit): what hangs on them is not checked, nothing passes.
     """
 
     robot: Robot
@@ -124,6 +127,7 @@ class Settings:
     passive: tuple[str, ...] = ()
     moved_contacts: tuple[str, ...] = ()
     hand_may_touch: tuple[tuple[float, float], ...] = ()
+    unknown: tuple[str, ...] = ()
 
     @property
     def hears_joints(self) -> bool:
@@ -134,3 +138,8 @@ class Settings:
     def hears_imu(self) -> bool:
         """Whether margins need an IMU: not where the base was declared level."""
         return self.imu.attitude != LEVEL
+
+    @property
+    def judges_tilt(self) -> bool:
+        """Whether tip-over is judged: with an IMU, where it is known on what the robot stands."""
+        return self.hears_imu and CONTACTS not in self.unknown
