@@ -85,7 +85,11 @@ class Mounting:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """All that was derived for one robot, before and after questions were answered."""
+    """All that was derived for one robot, before and after questions were answered.
+
+    `scales` (kg) is what the robot weighs on scales; None: nobody weighed it. `open` are the
+    questions (keys of questions.py) that nobody answered: what hangs on them is written `unknown`.
+    """
 
     name: str
     urdf: Urdf
@@ -97,3 +101,5 @@ class Draft:
     mounting: Mounting
     payload_link: Derived[str]
     mass: Derived[float]
+    scales: float | None = None
+    open: frozenset[str] = frozenset()
