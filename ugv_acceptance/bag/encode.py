@@ -1,4 +1,4 @@
-"""Encodes JointState, Imu and InertiaStamped messages as CDR, without ROS."""
+"""Encodes JointState, Imu, InertiaStamped and String messages as CDR, without ROS."""
 
 import struct
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ Numbers: TypeAlias = Sequence[float] | NDArray[np.float64]
 
 _NS = 1_000_000_000
 _STAMP = struct.Struct('<iI')
+_HEAD = b'\x00\x01\x00\x00'  # plain CDR, little endian
 
 
 def joint_state_cdr(
@@ -90,10 +91,17 @@ def inertia_cdr(
     return bytes(out)
 
 
+def string_message(text: str) -> bytes:
+    """Encode a std_msgs/String, such as a robot's URDF on /robot_description."""
+    out = bytearray(_HEAD)
+    put_text(out, text)
+    return bytes(out)
+
+
 def message_head(stamp_ns: int, frame_id: str, names: tuple[str, ...] | None = None) -> bytearray:
     """Return the start of a message: encapsulation, Header, and the names of a JointState."""
     sec, nanosec = divmod(stamp_ns, _NS)
-    out = bytearray(b'\x00\x01\x00\x00')
+    out = bytearray(_HEAD)
     out += _STAMP.pack(sec, nanosec)
     out += _texts(frame_id, names)
     return out

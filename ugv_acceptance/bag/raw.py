@@ -71,7 +71,8 @@ def _mcap(member: Member, wanted: set[str]) -> Iterator[Logged]:
     index: Any = member.index
     channels = {c.id: c.topic for c in index.channels.values() if c.topic in wanted}
     buffers, held = Buffers(), list[tuple[int, int, Logged]]()
-    pieces = sorted(index.pieces, key=lambda piece: piece.first)
+    held_in = [p for p in index.pieces if p.indexes is None or channels.keys() & p.indexes]
+    pieces = sorted(held_in, key=lambda piece: piece.first)
     with member.content.open('rb') as file:
         for k, piece in enumerate(pieces):
             held += _piece(file.fileno(), piece, buffers, channels)

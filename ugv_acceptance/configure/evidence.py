@@ -57,7 +57,9 @@ class StaticTransform:
 class Evidence:
     """What was seen of a robot: `where` is the recording's path, or 'live'.
 
-    `urdf` is the text of /robot_description. `joint_states` and `imus` are of the topics that fit.
+    `urdf` is the text of /robot_description. `joints` are those of the topic `joint_states`, which
+    fits the URDF best; `rivals` are the topics that fit as well. `imus` are all IMUs, one a topic
+    and frame.
     """
 
     where: str
@@ -68,3 +70,4 @@ class Evidence:
     joints: tuple[SeenJoint, ...] = ()
     imus: tuple[SeenImu, ...] = ()
     doubts: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()

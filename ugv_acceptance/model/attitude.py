@@ -92,6 +92,15 @@ def up_from_acceleration(x: Values, y: Values, z: Values, mounting: Matrix) -> t
     return ux, uy, uz
 
 
+def rotation_of(x: float, y: float, z: float, w: float) -> Matrix:
+    """Return the rotation matrix of a unit quaternion."""
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )
+
+
 def angle_between(a: Sequence[Any], b: Sequence[Any]) -> Values:
     """Return the angle (rad) between two vectors, exact for small and for flat angles."""
     (angle,) = _angle_kernel().run(*a, *b)
