@@ -62,18 +62,25 @@ class DerivedJoint:
 
 @dataclass(frozen=True, slots=True)
 class Joints:
-    """The measured joints, and those held at a position (rad, m), each with its source."""
+    """The measured joints, and those held at a position (rad, m), each with its source.
+
+    `question` is empty, or what a person has to say before names and topic can be used.
+    """
 
     measured: tuple[DerivedJoint, ...]
     held: tuple[tuple[str, Derived[float]], ...]
     topic: Derived[str]
     prefix: str = ''
     remarks: tuple[str, ...] = ()
+    question: str = ''
 
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """The IMU's topic, frame, place (m, root link) and how its axes are turned into the root's."""
+    """The IMU's topic, frame, place (m, root link) and how its axes are turned into the root's.
+
+    `joints` move the link it is on: place and rotation hold in the posture at rest alone.
+    """
 
     topic: Derived[str]
     frame: str
@@ -81,6 +88,7 @@ class Mounting:
     rotation: Derived[Matrix]
     question: str = ''
     remarks: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

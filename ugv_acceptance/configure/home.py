@@ -1,13 +1,10 @@
-"""The posture from which a robot is described, and the link that carries its load."""
+"""The link that carries the load of a robot, found in its tree; postures as plain numbers."""
 
-import math
 import re
 from collections.abc import Mapping
 
-from ugv_acceptance.config.urdf import Urdf
-from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Derived, Joints
-from ugv_acceptance.configure.evidence import Evidence
-from ugv_acceptance.model.robot import Joint, Robot
+from ugv_acceptance.configure.draft import ASK, CHECK, Derived
+from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.roles import chain_to, roles_of
 
 # Names of links that carry loads, best first: they only decide between links of one body.
@@ -17,39 +14,6 @@ _NAMES = tuple(
 )
 # A gripper's fingers have so many joints each at most.
 _PHALANGES = 3
-
-
-def home_posture(
-    urdf: Urdf, joints: Joints, evidence: Evidence | None
-) -> dict[str, Derived[float]]:
-    """Return the position (rad, m) of every movable joint from which the robot is described.
-
-    Of measured joints that at rest in the recording, of others where they are held; else 0, or the
-    middle of the range where 0 is outside of it. Joints that follow others are left out.
-    """
-    seen = {joint.topic_name: joint.at_rest for joint in evidence.joints} if evidence else {}
-    told = {joint.name: seen.get(joint.topic_name, math.nan) for joint in joints.measured}
-    held = dict(joints.held)
-    follows = {mimic.joint for mimic in urdf.mimics}
-    found: dict[str, Derived[float]] = {}
-    for joint in urdf.joints:
-        if joint.kind == 'fixed' or joint.name in follows:
-            continue
-        at = told.get(joint.name, math.nan)
-        if evidence is not None and math.isfinite(at):
-            found[joint.name] = Derived(at, CERTAIN, f'at rest in {evidence.where}')
-        elif joint.name in held:
-            found[joint.name] = held[joint.name]
-        else:
-            found[joint.name] = _within(joint)
-    return found
-
-
-def _within(joint: Joint) -> Derived[float]:
-    if joint.lower <= 0.0 <= joint.upper:
-        return Derived(0.0, CHECK, 'the zero posture: no recording tells another')
-    middle = (joint.lower + joint.upper) / 2.0
-    return Derived(middle, CHECK, 'the middle of its range, which does not hold 0')
 
 
 def positions(home: Mapping[str, Derived[float]]) -> dict[str, float]:

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.units import cut, quantity
+from ugv_acceptance.config.urdf import rotation_from_rpy
 from ugv_acceptance.configure.draft import (
     ASK,
     CERTAIN,
@@ -18,9 +19,13 @@ from ugv_acceptance.configure.draft import (
     DerivedJoint,
     Draft,
 )
+from ugv_acceptance.model.robot import Vector
 
-MASS, CONTACTS, TILT, LIMITS, LOAD = 'mass', 'contacts', 'tilt', 'limit', 'load-link'
+MASS, CONTACTS, TILT, IMU = 'mass', 'contacts', 'tilt', 'mounting'
+LIMITS, LOAD = 'limit', 'load-link'
 YES, NO, REAL, NOT_REAL, URDF, NONE = 'yes', 'no', 'real', 'not-real', 'urdf', 'none'
+MOUNTINGS = '--mounting ROLL,PITCH,YAW such as 180deg,-90deg,0 (or yes: as guessed; or none: no IMU)'
+NO_TILT = 'tip-over is not checked'
 # Tilt (rad) of the plane of the contact points from which a person has to say whether it is real.
 LEAST_TILT = math.radians(0.2)
 # Scales may differ so much from the URDF, as a share of it, before the unit is doubted.
@@ -48,13 +53,15 @@ class Answers:
     mass: str | None = None
     contacts: str | None = None
     tilt: str | None = None
+    mounting: str | None = None
     limits: tuple[str, ...] = ()
     load_link: str | None = None
 
 
 def questions_of(draft: Draft) -> tuple[Question, ...]:
     """Return the questions whose answers the draft does not hold, in the order of asking."""
-    asked = (_mass(draft), _contacts(draft), _tilt(draft), _limits(draft), _load(draft))
+    stands = _contacts(draft) or _tilt(draft)
+    asked = (_mass(draft), stands, _mounting(draft), _limits(draft), _load(draft))
     return tuple(question for question in asked if question is not None)
 
 
@@ -92,6 +99,17 @@ def _tilt(draft: Draft) -> Question | None:
         f'{draft_root(draft)} axes: does the robot really stand tilted like that?'
     )
     return Question(TILT, text, '--tilt real (or not-real)', NOT_REAL, 'tip-over is not checked')
+
+
+def _mounting(draft: Draft) -> Question | None:
+    mounting = draft.mounting
+    if mounting.topic.value is None and mounting.topic.grade == ASK:
+        guess = NONE if not draft.contacts.points else ''
+        text = f'Has the robot an IMU, and how is it mounted? {mounting.topic.source}'
+        return Question(IMU, text, MOUNTINGS, guess, NO_TILT)
+    if not mounting.question:
+        return None
+    return Question(IMU, mounting.question, MOUNTINGS, '', NO_TILT)
 
 
 def _limits(draft: Draft) -> Question | None:
@@ -143,7 +161,8 @@ def answered(draft: Draft, answers: Answers, anew: Anew) -> Draft:
 
     Whatever is asked and not answered stands in `open`.
     """
-    for take in (_with_mass, _with_contacts, _with_tilt, _with_limits, _with_load):
+    takes = (_with_mass, _with_contacts, _with_tilt, _with_mounting, _with_limits, _with_load)
+    for take in takes:
         draft = take(draft, answers, anew)
     return replace(draft, open=frozenset(question.key for question in questions_of(draft)))
 
@@ -210,6 +229,33 @@ def _with_tilt(draft: Draft, answers: Answers, _: Anew) -> Draft:
         return replace(draft, contacts=replace(contacts, question=words))
     points = tuple(_said(point) for point in contacts.points)
     return replace(draft, contacts=replace(contacts, points=points))
+
+
+def _with_mounting(draft: Draft, answers: Answers, _: Anew) -> Draft:
+    said, mounting = answers.mounting, draft.mounting
+    if said is None:
+        return draft
+    if said == NONE:
+        none = Derived[str](None, CERTAIN, f'{SAID}: it has no IMU')
+        return replace(draft, mounting=replace(mounting, topic=none, question=''))
+    topic = mounting.topic
+    if topic.value is None:
+        topic = Derived('imu/data', CHECK, 'the usual name: none was seen')
+    if said == YES:
+        if mounting.rotation.value is None:
+            raise BadConfig(f'--mounting {YES}: there is no guess: say {MOUNTINGS}')
+        rotation = Derived(mounting.rotation.value, CERTAIN, f'{SAID}; {mounting.rotation.source}')
+    else:
+        rotation = Derived(rotation_from_rpy(_angles(said)), CERTAIN, SAID)
+    return replace(draft, mounting=replace(mounting, topic=topic, rotation=rotation, question=''))
+
+
+def _angles(said: str) -> Vector:
+    parts = said.split(',')
+    if len(parts) != 3:
+        raise BadConfig(f'--mounting: expected roll,pitch,yaw as in {MOUNTINGS}, got {cut(said)}')
+    roll, pitch, yaw = (quantity(part, 'angle', f'--mounting {said}') for part in parts)
+    return (roll, pitch, yaw)
 
 
 def _with_limits(draft: Draft, answers: Answers, _: Anew) -> Draft:

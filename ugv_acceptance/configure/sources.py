@@ -207,12 +207,12 @@ def mesh_finder(described: Path | None, folders: Sequence[Path]) -> MeshFinder:
     around = _around(described, folders) if described else tuple(f.resolve() for f in folders)
 
     def find(name: str) -> Path | None:
-        return next((place for place in _places(name, around, described) if place.is_file()), None)
+        return next((place for place in _places(name, around) if place.is_file()), None)
 
     return find
 
 
-def _places(name: str, around: tuple[Path, ...], described: Path | None) -> Iterator[Path]:
+def _places(name: str, around: tuple[Path, ...]) -> Iterator[Path]:
     scheme, found, rest = name.partition('://')
     if not found:
         yield from (folder / name for folder in around)

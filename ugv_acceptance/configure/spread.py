@@ -73,7 +73,7 @@ def assumed_of(draft: Draft) -> list[tuple[str, str]]:
 
 
 def _assumed(draft: Draft) -> Iterator[tuple[str, str]]:
-    if draft.mass.grade != CERTAIN or SAID in draft.mass.source and draft.scales is None:
+    if draft.mass.grade != CERTAIN or draft.scales is None:
         for link in heaviest(draft.urdf)[:1]:
             yield f'{link.name}.mass', 'the sum of the URDF, nobody weighed the robot'
     for link in heaviest(draft.urdf)[:1]:

@@ -17,7 +17,7 @@ from ugv_acceptance.configure.draft import (
     DerivedJoint,
     Draft,
 )
-from ugv_acceptance.configure.questions import CONTACTS, LIMITS, LOAD, MASS, SAID, TILT
+from ugv_acceptance.configure.questions import CONTACTS, IMU, LIMITS, LOAD, MASS, SAID, TILT
 from ugv_acceptance.configure.spread import assumed_of, scaled_link, uncertain_of
 from ugv_acceptance.model.robot import Matrix, Vector
 
@@ -99,6 +99,8 @@ def _topics(draft: Draft) -> Iterator[str]:
         frame = f', frame_id: {text_of(mounting.frame)}' if mounting.frame else ''
         value = f'{{name: {text_of(mounting.topic.value)}{frame}}}'
         yield _line('imu', value, *_said(mounting.topic), 1)
+    elif IMU in draft.open:
+        yield _line('imu', '{name: imu/data}', ASK, mounting.topic.source, 1)
     else:
         yield _line('imu', 'null', *_said(mounting.topic), 1)
 
@@ -168,14 +170,13 @@ def _links(draft: Draft) -> Iterator[str]:
 def _imu(draft: Draft) -> Iterator[str]:
     mounting = draft.mounting
     turned, grade = mounting.rotation, mounting.rotation.grade
-    if mounting.topic.value is None:
+    if mounting.topic.value is None and IMU not in draft.open:
         yield _line('imu', '', CHECK, 'without an IMU tip-over is not checked')
         yield _line('attitude', 'level', CHECK, 'without an IMU: the base is declared level', 1)
         return
     yield _line('imu', '', grade, 'how the sensor sits on the robot')
-    if turned.value is None:
-        why = mounting.question or turned.source
-        yield _line('mounting', 'unknown', ASK, why, 1)
+    if turned.value is None or IMU in draft.open:
+        yield _line('mounting', 'unknown', ASK, mounting.question or mounting.topic.source, 1)
     else:
         degrees = _vector(tuple(map(math.degrees, rpy_of(turned.value))), 3)  # type: ignore[arg-type]
         yield _line('mounting_rpy_deg', degrees, *_said(turned), 1)
@@ -268,6 +269,7 @@ def open_words(draft: Draft) -> Sequence[str]:
         MASS: 'the mass is that of the URDF',
         CONTACTS: 'contacts: unknown',
         TILT: 'contacts: unknown',
+        IMU: 'imu.mounting: unknown',
         LIMITS: 'limits of joints: unknown',
         LOAD: 'payload.link: unknown',
     }

@@ -117,7 +117,6 @@ def _view(
     title, across, up, _ = view
     pick = [across, up]
     size = float((spread[1] - spread[0]).max())
-    feet = {mark.at for mark in picture.marks}
     for part in picture.parts:
         corners = outline(part.points[:, pick])
         if len(corners) > 2:
@@ -137,15 +136,15 @@ def _view(
     _imu(axes, picture, pick, _ARROW * size)
     axes.set_aspect('equal')
     axes.set(xlabel=_AXES[across], ylabel=_AXES[up])
-    axes.set_title(f'{title}{_seen(picture, up, bool(feet))}', parse_math=False)
+    axes.set_title(f'{title}{_seen(picture, up)}', parse_math=False)
     axes.set_xlim(spread[0][across], spread[1][across])
     axes.set_ylim(spread[0][up], spread[1][up])
     axes.grid(visible=True, lw=0.3, color='#dddddd')
     axes.set_axisbelow(True)
 
 
-def _seen(picture: RobotPicture, up: int, feet: bool) -> str:
-    return '' if up == 2 else f': {len(picture.marks) if feet else "no"} contact points'
+def _seen(picture: RobotPicture, up: int) -> str:
+    return '' if up == 2 else f': {len(picture.marks) or "no"} contact points'
 
 
 def _marks(axes: Axes, picture: RobotPicture, pick: Sequence[int]) -> None:

@@ -1,0 +1,216 @@
+"""The work of `ugv-acceptance init`: from sources to a draft, its checks, and files."""
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.bag.atomic_files import write_bytes, write_text
+from ugv_acceptance.cli import output_kinds as kinds
+from ugv_acceptance.cli.outputs import Input, Output, check_outputs, inputs_of
+from ugv_acceptance.config import Config, load
+from ugv_acceptance.config.urdf import Urdf, read_urdf
+from ugv_acceptance.configure.checks import Check, checks_of
+from ugv_acceptance.configure.derive import Given, contacts_of, draft_of
+from ugv_acceptance.configure.draft import Draft
+from ugv_acceptance.configure.evidence import Evidence
+from ugv_acceptance.configure.home import positions
+from ugv_acceptance.configure.joints import rest_posture
+from ugv_acceptance.configure.questions import Answers, Question, answered, ask, questions_of
+from ugv_acceptance.configure.sources import MeshFinder, Sources, mesh_finder, sources_of
+from ugv_acceptance.configure.yaml_text import yaml_of
+
+# A URDF so many folders up from the YAML is named by its absolute path.
+_UP = 3
+Prompt = Callable[[str, str], str]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What was asked for on the command line, beside the answers; `heard` (s): listen so long."""
+
+    sources: tuple[Path, ...]
+    meshes: tuple[Path, ...]
+    heard: float | None
+    arguments: Mapping[str, str]
+    picture: Path | None
+    overwrite: bool
+    say: Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What is told at the end: checks, notes, open questions, the files written."""
+
+    checks: tuple[Check, ...]
+    notes: tuple[str, ...]
+    questions: tuple[Question, ...]
+    written: tuple[Path, ...]
+    done: str
+
+
+def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) -> Found:
+    """Derive a configuration and write it; `prompt` asks a person, None: nobody is there.
+
+    Raises AcceptanceError where a source cannot be used or a file must not be replaced.
+    """
+    sources = _sources(asked)
+    evidence = _evidence(sources, asked)
+    text, made = _description(sources, evidence)
+    described = out.with_suffix('.urdf') if made else sources.path
+    assert described is not None  # noqa: S101 - a URDF that was not made has a path
+    _guard(out, described if made else None, sources, asked)
+    asked.say('looking for what carries the robot')
+    name = str(sources.path or evidence and evidence.where or described)
+    finder = mesh_finder(sources.path, asked.meshes)
+    given = Given(text, name, _shown(described, out), evidence, finder)
+    draft = _answer(given, draft_of(given), answers, prompt)
+    written = yaml_of(draft)
+    config = _loaded(written, text, out)
+    checks = checks_of(config, positions(draft.home), evidence, questions_of(draft))
+    if made:
+        write_bytes(described, text)
+    write_text(out, written)
+    files = [out, *([described] if made else [])]
+    if asked.picture is not None:
+        asked.say('drawing')
+        _draw(asked.picture, config, draft.urdf, positions(draft.home), finder, checks)
+        files.append(asked.picture)
+    notes = tuple(dict.fromkeys(_notes(draft, sources, evidence)))
+    done = f'ugv-acceptance evaluate RECORDING --config {out}'
+    return Found(checks, notes, questions_of(draft), tuple(files), done)
+
+
+def check_it(path: Path, asked: Asked) -> Found:
+    """Check a configuration, against what a recording or the running robot tells if asked for."""
+    config = load(path)
+    sources = sources_of(asked.sources)
+    if sources.path is not None:
+        raise BadConfig(f'{sources.path}: expected a recording beside --check, got a description')
+    output = Output('--picture', asked.picture, kinds.PICTURE)
+    inputs = inputs_of(config, asked.sources)
+    check_outputs([output], inputs, overwrite=asked.overwrite)
+    urdf = read_urdf(config.urdf_path.read_bytes(), str(config.urdf_path))
+    evidence = _evidence(replace(sources, urdf=config.urdf_path.read_bytes()), asked)
+    posture = positions(rest_posture(urdf, evidence))
+    checks = checks_of(config, posture, evidence)
+    if asked.picture is not None:
+        finder = mesh_finder(config.urdf_path, asked.meshes)
+        _draw(asked.picture, config, urdf, posture, finder, checks)
+    files = () if asked.picture is None else (asked.picture,)
+    return Found(checks, config.warnings, (), files, 'no check fails')
+
+
+def _sources(asked: Asked) -> Sources:
+    if not asked.sources and asked.heard is None:
+        raise BadConfig('init: expected a URDF, a xacro or a recording, or --live, got none')
+    sources = sources_of(asked.sources, asked.meshes, asked.arguments)
+    if sources.recordings and asked.heard is not None:
+        raise BadConfig(f'--live: expected no recording beside it, got {sources.recordings[0]}')
+    return sources
+
+
+def _evidence(sources: Sources, asked: Asked) -> Evidence | None:
+    urdf = None
+    if sources.urdf is not None:
+        urdf = read_urdf(sources.urdf, str(sources.path or 'the URDF'))
+    if asked.heard is not None:
+        from ugv_acceptance.nodes.robot_listener import listen
+
+        asked.say(f'listening for {asked.heard:g} s')
+        return listen(asked.heard, urdf)
+    if not sources.recordings:
+        return None
+    from ugv_acceptance.configure.recorded import evidence_of
+
+    asked.say('reading the recording')
+    return evidence_of([*sources.recordings], urdf)
+
+
+def _description(sources: Sources, evidence: Evidence | None) -> tuple[bytes, bool]:
+    """Return the text of the URDF, and whether it is in no file yet."""
+    if sources.urdf is not None:
+        return sources.urdf, sources.made
+    if evidence is not None and evidence.urdf is not None:
+        return evidence.urdf, True
+    where = evidence.where if evidence is not None else 'init'
+    raise BadConfig(f'{where}: expected /robot_description in it, found none: give its URDF too')
+
+
+def _guard(out: Path, made: Path | None, sources: Sources, asked: Asked) -> None:
+    """Refuse to write over what is read, or over files of others."""
+    inputs: list[Input] = inputs_of(None, sources.recordings)
+    if sources.path is not None:
+        inputs.append(Input('the description', sources.path))
+    outputs = [
+        Output('-o', out, kinds.CONFIGURATION),
+        Output('-o', made, kinds.DESCRIPTION),
+        Output('--picture', asked.picture, kinds.PICTURE),
+    ]
+    check_outputs(outputs, inputs, overwrite=asked.overwrite)
+
+
+def _shown(described: Path, out: Path) -> str:
+    """Return the path of a URDF as a YAML file names it."""
+    folder = out.resolve().parent
+    beside = os.path.relpath(described.resolve(), folder)
+    return str(described.resolve()) if beside.split(os.sep)[:_UP] == ['..'] * _UP else beside
+
+
+def _answer(given: Given, draft: Draft, answers: Answers, prompt: Prompt | None) -> Draft:
+    """Return the draft with the answers given, and those of a person if one is there."""
+
+    def anew(links: tuple[str, ...]) -> object:
+        return contacts_of(given, draft, links)
+
+    draft = answered(draft, answers, anew)  # type: ignore[arg-type]
+    if prompt is None:
+        return draft
+    for question in questions_of(draft):
+        said = ask(question, lambda text, of=question: prompt(text, of.guess))  # type: ignore[misc]
+        if said:
+            draft = answered(draft, Answers(**said), anew)  # type: ignore[arg-type]
+    return draft
+
+
+def _loaded(yaml: str, urdf: bytes, out: Path) -> Config:
+    """Return the configuration that a text and a URDF describe, before they are written."""
+    with tempfile.TemporaryDirectory(prefix='ugv_acceptance_init_') as folder:
+        files = Path(folder, out.name), Path(folder, 'robot.urdf')
+        files[0].write_text(yaml, 'utf-8')
+        files[1].write_bytes(urdf)
+        try:
+            return load(files[0], urdf=files[1])
+        except BadConfig as error:
+            raise BadConfig(str(error).replace(str(files[0]), str(out))) from None
+
+
+def _draw(
+    path: Path,
+    config: Config,
+    urdf: Urdf,
+    posture: Mapping[str, float],
+    finder: MeshFinder,
+    checks: tuple[Check, ...],
+) -> None:
+    from ugv_acceptance.configure.picture import picture_of
+    from ugv_acceptance.report.robot_picture import picture_html, picture_png
+
+    picture = picture_of(config, urdf, posture, finder, checks)
+    if path.suffix.lower() == '.png':
+        write_bytes(path, picture_png(picture))
+    else:
+        write_text(path, picture_html(picture))
+
+
+def _notes(draft: Draft, sources: Sources, evidence: Evidence | None) -> list[str]:
+    found = [*draft.urdf.warnings, *draft.contacts.remarks, *draft.joints.remarks]
+    found += draft.mounting.remarks
+    if evidence is not None:
+        found += evidence.doubts
+        differs = evidence.urdf is not None and sources.urdf not in {None, evidence.urdf}
+        if differs:
+            found.append(f'the URDF in {evidence.where} is another than {sources.path}')
+    return found

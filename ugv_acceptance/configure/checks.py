@@ -1,0 +1,183 @@
+"""What must be right before a configuration is done: how it stands, what is told, where the IMU is.
+
+The geometry is checked by config/setup_checks.py; here is what needs a recording, and what is open.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ugv_acceptance.config import Config
+from ugv_acceptance.configure.evidence import Evidence, SeenImu
+from ugv_acceptance.configure.imu_gravity import up_of
+from ugv_acceptance.configure.questions import Question
+from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.roles import chain_to, roles_of
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES, stability_of, stances_of
+from ugv_acceptance.model.stability import standing as stance_by
+from ugv_acceptance.type_aliases import Floats
+
+OK, FAILS, OPEN, UNSEEN = 'ok', 'FAILS', 'open', 'not seen'
+# A joint that nobody tells may carry so much of the mass, unless it is of the arm.
+SHARE = 0.05
+# Up by the IMU at rest may be so far (rad) from up by the contact points: ground is not level.
+SLOPE = math.radians(10.0)
+# Tilt left (rad) on level ground below which a centre of gravity is near the edge.
+NEAR = math.radians(5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One check: what was looked at, OK, FAILS, OPEN or UNSEEN, and why."""
+
+    what: str
+    state: str
+    text: str
+
+
+def checks_of(
+    config: Config,
+    posture: Mapping[str, float],
+    evidence: Evidence | None,
+    questions: Sequence[Question] = (),
+) -> tuple[Check, ...]:
+    """Return the checks of a configuration in a posture (rad, m), against what was seen if given.
+
+    `questions` are those that nobody answered.
+    """
+    settings = config.settings
+    found = [
+        *_stands(config, posture),
+        _told(settings, evidence),
+        _gravity(settings, evidence, config),
+        *(Check(q.key, OPEN, f'{q.text} -> {q.option}') for q in questions),
+    ]
+    said = {q.key for q in questions}
+    found += [
+        Check(key, OPEN, 'the configuration says unknown')
+        for key in settings.unknown
+        if not said or not any(key.startswith(k) or k in key for k in said)
+    ]
+    return tuple(found)
+
+
+def exit_code(checks: Sequence[Check]) -> int:
+    """Return 1 where a check fails, 3 where something is open, else 0."""
+    states = {check.state for check in checks}
+    return 1 if FAILS in states else 3 if OPEN in states else 0
+
+
+def posture_of_robot(robot: Robot, posture: Mapping[str, float]) -> list[float]:
+    """Return the positions of the measured joints in a posture, 0 where it does not say."""
+    return [posture.get(name, 0.0) for name in robot.joint_names]
+
+
+def _stands(config: Config, posture: Mapping[str, float]) -> Iterator[Check]:
+    """Yield what the geometry of the contact points says."""
+    settings = config.settings
+    if not settings.judges_tilt:
+        why = 'contacts are unknown' if settings.hears_imu else 'no IMU: tip-over is not judged'
+        yield Check('stands', OPEN if settings.hears_imu else UNSEEN, why)
+        return
+    yield _balance(settings.robot, posture)
+
+
+def _balance(robot: Robot, posture: Mapping[str, float]) -> Check:
+    """Return whether the centre of gravity is well inside the support polygon on level ground."""
+    what, mechanics = 'centre of gravity', mechanics_of(robot)
+    found = posture_of(mechanics, posture_of_robot(robot, posture))
+    gravity = (0.0, 0.0, -robot.gravity)
+    margins = stability_of(stance_by(stances_of(mechanics, found), gravity), gravity)
+    if int(margins.state) >= NO_CONTACT:
+        state = STATES[int(margins.state)].replace('_', ' ')
+        return Check(what, FAILS, f'no support polygon is under it: {state}')
+    known = [(float(a), side) for a, side in zip(margins.angle, SIDES, strict=True)]
+    least, side = min((a, side) for a, side in known if math.isfinite(a))
+    words = f'{math.degrees(least):.1f} deg of tilt left to the {side}, on level ground'
+    if least <= NEAR:
+        return Check(what, FAILS, f'outside of the support polygon, or near its edge: {words}')
+    return Check(what, OK, words)
+
+
+def _told(settings: Settings, evidence: Evidence | None) -> Check:
+    """Return whether every joint that matters is told by messages."""
+    what, robot = 'joints told', settings.robot
+    untold = _that_matter(robot)
+    if evidence is None:
+        return Check(what, UNSEEN, f'no recording: {len(robot.joint_names)} joints are to be told')
+    seen = {joint.topic_name for joint in evidence.joints}
+    missing = [
+        name
+        for name, given in zip(robot.joint_names, settings.joints, strict=True)
+        if given.topic_name not in seen
+    ]
+    if missing:
+        return Check(what, FAILS, f'{_list(missing)}: under joints, but no message tells them')
+    if untold:
+        return Check(what, FAILS, f'told by nobody, and it matters where they stand: {_list(untold)}')
+    return Check(what, OK, f'{len(robot.joint_names)} measured; held: {_list(_held(robot))}')
+
+
+def _list(names: Sequence[str]) -> str:
+    more = f' and {len(names) - 6} more' if len(names) > 6 else ''
+    return ', '.join(names[:6]) + more or 'none'
+
+
+def _held(robot: Robot) -> list[str]:
+    moves = {*robot.joint_names, *(mimic.joint for mimic in robot.mimics)}
+    return [j.name for j in robot.joints if j.kind != 'fixed' and j.name not in moves]
+
+
+def _that_matter(robot: Robot) -> list[str]:
+    """Return the held joints that carry much of the mass or are of the arm; wheels do not matter."""
+    roles, total = roles_of(robot), robot.mass
+    arm = chain_to(robot, robot.payload_link) if robot.payload_link else roles.arm
+    masses = {link.name: link.mass for link in robot.links}
+    found = []
+    for name in _held(robot):
+        if name in roles.wheels:
+            continue
+        links = [robot.joint(name).child]
+        for link in links:
+            links += [joint.child for joint in robot.joints if joint.parent == link]
+        if name in arm or math.fsum(masses[link] for link in links) > SHARE * total:
+            found.append(name)
+    return found
+
+
+def _gravity(settings: Settings, evidence: Evidence | None, config: Config) -> Check:
+    """Return whether gravity at rest, by the IMU as it is mounted, points where the robot stands."""
+    what = 'IMU against gravity'
+    if not settings.hears_imu:
+        return Check(what, UNSEEN, 'the robot has no IMU')
+    if evidence is None:
+        return Check(what, UNSEEN, 'no recording: the monitor and evaluate look at it')
+    imu = _imu_of(config, evidence)
+    if imu is None:
+        return Check(what, FAILS, f'no IMU on {config.topics.imu.name} in {evidence.where}')
+    up = up_of(imu)
+    if not up.directions:
+        return Check(what, UNSEEN, f'{imu.topic} does not tell gravity at rest')
+    turn: Floats = np.array(settings.imu.mounting)
+    lean = [_lean(turn @ np.array(direction)) for direction in up.directions]
+    worst = max(lean)
+    words = f'at rest up is {math.degrees(worst):.1f} deg off the root link'
+    if worst > SLOPE:
+        return Check(what, FAILS, f'{words}: wrong mounting, or it stood on a slope')
+    return Check(what, OK, words)
+
+
+def _lean(up: Floats) -> float:
+    return math.acos(max(-1.0, min(1.0, float(up[2]))))
+
+
+def _imu_of(config: Config, evidence: Evidence) -> SeenImu | None:
+    name = config.topics.imu.name.lstrip('/')
+    on = [imu for imu in evidence.imus if imu.topic.lstrip('/') == name]
+    frame = config.settings.imu.frame
+    named = [imu for imu in on if not frame or imu.frame.lstrip('/') == frame]
+    return (named or on or [None])[0]  # type: ignore[list-item]
