@@ -123,10 +123,8 @@ class Collector:
                 doubts.append(str(error))
         names = [] if urdf is None else [j.name for j in urdf.joints if j.kind != 'fixed']
         joints, rivals = self._joint_states(names, where, doubts)
-        told = ()
-        if joints is not None:
-            told, doubt = self._topics[joints].joints.seen()
-            doubts += [f'{joints}: {doubt}'] if doubt else []
+        told, doubt = ((), '') if joints is None else self._topics[joints].joints.seen()
+        doubts += [f'{joints}: {doubt}'] if doubt else []
         return Evidence(
             self.where,
             tuple(topic.seen(name) for name, topic in sorted(self._topics.items())),

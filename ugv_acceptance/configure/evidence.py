@@ -1,8 +1,12 @@
 """What a recording or a running robot tells beside its URDF, as plain values."""
 
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from ugv_acceptance.model.robot import Matrix, Vector
+
+# Where it was seen, if not in a recording.
+LIVE = 'live'
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,3 +75,8 @@ class Evidence:
     imus: tuple[SeenImu, ...] = ()
     doubts: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> str:
+        """Where it was seen, in short: the recording's name, or the running robot."""
+        return 'the running robot' if self.where == LIVE else PurePath(self.where).name

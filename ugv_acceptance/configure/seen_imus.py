@@ -6,13 +6,16 @@ from dataclasses import dataclass, field
 from itertools import groupby
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ugv_acceptance.bag.cdr import ImuSample
 from ugv_acceptance.configure.evidence import SeenImu
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import NORM_SLACK, rotation_of
 from ugv_acceptance.model.robot import Matrix, Vector
-from ugv_acceptance.type_aliases import Floats
+from ugv_acceptance.type_aliases import Floats, Times
+
+Mask = NDArray[np.bool_]
 
 # Messages are kept this often (ns), so many of a frame at most, of so many frames.
 _EVERY, _ROWS, _FRAMES = 10_000_000, 8000, 8
@@ -88,7 +91,7 @@ class ImusSeen:
         return tuple(found), doubts
 
 
-def _rest(time: 'np.ndarray[tuple[int], np.dtype[np.int64]]', rate: Floats) -> Floats | None:
+def _rest(time: Times, rate: Floats) -> Mask | None:
     """Return which rows (n,) are the first rest that lasts, else the longest; None: no rest."""
     number = (time - time[0]) // _WINDOW
     still = []
@@ -103,8 +106,7 @@ def _rest(time: 'np.ndarray[tuple[int], np.dtype[np.int64]]', rate: Floats) -> F
     long = [spell for spell in spells if (spell[1] - spell[0]) * _WINDOW >= _LEAST]
     first, last = long[0] if long else max(spells, key=lambda spell: spell[1] - spell[0])
     last = min(last, first + _MOST // _WINDOW)
-    rows: Floats = (number >= first) & (number < last)
-    return rows
+    return np.asarray((number >= first) & (number < last))
 
 
 def _spells(still: list[bool]) -> Iterator[tuple[int, int]]:

@@ -8,7 +8,7 @@ import numpy as np
 from ugv_acceptance.bag.cdr import JointStateSample
 from ugv_acceptance.configure.evidence import SeenJoint
 from ugv_acceptance.evaluation.effort.rests import TURNED, find_rests
-from ugv_acceptance.type_aliases import Floats
+from ugv_acceptance.type_aliases import Floats, Times
 
 # Postures are kept this often (ns), so many at most, of so many joints.
 _EVERY, _ROWS, _NAMES = 50_000_000, 4000, 500
@@ -105,7 +105,7 @@ class JointsSeen:
         return table
 
 
-def _longest_rest(time: np.ndarray[tuple[int], np.dtype[np.int64]], q: Floats) -> Floats | None:
+def _longest_rest(time: Times, q: Floats) -> Floats | None:
     """Return the median posture of the longest rest; None if there is none."""
     n, joints = q.shape
     nothing, down = np.full((n, joints), math.nan), np.tile((0.0, 0.0, -1.0), (n, 1))
