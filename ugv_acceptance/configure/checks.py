@@ -14,8 +14,8 @@ from ugv_acceptance.configure.evidence import Evidence, SeenImu
 from ugv_acceptance.configure.imu_gravity import up_of
 from ugv_acceptance.configure.questions import Question
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.mechanics import mechanics_of, posture_once
+from ugv_acceptance.model.robot import ZERO, Robot
 from ugv_acceptance.model.roles import chain_to, roles_of
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES, stability_of, stances_of
 from ugv_acceptance.model.stability import standing as stance_by
@@ -89,7 +89,7 @@ def _stands(config: Config, posture: Mapping[str, float]) -> Iterator[Check]:
 def _balance(robot: Robot, posture: Mapping[str, float]) -> Check:
     """Return whether the centre of gravity is well inside the support polygon on level ground."""
     what, mechanics = 'centre of gravity', mechanics_of(robot)
-    found = posture_of(mechanics, posture_of_robot(robot, posture))
+    found = posture_once(robot, posture_of_robot(robot, posture), 0.0, ZERO)
     gravity = (0.0, 0.0, -robot.gravity)
     margins = stability_of(stance_by(stances_of(mechanics, found), gravity), gravity)
     if int(margins.state) >= NO_CONTACT:

@@ -10,8 +10,8 @@ from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.configure.checks import FAILS, OPEN, Check, posture_of_robot
 from ugv_acceptance.configure.collision import points_of
 from ugv_acceptance.configure.sources import MeshFinder
-from ugv_acceptance.model.mechanics import mechanics_of, posture_of
-from ugv_acceptance.model.robot import Robot, Vector
+from ugv_acceptance.model.mechanics import mechanics_of, posture_once
+from ugv_acceptance.model.robot import ZERO, Robot, Vector
 from ugv_acceptance.model.stability import NO_CONTACT, stability_of, stances_of, standing
 from ugv_acceptance.model.tree import Pose, body_positions, drives_of, point_of, pose_of, tree_of
 from ugv_acceptance.report.robot_picture import Mark, Part, RobotPicture
@@ -37,7 +37,7 @@ def picture_of(
     pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
     parts = tuple(_parts(robot, urdf, pose, meshes))
     mechanics = mechanics_of(robot)
-    found = posture_of(mechanics, q)
+    found = posture_once(robot, q, 0.0, ZERO)
     gravity = (0.0, 0.0, -robot.gravity)
     stance = standing(stances_of(mechanics, found), gravity)
     margins = stability_of(stance, gravity)
