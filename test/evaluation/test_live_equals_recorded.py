@@ -32,7 +32,7 @@ from hypothesis import strategies as st
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
-from ugv_acceptance.model.robot import Vector
+from ugv_acceptance.model.robot import Joint, Link, Vector
 
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 
@@ -107,6 +107,46 @@ def test_margins_and_alerts_are_equal(
         joints = tuple(replace(joint, velocity=0.02) for joint in told.robot.joints)
         told = replace(told, robot=replace(told.robot, joints=joints))
     compare(told, messages, cuts, [T0 + t * MS for t in ticks], rest)
+
+
+@hypothesis.settings(max_examples=100)
+@given(
+    streams(),
+    st.lists(st.integers(0, 120), max_size=5),
+    st.lists(st.integers(0, 3000), max_size=20),
+    st.sampled_from(LIVE_INPUTS),
+    st.sampled_from(['base', 'arm', 'hand']),
+    st.sampled_from(['auto', 'given', 'unknown', 'told by tf']),
+    st.booleans(),
+)
+def test_a_mounting_that_is_found_and_one_that_moves_are_equal_too(
+    messages: list[Message],
+    cuts: list[int],
+    ticks: list[int],
+    attitude: str,
+    carrier: str,
+    how: str,
+    noise_free: bool,  # noqa: FBT001 - drawn
+) -> None:
+    """On the base, the arm or the slide; by its frame or by its link; with messages of no frame."""
+    turned = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
+    placed = {'told by tf': 'auto'}.get(how, how)
+    imu = ImuInput(
+        attitude=attitude, position=(0.1, 0.0, 0.2), agreement_delay=0.05, noise_free=noise_free,
+        placed=placed, link=carrier if how == 'given' else '',
+        transforms=((carrier, 'imu_link', (0.0, 0.1, 0.0), turned),) if how == 'told by tf' else (),
+    )  # fmt: skip
+    told = settings(imu, Delays(tip_on=0.02, torque_on=0.03, off=0.1))
+    if how == 'auto':
+        link = Joint('imu_joint', 'fixed', carrier, 'imu_link', (0.0, 0.1, 0.0), turned)
+        robot = told.robot
+        told = replace(
+            told,
+            robot=replace(
+                robot, links=(*robot.links, Link('imu_link')), joints=(*robot.joints, link)
+            ),
+        )
+    compare(told, messages, cuts, [T0 + t * MS for t in ticks], S)
 
 
 @hypothesis.settings(max_examples=20)

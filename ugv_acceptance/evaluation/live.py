@@ -20,6 +20,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
 from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
+from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
@@ -79,6 +80,7 @@ class LiveEvaluator:
     evaluated: int = 0
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
+    mount: ImuMount = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisMotion = field(init=False)
     ground: GroundContact = field(init=False)
@@ -95,8 +97,11 @@ class LiveEvaluator:
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self._chassis = ChassisMotion(self.settings, self.watch.chassis)
+        self.mount = ImuMount(self.settings, self.watch.placing, self.watch.attitude.motion.mounting)
+        placed = self.mount.applied(self.settings)
+        self._imu = ImuTracker(placed, self.watch.attitude)
+        self._chassis = ChassisMotion(placed, self.watch.chassis)
+        self.mount.settle = (self._imu.adopt, self._chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
@@ -189,9 +194,16 @@ class LiveEvaluator:
         if self._level:
             return self.margins
         self._arrived(1, now, stamp, self.watch.imu)
+        mount = self.mount
+        if mount.busy:
+            felt = orientation, covariance_0, omega, acceleration
+            felt = mount.one(now, frame, felt, self._joints.q, self._joints.qd)
+            orientation, covariance_0, omega, acceleration = felt
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame
         )
+        if not mount.told:
+            gravity, unusable = NOWHERE, False
         invalid = self.watch.imu.invalid
         if unusable or not invalid.quiet:
             invalid.step(now, 1.0 if unusable else 0.0)
@@ -239,7 +251,8 @@ class LiveEvaluator:
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
         self.settings = self.watch.settings = self.ground.settings = settings
-        self._imu.adopt(settings)
+        self.mount.learn(settings)
+        self._imu.adopt(self.mount.applied(settings))
         self.watch.trend.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)

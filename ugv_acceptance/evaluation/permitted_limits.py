@@ -204,7 +204,8 @@ def limits_hash(settings: Settings) -> str:
     names = settings.robot.joint_names
     for key in ('torque', 'speed'):
         limits[key] = dict(zip(names, limits[key] or (math.inf,) * len(names), strict=True))
-    for key in ('mounting', 'position', 'frame'):  # the IMU's place is not a threshold
+    # The IMU's place is not a threshold.
+    for key in ('mounting', 'position', 'frame', 'placed', 'link', 'transforms'):
         del imu[key]
     del limits['rated']
     told = {'limits': limits, 'delays': asdict(settings.delays), 'imu': imu}

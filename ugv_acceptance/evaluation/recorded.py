@@ -17,6 +17,7 @@ from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.ground_contact import GroundContact, blanked
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
+from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount, felt_by
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.inputs.joints import JointMerger
@@ -85,6 +86,7 @@ class RecordedEvaluator:
     watch: RuleSet = field(init=False)
     _mechanics: Mechanics = field(init=False)
     _joints: JointMerger = field(init=False)
+    mount: ImuMount = field(init=False)
     _imu: ImuTracker = field(init=False)
     _chassis: ChassisColumns = field(init=False)
     _ground: GroundContact = field(init=False)
@@ -102,8 +104,11 @@ class RecordedEvaluator:
         robot = self.settings.robot
         self._mechanics = mechanics_of(robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self._imu = ImuTracker(self.settings, self.watch.attitude)
-        self._chassis = ChassisColumns(ChassisMotion(self.settings, self.watch.chassis))
+        self.mount = ImuMount(self.settings, self.watch.placing, self.watch.attitude.motion.mounting)
+        placed = self.mount.applied(self.settings)
+        self._imu = ImuTracker(placed, self.watch.attitude)
+        self._chassis = ChassisColumns(ChassisMotion(placed, self.watch.chassis))
+        self.mount.settle = (self._imu.adopt, self._chassis.place)
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         self._payload = PayloadHistory(robot.payload)
@@ -166,13 +171,15 @@ class RecordedEvaluator:
         It is when an input becomes stale, unless the next batch brings a message before.
         """
         felt = batch.imu if self.settings.hears_imu else ()
-        imu = self._imu.columns(felt)
         if self.settings.hears_joints:
             joints = self._joints.merge_columns(batch.joints)
+            posed = preceded(self._carry.joints, joints) if self.mount.busy else joints
+            felt, imu = felt_by(self.mount, self._imu, felt, posed)
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
             self._watch_joints(joints, joint_limits)
             until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
+            felt, imu = felt_by(self.mount, self._imu, felt, self._carry.joints)
             joints = without_joints(imu)
             until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)

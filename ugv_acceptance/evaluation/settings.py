@@ -7,12 +7,16 @@ YAML file and validates them; they are not validated again here.
 from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.ground import NOT_ENTERED, Ground
+from ugv_acceptance.evaluation.inputs.frames import Transform
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
 LEVEL = 'level'
 # Keys in `Settings.unknown`; that of a joint's limit is joints.NAME.limit.
 CONTACTS, PAYLOAD_LINK = 'contacts', 'payload.link'
+# Where the mounting of an IMU comes from: a number in the configuration, the frame its messages
+# name, or nobody knows it.
+GIVEN, AUTO, UNKNOWN = 'given', 'auto', 'unknown'
 # The times in which the hand may touch the ground, if it always may.
 ALWAYS = ((0.0, float('inf')),)
 
@@ -35,7 +39,10 @@ class JointInput:
 class ImuInput:
     """How the IMU is mounted on the robot, and how its messages are used.
 
-    `mounting` rotates sensor axes into `base_link`, `position` is the sensor in `base_link` (m).
+    `mounting` rotates sensor axes into those of `link`, `position` is the sensor in it (m); '' is
+    the root link. If a joint moves that link, the base's attitude follows from its position. `placed`
+    is GIVEN; AUTO: by the frame of its messages, the robot's links and `transforms` (of /tf_static);
+    or UNKNOWN: no attitude is known.
     `attitude` is auto (orientation if it can be trusted, else accelerometer), orientation or
     accelerometer. With `specific_force` the accelerometer replaces gravity in every margin.
     `low_pass` (s) is the filter's time constant; `rest_acceleration` (m/s2) and `rest_rate` (rad/s)
@@ -57,6 +64,9 @@ class ImuInput:
     agreement_delay: float = 1.0
     frame: str = ''
     noise_free: bool = False
+    placed: str = GIVEN
+    link: str = ''
+    transforms: tuple[Transform, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +138,13 @@ class Settings:
     moved_contacts: tuple[str, ...] = ()
     hand_may_touch: tuple[tuple[float, float], ...] = ()
     unknown: tuple[str, ...] = ()
+    base_frame: str = ''
+    frame_prefix: str = ''
+
+    @property
+    def frame(self) -> str:
+        """The frame in which shapes are sent to viewers."""
+        return self.frame_prefix + (self.base_frame or self.robot.root)
 
     @property
     def hears_joints(self) -> bool:

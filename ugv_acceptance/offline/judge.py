@@ -18,6 +18,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 )
 from ugv_acceptance.evaluation.criteria.findings import Findings
 from ugv_acceptance.evaluation.criteria.ground_statement import GroundExamination
+from ugv_acceptance.evaluation.criteria.imu_mounting import MountExamination
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
@@ -37,6 +38,7 @@ from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.offline.evaluation import Judgement
+from ugv_acceptance.offline.recorded_transforms import with_transforms
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
@@ -82,6 +84,7 @@ def judge(
     identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
     """
     bag, topics = recording.bag, recording.chosen(imu_required=False)
+    settings = with_transforms(settings, bag)
     span = bag.start_ns, bag.end_ns
     limits = CriteriaMeasurement(default_criteria(settings), settings, *span)
     asked = CriteriaMeasurement(criteria, settings, *span) if criteria else limits
@@ -127,6 +130,7 @@ def _examinations(
     return (
         ModelCheck(settings, sources, lambda: evaluator.carrying),
         ImuExamination(evaluator.imu),
+        MountExamination(evaluator.mount, evaluator.imu),
         ChassisExamination(),
         DynamicBound(settings, limits.payloads.at),
         InputTimes(),

@@ -27,6 +27,8 @@ MARGIN_BACK = 0.01745
 SLOW, SLOW_FOR = 0.3, 2.0
 # No arm is this far (m) from the ground.
 FAR = 1e6
+# /tf_static, which may tell where the IMU is, takes so long (s) to arrive.
+UNPLACED = 2.0
 # An implausible jump is found by positions up to this (ns) before.
 LEAP_REACH = 2_000_000_000
 # A joint that moves faster than this many times its maximum speed reports another unit or joint.
@@ -70,6 +72,7 @@ class RuleSet:
     repeated: Signal = field(init=False)
     jump_signals: list[Signal] = field(init=False)
     attitude: AttitudeSignals = field(init=False)
+    placing: Signal = field(init=False)
     prediction: Prediction = field(init=False)
     slide: Signal = field(init=False)
     trend: TippingWatch = field(init=False)
@@ -108,6 +111,7 @@ class RuleSet:
         self.payload = self._fault('PAYLOAD_INVALID', 'payload', ERROR)
         self.jump_signals = [self._jump_signal(name) for name in names]
         self.attitude = self._attitude()
+        self.placing = self._fault('IMU_MOUNTING_UNKNOWN', 'imu', STALE, UNPLACED)
         self.prediction = foresight_of(self.settings, self._warning)
         self.slide = self._slide()
         self.trend = TippingWatch(self.settings, self._trend())
@@ -275,6 +279,7 @@ class RuleSet:
             of.frame, of.orientation, of.strange, of.disagreement, of.nothing, *of.motion.all()
         ]  # fmt: skip
         faults = [self.support, self.ground, self.payload, self.missing, self.repeated, *attitude]
+        faults.append(self.placing)
         return [
             *pairs,
             *self.speed,

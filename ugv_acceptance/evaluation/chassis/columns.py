@@ -43,7 +43,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
 )
 from ugv_acceptance.evaluation.margin_table import NO_CHASSIS_ROWS, ChassisRows, MarginRows
 from ugv_acceptance.evaluation.samples import ImuColumns
-from ugv_acceptance.evaluation.settings import ImuInput
+from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.edges import SIDES
 from ugv_acceptance.model.mechanics import posture_of
 from ugv_acceptance.model.row_selection import pick
@@ -86,6 +86,11 @@ class ChassisColumns:
 
     def __post_init__(self) -> None:
         self.raw = RawColumns(self.motion.filter.mounting)
+
+    def place(self, settings: Settings) -> None:
+        """Take settings with another place of the IMU."""
+        self.motion.place(settings)
+        self.raw.mounting = self.motion.filter.mounting
 
     def take(
         self, segments: Sequence[ImuColumns], rows: MarginRows, load: Sequence[Any], lost: Lost

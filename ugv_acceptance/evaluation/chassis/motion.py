@@ -159,10 +159,15 @@ class ChassisMotion:
     _inertia: tuple[Pose | None, Four] = (None, ())
 
     def __post_init__(self) -> None:
-        imu, robot = self.settings.imu, self.settings.robot
-        self.mechanics = mechanics_of(robot)
-        mounting = IDENTITY if imu.mounting == IDENTITY else imu.mounting
-        self.filter = ChassisFilter(mounting, reach_of(self.mechanics, imu.position))
+        self.mechanics = mechanics_of(self.settings.robot)
+        self.filter = ChassisFilter(IDENTITY, 0.0)
+        self.place(self.settings)
+
+    def place(self, settings: Settings) -> None:
+        """Take settings with another place of the IMU."""
+        self.settings, imu = settings, settings.imu
+        self.filter.mounting = IDENTITY if imu.mounting == IDENTITY else imu.mounting
+        self.filter.reach = reach_of(self.mechanics, imu.position)
 
     def step(
         self,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.inputs.imu_cell import BODY, ORIENTED, SECONDS, SQUARE
 from ugv_acceptance.evaluation.inputs.imu_grid import QUATERNION, TIME, ImuGrid
-from ugv_acceptance.evaluation.settings import ImuInput
+from ugv_acceptance.evaluation.settings import GIVEN, ImuInput
 from ugv_acceptance.model.robot import Vector
 
 # Rows of the grid over which unit and lean are averaged (2 s), and the parts of it (0.5 s).
@@ -89,6 +89,8 @@ class Mounting:
 
     def judge(self, grid: ImuGrid, end: int) -> float:
         """Take the window that ends at the row `end` of the grid; return `kind`, NaN for None."""
+        if self.imu.placed != GIVEN:
+            return math.nan
         if self.kind == 0.0:
             return 0.0
         if self.kind is None:
