@@ -1,4 +1,4 @@
-"""`ugv-acceptance init`: derives a robot's configuration from its URDF, a recording, live topics."""
+"""`ugv-acceptance init`: derives a robot's configuration from what its files and topics tell."""
 
 import sys
 from pathlib import Path
@@ -14,7 +14,7 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.options import Overwrite
 
 if TYPE_CHECKING:
-    from ugv_acceptance.cli.init_work import Asked, Found
+    from ugv_acceptance.cli.init_work import Found
 
 DONE, FAILS, OPEN = 0, 1, 3
 COLOURS = {'ok': 'green', 'FAILS': 'bold red', 'open': 'yellow', 'not seen': 'dim'}

@@ -63,7 +63,7 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     assert described is not None  # noqa: S101 - a URDF that was not made has a path
     _guard(out, described if made else None, sources, asked)
     asked.say('looking for what carries the robot')
-    name = str(sources.path or evidence and evidence.where or described)
+    name = str(sources.path or (evidence and evidence.where) or described)
     finder = mesh_finder(sources.path, asked.meshes)
     given = Given(text, name, _shown(described, out), evidence, finder)
     draft = _answer(given, draft_of(given), answers, prompt)
@@ -155,8 +155,8 @@ def _guard(out: Path, made: Path | None, sources: Sources, asked: Asked) -> None
 def _shown(described: Path, out: Path) -> str:
     """Return the path of a URDF as a YAML file names it."""
     folder = out.resolve().parent
-    beside = os.path.relpath(described.resolve(), folder)
-    return str(described.resolve()) if beside.split(os.sep)[:_UP] == ['..'] * _UP else beside
+    beside = Path(os.path.relpath(described.resolve(), folder))
+    return str(described.resolve() if beside.parts[:_UP] == ('..',) * _UP else beside)
 
 
 def _answer(given: Given, draft: Draft, answers: Answers, prompt: Prompt | None) -> Draft:

@@ -71,7 +71,7 @@ def exit_code(checks: Sequence[Check]) -> int:
     return 1 if FAILS in states else 3 if OPEN in states else 0
 
 
-def posture_of_robot(robot: Robot, posture: Mapping[str, float]) -> list[float]:
+def positions_of(robot: Robot, posture: Mapping[str, float]) -> list[float]:
     """Return the positions of the measured joints in a posture, 0 where it does not say."""
     return [posture.get(name, 0.0) for name in robot.joint_names]
 
@@ -89,7 +89,7 @@ def _stands(config: Config, posture: Mapping[str, float]) -> Iterator[Check]:
 def _balance(robot: Robot, posture: Mapping[str, float]) -> Check:
     """Return whether the centre of gravity is well inside the support polygon on level ground."""
     what, mechanics = 'centre of gravity', mechanics_of(robot)
-    found = posture_once(robot, posture_of_robot(robot, posture), 0.0, ZERO)
+    found = posture_once(robot, positions_of(robot, posture), 0.0, ZERO)
     gravity = (0.0, 0.0, -robot.gravity)
     margins = stability_of(stance_by(stances_of(mechanics, found), gravity), gravity)
     if int(margins.state) >= NO_CONTACT:
@@ -118,7 +118,9 @@ def _told(settings: Settings, evidence: Evidence | None) -> Check:
     if missing:
         return Check(what, FAILS, f'{_list(missing)}: under joints, but no message tells them')
     if untold:
-        return Check(what, FAILS, f'told by nobody, and it matters where they stand: {_list(untold)}')
+        return Check(
+            what, FAILS, f'told by nobody, and it matters where they stand: {_list(untold)}'
+        )
     return Check(what, OK, f'{len(robot.joint_names)} measured; held: {_list(_held(robot))}')
 
 

@@ -7,18 +7,23 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.urdf import Urdf
-from ugv_acceptance.configure.checks import FAILS, OPEN, Check, posture_of_robot
-from ugv_acceptance.configure.collision import points_of
+from ugv_acceptance.configure.checks import FAILS, OPEN, Check, positions_of
+from ugv_acceptance.configure.collision import geometry_of
+from ugv_acceptance.configure.posture import posture_of
 from ugv_acceptance.configure.sources import MeshFinder
+from ugv_acceptance.evaluation.inputs.frames import place_of
+from ugv_acceptance.evaluation.settings import AUTO, UNKNOWN
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
-from ugv_acceptance.model.robot import ZERO, Robot, Vector
+from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
 from ugv_acceptance.model.stability import NO_CONTACT, stability_of, stances_of, standing
 from ugv_acceptance.model.tree import Pose, body_positions, drives_of, point_of, pose_of, tree_of
 from ugv_acceptance.report.robot_picture import Mark, Part, RobotPicture
 from ugv_acceptance.type_aliases import Floats
 
 # A contact point this far (m) from all geometry of the robot is drawn as wrong.
-FAR = 0.02
+FAR = 0.015
+# Directions around each axis, and all over, in which outlines are known.
+_TURNS, _ALL_OVER = 72, 200
 # Points of one link that are drawn: a mesh has many.
 _MOST = 20_000
 
@@ -32,10 +37,10 @@ def picture_of(
 ) -> RobotPicture:
     """Return what is drawn of a configuration in a posture (rad, m), with what is wrong with it."""
     robot = config.settings.robot
-    q = posture_of_robot(robot, posture)
+    q = positions_of(robot, posture)
     tree = tree_of(robot)
     pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
-    parts = tuple(_parts(robot, urdf, pose, meshes))
+    parts = tuple(_parts(urdf, posture, meshes))
     mechanics = mechanics_of(robot)
     found = posture_once(robot, q, 0.0, ZERO)
     gravity = (0.0, 0.0, -robot.gravity)
@@ -43,7 +48,6 @@ def picture_of(
     margins = stability_of(stance, gravity)
     stands = int(margins.state) < NO_CONTACT
     angles = [math.degrees(a) if stands and math.isfinite(a) else math.nan for a in margins.angle]
-    imu = config.settings.imu
     cog = tuple(map(float, found.cog))
     return RobotPicture(
         config.name,
@@ -53,47 +57,78 @@ def picture_of(
         (cog[0], cog[1], cog[2]),
         robot.ground if robot.contacts else math.nan,
         tuple(angles),
-        (imu.position, imu.mounting) if config.settings.hears_imu else None,
+        _imu(config, posture),
         robot.root,
         tuple(f'{c.state}: {c.what}: {c.text}' for c in checks if c.state in {FAILS, OPEN}),
     )
 
 
-def _parts(robot: Robot, urdf: Urdf, pose: Pose, meshes: MeshFinder) -> Iterator[Part]:
-    tree = tree_of(robot)
-    for link in urdf.links:
-        shapes = [shape for shape in urdf.shapes if shape.link == link.name]
-        points = [found for shape in shapes if (found := points_of(shape, meshes)) is not None]
-        if not points:
-            continue
-        own = np.concatenate(points)
-        own = own[:: max(1, len(own) // _MOST)]
-        body, turn, xyz = tree.frames[link.name]
-        outer = np.array(pose.rotation[body], dtype=np.float64)
-        placed: Floats = (own @ np.array(turn).T + np.array(xyz)) @ outer.T
-        yield Part(link.name, placed + np.array(pose.origin[body], dtype=np.float64))
+def _parts(urdf: Urdf, posture: Mapping[str, float], meshes: MeshFinder) -> Iterator[Part]:
+    """Yield every link's geometry as points that hold its outline in each view."""
+    solids = posture_of(urdf, posture, geometry_of(urdf, meshes)).solids
+    of: dict[str, list[Floats]] = {}
+    for solid in solids:
+        points = solid.points
+        if not len(points):
+            points = np.array([solid.lowest(way) for way in _WAYS])
+        of.setdefault(solid.link, []).append(points[:: max(1, len(points) // _MOST)])
+    for link, points_of_link in of.items():
+        yield Part(link, np.concatenate(points_of_link))
+
+
+def _ways() -> Floats:
+    """Return unit vectors (n, 3): around each axis, as the views look, and all over the sphere."""
+    angle = np.arange(_TURNS) * (2.0 * math.pi / _TURNS)
+    c, s, o = np.cos(angle), np.sin(angle), np.zeros(_TURNS)
+    k = np.arange(_ALL_OVER) + 0.5
+    z, turn = 1.0 - 2.0 * k / _ALL_OVER, math.pi * (1.0 + math.sqrt(5.0)) * k
+    r = np.sqrt(1.0 - z * z)
+    rings = [np.c_[c, s, o], np.c_[c, o, s], np.c_[o, c, s]]
+    found: Floats = np.vstack([*rings, np.c_[r * np.cos(turn), r * np.sin(turn), z]])
+    return found
 
 
 def _marks(robot: Robot, pose: Pose, parts: Sequence[Part]) -> Iterator[Mark]:
-    """Yield the contact points; one that hangs in the air, or is far from the robot, is wrong."""
+    """Yield the contact points; one that is far from all geometry of the robot is wrong."""
     tree = tree_of(robot)
+    heights = [_WAYS @ part.points.T for part in parts]
+    most = np.array([height.max(axis=1) for height in heights]).reshape(-1, len(_WAYS))
     for contact in robot.contacts:
         _, at = point_of(tree, pose, contact.link, contact.position)
         x, y, z = map(float, at)
-        yield Mark(contact.name, (x, y, z), _wrong((x, y, z), parts))
+        yield Mark(contact.name, (x, y, z), _wrong(np.array((x, y, z)), most))
 
 
-def _wrong(at: Vector, parts: Sequence[Part]) -> str:
-    """Return what is wrong with a contact point: it is outside of every part's extent."""
-    if not parts:
+def _wrong(at: Floats, most: Floats) -> str:
+    """Return what is wrong with a contact point (3,); '': nothing.
+
+    `most` (parts, ways) is how far each part's convex hull reaches along each of _WAYS.
+    """
+    if not len(most):
         return ''
-    point = np.array(at)
-    off = min(
-        float(
-            np.linalg.norm(
-                np.maximum(np.maximum(p.points.min(0) - point, point - p.points.max(0)), 0.0)
-            )
-        )
-        for p in parts
-    )
+    off = float((_WAYS @ at - most).max(axis=1).min())
     return f'{off * 1e3:.0f} mm from the robot' if off > FAR else ''
+
+
+def _imu(config: Config, posture: Mapping[str, float]) -> tuple[Vector, Matrix] | None:
+    """Return where the IMU is in the root link's axes, and its axes there; None: not known."""
+    settings, imu = config.settings, config.settings.imu
+    if not settings.hears_imu or imu.placed == UNKNOWN:
+        return None
+    robot = settings.robot
+    link, xyz, turn = imu.link or robot.root, imu.position, imu.mounting
+    if imu.placed == AUTO:
+        found = place_of(robot, imu.frame) if imu.frame else None
+        if found is None:
+            return None
+        link, xyz, turn = found.link, found.xyz, found.rotation
+    tree = tree_of(robot)
+    pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
+    body, own, _ = tree.frames[link]
+    at = tuple(map(float, point_of(tree, pose, link, xyz)[1]))
+    axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
+    a, b, c = ((float(x), float(y), float(z)) for x, y, z in axes)
+    return (at[0], at[1], at[2]), (a, b, c)
+
+
+_WAYS = _ways()

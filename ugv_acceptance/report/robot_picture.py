@@ -107,6 +107,11 @@ def _extent(picture: RobotPicture) -> tuple[Floats, Floats]:
     every = np.concatenate(points)
     every = every[np.isfinite(every).all(axis=1)]
     low, high = every.min(axis=0), every.max(axis=0)
+    if picture.imu is not None:
+        # An arrow whose tip lies outside of the axes would not be drawn at all.
+        place, turn = np.array(picture.imu[0]), np.array(picture.imu[1])
+        tips = place + _ARROW * float((high - low).max() or 1.0) * np.vstack([turn.T, np.zeros(3)])
+        low, high = np.minimum(low, tips.min(axis=0)), np.maximum(high, tips.max(axis=0))
     room = _ROOM * float((high - low).max() or 1.0)
     return low - room, high + room
 
@@ -116,7 +121,8 @@ def _view(
 ) -> None:
     title, across, up, _ = view
     pick = [across, up]
-    size = float((spread[1] - spread[0]).max())
+    # Without the room around it: so long were the arrows for which room was made.
+    size = float((spread[1] - spread[0]).max()) / (1.0 + 2.0 * _ROOM) * 0.8
     for part in picture.parts:
         corners = outline(part.points[:, pick])
         if len(corners) > 2:
