@@ -119,7 +119,7 @@ def _told(settings: Settings, evidence: Evidence | None) -> Check:
         return Check(what, FAILS, f'{_list(missing)}: under joints, but no message tells them')
     if untold:
         return Check(
-            what, FAILS, f'told by nobody, and it matters where they stand: {_list(untold)}'
+            what, FAILS, f'told by nobody, but where they stand matters: {_list(untold)}'
         )
     return Check(what, OK, f'{len(robot.joint_names)} measured; held: {_list(_held(robot))}')
 
@@ -135,7 +135,7 @@ def _held(robot: Robot) -> list[str]:
 
 
 def _that_matter(robot: Robot) -> list[str]:
-    """Return the held joints that carry much of the mass or are of the arm; wheels do not matter."""
+    """Return the held joints that carry much of the mass or are of the arm, wheels left out."""
     roles, total = roles_of(robot), robot.mass
     arm = chain_to(robot, robot.payload_link) if robot.payload_link else roles.arm
     masses = {link.name: link.mass for link in robot.links}
@@ -152,7 +152,7 @@ def _that_matter(robot: Robot) -> list[str]:
 
 
 def _gravity(settings: Settings, evidence: Evidence | None, config: Config) -> Check:
-    """Return whether gravity at rest, by the IMU as it is mounted, points where the robot stands."""
+    """Return whether gravity at rest, by the IMU as it is mounted, is along the root link."""
     what = 'IMU against gravity'
     if not settings.hears_imu:
         return Check(what, UNSEEN, 'the robot has no IMU')

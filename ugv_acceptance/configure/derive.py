@@ -89,7 +89,7 @@ def _judged(robot: Robot, joints: Joints) -> tuple[DerivedJoint, ...]:
     if not any(joint.limit.grade == ASK for joint in joints.measured):
         return joints.measured
     most = carried(robot) if len(joints.measured) <= MOST_JOINTS else {}
-    idle = Derived[float](None, CHECK, 'no weight puts a torque on it: not judged')
+    idle: Derived[float] = Derived(None, CHECK, 'no weight puts a torque on it: not judged')
     return tuple(
         replace(joint, limit=idle)
         if joint.limit.grade == ASK and most.get(joint.name, math.inf) == 0.0

@@ -238,7 +238,7 @@ def _with_mounting(draft: Draft, answers: Answers, _: Anew) -> Draft:
     if said is None:
         return draft
     if said == NONE:
-        none = Derived[str](None, CERTAIN, f'{SAID}: it has no IMU')
+        none: Derived[str] = Derived(None, CERTAIN, f'{SAID}: it has no IMU')
         return replace(draft, mounting=replace(mounting, topic=none, question=''))
     topic = mounting.topic
     if topic.value is None:

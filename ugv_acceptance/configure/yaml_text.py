@@ -24,6 +24,8 @@ from ugv_acceptance.model.robot import Matrix, Vector
 # What YAML reads as a text without quotes; not among the words it reads as something else.
 _PLAIN = re.compile(r'[A-Za-z_][A-Za-z0-9_./-]*')
 _WORDS = frozenset({'y', 'n', 'yes', 'no', 'on', 'off', 'true', 'false', 'null', 'unknown'})
+# A tilt of the plane of the contact points (rad) below this is not told.
+LEAST_TOLD = math.radians(0.005)
 # A source is cut to so many characters.
 _LONGEST = 150
 HEAD = '# Written by ugv-acceptance init. Each line says how sure its value is, and its source:'
@@ -205,7 +207,7 @@ def _contacts(draft: Draft) -> Iterator[str]:
         return
     grade = _worst(*(Derived('', p.grade, '') for p in contacts.points), source='')[0]
     source = f'{len(contacts.points)} points'
-    if contacts.tilt > 0.0:
+    if contacts.tilt >= LEAST_TOLD:
         source += f', in a plane {math.degrees(contacts.tilt):.2f} deg off the root link'
     yield _line('contacts', '', grade, source)
     for point in contacts.points:
@@ -215,7 +217,13 @@ def _contacts(draft: Draft) -> Iterator[str]:
 def _point(point: DerivedContact, depth: int) -> str:
     at = point.contact
     value = f'{{link: {text_of(at.link)}, position_m: {_vector(at.position)}}}'
-    return _line(text_of(at.name), value, point.grade, f'{point.on}; {point.source}', depth)
+    return _line(
+        text_of(at.name),
+        value,
+        point.grade,
+        point.source if point.on in point.source else f'{point.on}: {point.source}',
+        depth,
+    )
 
 
 def _ground(draft: Draft) -> Iterator[str]:
