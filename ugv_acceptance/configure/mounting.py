@@ -86,7 +86,7 @@ def _unseen(urdf: Urdf, topic: Derived[str], posture: Mapping[str, float]) -> Mo
         return Mounting(topic, '', place.position, rotation, question, place.remarks)
     grade = CHECK if topic.value else ASK
     rotation = Derived(place.rotation, grade, f'{place.source}; no message was seen')
-    question = '' if topic.value else f'Which topic is the IMU on? {topic.source.capitalize()}.'
+    question = '' if topic.value else f'On which topic is the IMU? So far {topic.source}.'
     remarks, joints = place.remarks, place.joints
     return Mounting(topic, place.link, place.position, rotation, question, remarks, joints)
 
@@ -153,7 +153,7 @@ def _decided(place: Placed, up: Up, evidence: Evidence) -> _Decided:
         return _Decided(Derived(best.rotation, ASK, source), question, tuple(remarks))
     if best.rotation != IDENTITY:
         remarks.append(f'{_YAW}: that is the word of {best.says}')
-    grade = CERTAIN if place.sure and place.rotation is not None else CHECK
+    grade = CERTAIN if place.sure and not place.joints else CHECK
     return _Decided(Derived(best.rotation, grade, source), '', tuple(remarks))
 
 
