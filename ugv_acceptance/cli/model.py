@@ -155,7 +155,7 @@ def _boundless(d: Values) -> bool:
 
 
 def _contacts(d: Values) -> Table:
-    table = _table('Contact points (base_link)', 'point', 'link', 'x m', 'y m', 'z m', 'polygon')
+    table = _table(f'Contact points ({d["robot"]["root"]})', 'point', 'link', 'x m', 'y m', 'z m', 'polygon')
     for contact in d['contacts']:
         xyz = _numbers(contact['position_m'])
         corner = 'corner' if contact['corner'] else ''
@@ -169,6 +169,8 @@ def _print_stability(console: Console, d: Values) -> None:
         f'Total mass {number_text(d["total_mass_kg"], 2)} kg with payload, '
         f'centre of gravity {x} {y} {z} m'
     )
+    if d['imu']:
+        console.print(f'IMU: {escape(d["imu"])}', soft_wrap=True)
     names = ' '.join(d['support_polygon']) or 'none'
     console.print(f'Support polygon: {escape(names)} ({d["state"]})')
     arm = d['clearance']

@@ -11,7 +11,10 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
+from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
+from ugv_acceptance.evaluation.inputs.imu_mount import mounted
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
+from ugv_acceptance.evaluation.settings import AUTO
 from ugv_acceptance.model.clearance import clearance, lowest_part, nearness_of
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import Reactions, reactions_of
@@ -51,7 +54,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     arm = _clearance(mechanics, stance, q, load)
     return {
         'version': VERSION,
-        'robot': {'name': config.name, 'serial': config.serial},
+        'robot': {'name': config.name, 'serial': config.serial, 'root': robot.root},
         'config': {
             'path': str(config.path),
             'urdf': str(config.urdf_path),
@@ -63,6 +66,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
         'payload': _payload(config, q, gravity, load),
         'total_mass_kg': found.mass,
         'centre_of_gravity_m': list(found.cog),
+        'imu': _imu(config),
         'contacts': _contacts(robot, found, stance),
         'clearance': arm,
         **_stability(robot, stance, gravity, on_ground=arm['on_ground']),
@@ -76,6 +80,18 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
             *payload_doubts(robot, payload),
         ],
     }
+
+
+def _imu(config: Config) -> str | None:
+    """Return in words how the IMU is mounted; None: there is none."""
+    settings = config.settings
+    if not settings.hears_imu:
+        return None
+    auto = settings.imu.placed == AUTO
+    if auto and not settings.imu.frame:
+        return 'mounting: auto, by the frame_id of its messages'
+    why = 'imu.mounting: unknown' if not auto else f'{settings.imu.frame} is no link of the URDF'
+    return mounting_words(settings, mounted(settings, settings.imu.frame), why)
 
 
 def posture_from(robot: Robot, text: str) -> list[float]:

@@ -10,15 +10,16 @@ from pydantic import BaseModel, ValidationError
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import Document, Path
+from ugv_acceptance.config.imu_place import base_frame_from, imu_from
 from ugv_acceptance.config.schema import File, JointSection
 from ugv_acceptance.config.units import EXAMPLES, Given, shown
 from ugv_acceptance.config.unknown import known_of
-from ugv_acceptance.config.urdf import Urdf, rotation_from_rpy
+from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
-from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.frames import same_frame, without_prefix
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
-from ugv_acceptance.evaluation.settings import Delays, ImuInput, JointInput, Limits, Settings
+from ugv_acceptance.evaluation.settings import Delays, JointInput, Limits, Settings
 from ugv_acceptance.model.clearance import arm_links
 from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Mimic, Payload, Robot
 
@@ -91,7 +92,7 @@ def settings_from(build: Build) -> Settings:
     settings = Settings(
         robot,
         tuple(_input(build, joints[name], section) for name, section in measured.items()),
-        _imu(build.file),
+        imu_from(build.file, robot, build.refuse),
         _limits(build, [(joints[name], section) for name, section in measured.items()]),
         Delays(**build.file.delays.model_dump()),
         build.file.unsafe_limits or '',
@@ -100,6 +101,8 @@ def settings_from(build: Build) -> Settings:
         tuple(name for name, section in measured.items() if section.passive),
         stands.moved,
         unknown=unknown,
+        base_frame=base_frame_from(build.file, robot, build.refuse, build.warn),
+        frame_prefix=build.file.robot.frame_prefix,
     )
     _check_inputs(build, settings)
     _check_ranges(build, settings)
@@ -155,7 +158,8 @@ def _check_inputs(build: Build, settings: Settings) -> None:
             ('topics',), 'expected joint states or an IMU: nothing is left that could be measured'
         )
     frame, link = topics.payload.frame_id, settings.robot.payload_link
-    if frame and link and not same_frame(frame, link):
+    bare = without_prefix(frame or '', settings.frame_prefix)
+    if frame and link and not same_frame(bare, link):
         build.warn(
             ('topics', 'payload', 'frame_id'),
             f'{frame} is not the payload link, {link}: loads declared in it cannot be used',
@@ -345,13 +349,6 @@ def _input(build: Build, joint: Joint, section: JointSection) -> JointInput:
         section.effort_sign,
         section.effort_scale,
     )
-
-
-def _imu(file: File) -> ImuInput:
-    values = file.imu.model_dump()
-    mounting = rotation_from_rpy(values.pop('mounting_rpy'))
-    named = file.topics.imu.frame_id if file.topics.imu else None
-    return ImuInput(mounting=mounting, frame=(named or '').lstrip('/'), **values)
 
 
 def _limits(build: Build, joints: list[tuple[Joint, JointSection]]) -> Limits:

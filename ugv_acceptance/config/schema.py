@@ -194,9 +194,14 @@ class LinkSection(Section):
 
 
 class ImuSection(Section):
-    """Mounting, position and use of the IMU, as in evaluation.settings.ImuInput."""
+    """Mounting, position and use of the IMU, as in evaluation.settings.ImuInput.
 
+    `mounting` is what stands in place of numbers: found by the frame of its messages, or unknown.
+    """
+
+    mounting: Literal['auto', 'unknown'] | None = None
     mounting_rpy: Angles = (0.0, 0.0, 0.0)
+    link: Name | None = None
     position: Position = _IMU.position
     attitude: Literal['auto', 'orientation', 'accelerometer', 'level'] = 'auto'
     specific_force: Annotated[bool, Field(strict=True)] = _IMU.specific_force
@@ -265,10 +270,12 @@ class DelaysSection(Section):
 
 
 class RobotSection(Section):
-    """Name and serial number of the robot."""
+    """Name and serial number of the robot, and how its frames are named for viewers."""
 
     name: Name
     serial: Annotated[str, Field(strict=True)] | None = None
+    base_frame: Name | None = None
+    frame_prefix: Annotated[str, Field(strict=True)] = ''
 
 
 class File(Section):

@@ -17,9 +17,10 @@ from ugv_acceptance.configure.draft import (
     DerivedJoint,
     Draft,
 )
-from ugv_acceptance.configure.questions import CONTACTS, IMU, LIMITS, LOAD, MASS, SAID, TILT
+from ugv_acceptance.configure.questions import CONTACTS, IMU, LIMITS, LOAD, MASS, TILT
 from ugv_acceptance.configure.spread import assumed_of, scaled_link, uncertain_of
-from ugv_acceptance.model.robot import Matrix, Vector
+from ugv_acceptance.evaluation.criteria.imu_mounting import rpy_of
+from ugv_acceptance.model.robot import Vector
 
 # What YAML reads as a text without quotes; not among the words it reads as something else.
 _PLAIN = re.compile(r'[A-Za-z_][A-Za-z0-9_./-]*')
@@ -179,19 +180,17 @@ def _imu(draft: Draft) -> Iterator[str]:
     yield _line('imu', '', grade, 'how the sensor sits on the robot')
     if turned.value is None or IMU in draft.open:
         yield _line('mounting', 'unknown', ASK, mounting.question or mounting.topic.source, 1)
-    else:
-        degrees = _vector(tuple(map(math.degrees, rpy_of(turned.value))), 3)  # type: ignore[arg-type]
-        yield _line('mounting_rpy_deg', degrees, *_said(turned), 1)
+        return
+    if mounting.frame and (mounting.joints or (draft.evidence is None and turned.grade == CHECK)):
+        # Not numbers: they hold for this posture alone, or for a message that nobody has seen.
+        yield _line('mounting', 'auto', CHECK, f'by the frame of its messages; {turned.source}', 1)
+        return
+    degrees = tuple(map(math.degrees, rpy_of(turned.value)))
+    yield _line(
+        'mounting_rpy_deg', _vector((degrees[0], degrees[1], degrees[2]), 3), *_said(turned), 1
+    )
     if mounting.position.value is not None:
         yield _line('position_m', _vector(mounting.position.value), *_said(mounting.position), 1)
-
-
-def rpy_of(m: Matrix) -> Vector:
-    """Return roll, pitch and yaw (rad) about fixed axes of a rotation, as in a URDF."""
-    pitch = math.asin(max(-1.0, min(1.0, -m[2][0])))
-    if abs(m[2][0]) > 1.0 - 1e-9:  # straight up or down: yaw and roll turn about one axis
-        return math.atan2(-m[1][2], m[1][1]), pitch, 0.0
-    return math.atan2(m[2][1], m[2][2]), pitch, math.atan2(m[1][0], m[0][0])
 
 
 def _contacts(draft: Draft) -> Iterator[str]:
@@ -282,6 +281,3 @@ def open_words(draft: Draft) -> Sequence[str]:
         LOAD: 'payload.link: unknown',
     }
     return list(dict.fromkeys(word for key, word in words.items() if key in draft.open))
-
-
-__all__ = ['HEAD', 'SAID', 'number', 'open_words', 'rpy_of', 'text_of', 'yaml_of']

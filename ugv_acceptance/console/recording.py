@@ -20,6 +20,7 @@ from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snap
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
@@ -256,9 +257,10 @@ def _payloads(
         return np.array(times, np.int64), tuple(found)
     for batch in bag.batches(Topics(None, None, topics.payload)):
         for part in batch.payload:
+            frame = without_prefix(part.frame_id, settings.frame_prefix)
             times += part.log_time.tolist()
             for when, mass, com in zip(part.log_time, part.mass, part.com, strict=True):
-                load = payload_from(settings.robot, float(mass), com.tolist(), part.frame_id)
+                load = payload_from(settings.robot, float(mass), com.tolist(), frame)
                 found += [(int(when), load)] if load else []
     return np.array(sorted(times), np.int64), tuple(sorted(found, key=lambda entry: entry[0]))
 

@@ -19,6 +19,7 @@ from ugv_acceptance.evaluation.chassis.motion import (
 )
 from ugv_acceptance.evaluation.ground_contact import FREE, PERMITTED, UNSUPPORTED, GroundContact
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuTracker
 from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount
 from ugv_acceptance.evaluation.inputs.joint_rows import NEVER
@@ -233,7 +234,7 @@ class LiveEvaluator:
 
         After one that cannot be used margins are unknown until a good one comes.
         """
-        robot = self.settings.robot
+        robot, frame = self.settings.robot, without_prefix(frame, self.settings.frame_prefix)
         payload = payload_from(robot, mass, com, frame)
         self.watch.declared(now, '' if payload else payload_fault(robot, mass, com, frame))
         self.load_known = payload is not None
@@ -287,8 +288,7 @@ class LiveEvaluator:
     def level(self) -> int:
         """The most severe level of the active alerts; at least STALE while margins are unknown.
 
-        On ground that is not flat also while it is not known whether the robot begins to tip; and
-        always, but for an ERROR, where the configuration says `unknown` of what margins need.
+        Also while a trend to tip is not known yet, and where the configuration calls values unknown.
         """
         active = [alert.rule.level for alert in self.watch.active]
         known = self.margins is not None and not self.waits_for_trend

@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.chassis.columns import ChassisColumns
 from ugv_acceptance.evaluation.chassis.motion import ChassisMotion
 from ugv_acceptance.evaluation.ground_contact import GroundContact, blanked
 from ugv_acceptance.evaluation.inputs import joint_state_words as words
+from ugv_acceptance.evaluation.inputs.frames import without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ORIENTATIONS, ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.imu_mount import ImuMount, felt_by
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
@@ -173,13 +174,12 @@ class RecordedEvaluator:
         felt = batch.imu if self.settings.hears_imu else ()
         if self.settings.hears_joints:
             joints = self._joints.merge_columns(batch.joints)
-            posed = preceded(self._carry.joints, joints) if self.mount.busy else joints
-            felt, imu = felt_by(self.mount, self._imu, felt, posed)
+            felt, imu = felt_by(self.mount, self._imu, felt, (self._carry.joints, joints))
             joint_limits = self._input(0, joints.time, joints.stamp, self.watch.joints)
             self._watch_joints(joints, joint_limits)
             until = np.where(self._joints.told.repeating, NEVER, joints.oldest + joint_limits)
         else:
-            felt, imu = felt_by(self.mount, self._imu, felt, self._carry.joints)
+            felt, imu = felt_by(self.mount, self._imu, felt, (self._carry.joints,))
             joints = without_joints(imu)
             until = joints.oldest + np.full(len(imu.time), FOREVER)
         imu_limits = self._input(1, imu.time, imu.stamp, self.watch.imu)
@@ -253,7 +253,8 @@ class RecordedEvaluator:
     def _take_payloads(self, segments: Sequence[PayloadColumns]) -> None:
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
-            told = self.settings.robot, s.mass[k], s.com[k], s.frame_id
+            frame = without_prefix(s.frame_id, self.settings.frame_prefix)
+            told = self.settings.robot, s.mass[k], s.com[k], frame
             payload = payload_from(*told)
             self.watch.declared(when, '' if payload else payload_fault(*told))
             self._payload.declare(when, payload)

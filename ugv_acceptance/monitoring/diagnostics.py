@@ -11,6 +11,7 @@ from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
+from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_words
 from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
@@ -335,6 +336,8 @@ def _input(
     if name == 'imu':
         of = session.evaluator.orientations
         values |= {f'orientation_{how}': number for how, number in of.items()}
+        mount = session.evaluator.mount
+        values['mounting'] = mounting_words(mount.settings, mount.found, mount.why)
     if count.reason:
         values['last_malformed'] = count.reason
     level = max([a.rule.level for a in mine], default=OK)

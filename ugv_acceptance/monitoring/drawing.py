@@ -2,18 +2,33 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ugv_acceptance.bag.encode_views import Colour, Shape
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.expressions import add, cross, dot, rotate, scale, subtract
+from ugv_acceptance.model.expressions import (
+    add,
+    cross,
+    dot,
+    rotate,
+    scale,
+    subtract,
+    transpose,
+)
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
-from ugv_acceptance.model.robot import Payload, Robot, Vector
+from ugv_acceptance.model.robot import IDENTITY, ZERO, Payload, Robot, Vector
 from ugv_acceptance.model.stability import stances_of, standing
-from ugv_acceptance.model.tree import Tree, body_positions, drives_of, point_of, pose_of
+from ugv_acceptance.model.tree import (
+    Tree,
+    body_positions,
+    drives_of,
+    point_of,
+    pose_of,
+    tree_of,
+)
 
 # Points of one body closer together than this (m) are drawn as one.
 _SAME = 0.02
@@ -160,7 +175,6 @@ def _numbers(v: Sequence[Any]) -> Vector:
     return float(x), float(y), float(z)
 
 
-FRAME = 'base_link'
 # Seconds between drawings; markers vanish after LIFETIME (s) when the monitor has died.
 PERIOD, LIFETIME = 0.1, 0.5
 NAMES = ('support', 'worst_edge', 'cog', 'plumb', 'limbs', 'words')
@@ -169,12 +183,31 @@ LINE_STRIP, LINE_LIST, SPHERE_LIST, TEXT = 4, 5, 7, 9
 
 GREEN, AMBER = (0.1, 0.6, 0.2, 1.0), (1.0, 0.75, 0.0, 1.0)
 RED, BLUE = (0.8, 0.0, 0.1, 1.0), (0.0, 0.3, 0.8, 1.0)
+# Where the root link is on its body: at the origin.
+_ROOT = (0, IDENTITY, ZERO)
 # Outward direction in `base_link` of each of SIDES.
 _OUTWARD = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
 
 def shapes_of(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple[Shape, ...]:
-    """Return the shapes of one posture, one for each of NAMES."""
+    """Return the shapes of one posture, one for each of NAMES, in the axes of `settings.frame`."""
+    shapes = _in_root(skeleton, margins, settings)
+    _, rotation, xyz = tree_of(settings.robot).frames.get(settings.base_frame, _ROOT)
+    if (rotation, xyz) == _ROOT[1:]:
+        return shapes
+    back = transpose(rotation)
+
+    def seen(point: Vector) -> Vector:
+        return _numbers(rotate(back, subtract(point, xyz)))
+
+    return tuple(
+        replace(shape, points=tuple(map(seen, shape.points)), position=seen(shape.position))
+        for shape in shapes
+    )
+
+
+def _in_root(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple[Shape, ...]:
+    """Return the shapes in the axes of the robot's root link."""
     angles = [float(a) for a in margins.stability.angle]
     colour = _tip_colour(min(angles), settings)
     outline = (*skeleton.polygon, *skeleton.polygon[:1])

@@ -27,7 +27,6 @@ from ugv_acceptance.model.stability import SIDES, Stability
 from ugv_acceptance.monitoring.alarm_tracker import Event, events_of
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
 from ugv_acceptance.monitoring.drawing import (
-    FRAME,
     LIFETIME,
     PERIOD,
     Figure,
@@ -224,7 +223,7 @@ class Annotation:
         skeleton = skeleton_of(self._figure, margins.q, margins.gravity, load)
         if skeleton is not None:
             shapes = shapes_of(skeleton, margins, self.settings)
-            data = markers_cdr(self._stamp, FRAME, LIFETIME, shapes)
+            data = markers_cdr(self._stamp, self.settings.frame, LIFETIME, shapes)
             yield Said(now, self.names['markers'], data)
 
     def _array(self, now: int, statuses: Sequence[Status]) -> bytes:

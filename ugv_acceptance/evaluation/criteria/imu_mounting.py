@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
-from ugv_acceptance.evaluation.inputs.imu_mount import NOBODY, ImuMount, Mounted
+from ugv_acceptance.evaluation.inputs.imu_mount import NOBODY, ImuMount, Mounted, source_words
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Matrix
@@ -72,6 +72,21 @@ def mounting_json(settings: Settings, found: Mounted | None, why: str = '') -> d
         'moved_by': moved_by,
         'held': {name: position for name, position in found.held},
     }
+
+
+def mounting_words(settings: Settings, found: Mounted | None, why: str = '') -> str:
+    """Return a mounting in words: where it is known from, the numbers, what moves it."""
+    if found is None:
+        return f'not known: {why}'
+    numbers = ' '.join(f'{math.degrees(angle) + 0.0:.4g}' for angle in rpy_of(found.rotation))
+    place = ' '.join(f'{round(x, 4) + 0.0:g}' for x in found.xyz)
+    text = f'from {source_words(found)}: rpy {numbers} deg, at {place} m in {found.link}'
+    if found.joints:
+        text += f', moved by {", ".join(settings.robot.joint_names[j] for j in found.joints)}'
+    if found.held:
+        held = (f'{name} ({position:g})' for name, position in found.held)
+        text += f', with {", ".join(held)} held'
+    return text
 
 
 def rpy_of(rotation: Matrix) -> tuple[float, float, float]:

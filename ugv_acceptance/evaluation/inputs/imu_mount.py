@@ -6,6 +6,7 @@ measured, by the newest positions and rates of these joints; all checks then wor
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from ugv_acceptance.evaluation.inputs.imu import ImuRows, ImuTracker
 from ugv_acceptance.evaluation.inputs.imu_turn import Felt, Turn, in_order, rows_of, runs_of
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
+from ugv_acceptance.evaluation.row_ends import preceded
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import AUTO, GIVEN, UNKNOWN, Settings
 from ugv_acceptance.model.carried import carriers
@@ -30,6 +32,7 @@ SOURCE_WORDS = {
     URDF: 'the URDF',
     TF_STATIC: '/tf_static',
 }
+NAMELESS = 'imu.mounting is auto, and its messages name no frame (frame_id is empty)'
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +108,7 @@ class ImuMount:
         if self.settings.imu.placed == UNKNOWN:
             return 'the configuration says imu.mounting: unknown'
         if not self.frame:
-            return 'imu.mounting is auto, and its messages name no frame (frame_id is empty)'
+            return NAMELESS
         robot = self.settings.robot
         return (
             f'its frame {self.frame!r} is no link of the URDF, and /tf_static does not lead from '
@@ -260,17 +263,17 @@ def felt_by(
     mount: ImuMount,
     tracker: ImuTracker,
     felt: Sequence[ImuColumns],
-    joints: JointRows,
+    joints: Sequence[JointRows],
 ) -> tuple[Sequence[ImuColumns], ImuRows]:
     """Return messages, in base axes where a joint moves the IMU, and the gravity they tell.
 
-    `joints` are the joint states, preceded by the newest before them.
+    `joints` are the newest joint states before these messages, and those among them.
     """
     if not mount.busy:
         return felt, tracker.columns(felt)
     turned: list[ImuColumns] = []
     found: list[ImuRows] = []
-    for part, told in mount.parts(felt, joints):
+    for part, told in mount.parts(felt, reduce(preceded, joints)):
         rows = tracker.columns(part)
         if told is not None:
             rows.gravity[~told], rows.unusable[~told] = np.nan, False

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.frames import same_frame, without_prefix
 from ugv_acceptance.evaluation.samples import PayloadColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload, Robot
@@ -106,7 +106,8 @@ class PayloadLog:
         """Add the payload messages of a batch."""
         messages = [(int(t), s, k) for s in segments for k, t in enumerate(s.log_time)]
         for when, s, k in sorted(messages, key=lambda message: message[0]):
-            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], s.frame_id)
+            frame = without_prefix(s.frame_id, self.settings.frame_prefix)
+            payload = payload_from(self.settings.robot, s.mass[k], s.com[k], frame)
             if payload and payload != self.at(when):
                 self.since.append(when)
                 self.payloads.append(payload)

@@ -19,7 +19,6 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.diagnostics import Status
 from ugv_acceptance.monitoring.drawing import (
-    FRAME,
     LIFETIME,
     PERIOD,
     Figure,
@@ -171,4 +170,4 @@ class MarkerOutput:
         if skeleton is not None:
             stamp = self._node.get_clock().now().nanoseconds
             shapes = shapes_of(skeleton, margins, settings)
-            self._publisher.publish(markers_cdr(stamp, FRAME, LIFETIME, shapes))
+            self._publisher.publish(markers_cdr(stamp, settings.frame, LIFETIME, shapes))

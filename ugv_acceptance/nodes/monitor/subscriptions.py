@@ -17,6 +17,7 @@ from sensor_msgs.msg import Imu, JointState
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.monitoring.publisher_identity import Publisher, Voices
 from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.monitor.static_transforms import StaticTransforms
 
 _RELIABILITY = {
     'best_effort': ReliabilityPolicy.BEST_EFFORT,
@@ -75,6 +76,7 @@ class Inputs:
             for name, topic, kind, take in rows
         }
         self._malformed = dict.fromkeys(self.subscriptions, 0)
+        self.transforms = StaticTransforms(node, session)
 
     def _events(self, name: str) -> SubscriptionEventCallbacks:
         session = self._session
@@ -115,6 +117,7 @@ class Inputs:
         """Update publishers, and clear faults that are over; to be called once a second."""
         self._allowed = frozenset(node for node in allowed if node)
         now, faults = self._session.clock.now(), self._session.faults
+        self.transforms.look()
         self._see_publishers(now)
         for name in self.subscriptions:
             count = self._session.counts[name]
@@ -165,6 +168,7 @@ class Inputs:
     def destroy(self) -> None:
         """Unsubscribe from all inputs."""
         self._node.destroy_timer(self._soon)
+        self.transforms.destroy()
         for subscription in self.subscriptions.values():
             self._node.destroy_subscription(subscription)
         self.subscriptions = {}
