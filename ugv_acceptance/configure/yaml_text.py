@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from ugv_acceptance.configure.draft import (
     ASK,
@@ -108,9 +109,7 @@ def _topics(draft: Draft) -> Iterator[str]:
         yield _line('imu', 'null', *_said(mounting.topic), 1)
 
 
-def _said(
-    one: Derived[str] | Derived[float] | Derived[Vector] | Derived[Matrix],
-) -> tuple[str, str]:
+def _said(one: Derived[Any]) -> tuple[str, str]:
     return one.grade, one.source
 
 

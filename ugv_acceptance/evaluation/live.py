@@ -288,7 +288,7 @@ class LiveEvaluator:
     def level(self) -> int:
         """The most severe level of the active alerts; at least STALE while margins are unknown.
 
-        Also while a trend to tip is not known yet, and where the configuration calls values unknown.
+        Also while a trend to tip is not known yet, and where a value is said to be unknown.
         """
         active = [alert.rule.level for alert in self.watch.active]
         known = self.margins is not None and not self.waits_for_trend
