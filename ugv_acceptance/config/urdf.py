@@ -1,4 +1,4 @@
-"""Reads a URDF: links, masses, joints, limits and collision geometry; visuals are ignored.
+"""Reads a URDF: links, masses, joints, limits, collision and visual geometry.
 
 Parsed by defusedxml, which refuses entities and external files.
 """
@@ -27,13 +27,14 @@ from ugv_acceptance.model.robot import (
 )
 
 KINDS = ('revolute', 'continuous', 'prismatic', 'fixed')
+ONE: Vector = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Urdf:
     """The links and joints of a URDF; `mimics` are the joints that follow others.
 
-    `shapes` is the collision geometry of all links.
+    `shapes` is the collision geometry of all links, `visuals` the geometry they are drawn with.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Urdf:
     mimics: tuple[Mimic, ...]
     warnings: tuple[str, ...]
     shapes: tuple[Shape, ...] = ()
+    visuals: tuple[Shape, ...] = ()
 
 
 def read_urdf(text: bytes, source: str) -> Urdf:
@@ -57,8 +59,9 @@ def read_urdf(text: bytes, source: str) -> Urdf:
     _check_unique('joint', [joint.name for joint in joints], source)
     _check_tree(links, joints, source)
     mimics = tuple(_mimics(root, joints, source))
-    shapes = tuple(_shapes(root))
-    return Urdf(root.get('name') or 'robot', links, joints, mimics, tuple(warnings), shapes)
+    shapes, visuals = tuple(_shapes(root, 'collision')), tuple(_shapes(root, 'visual'))
+    name = root.get('name') or 'robot'
+    return Urdf(name, links, joints, mimics, tuple(warnings), shapes, visuals)
 
 
 def _parse(text: bytes, source: str) -> Element:
@@ -184,21 +187,25 @@ def _mimics(root: Element, joints: tuple[Joint, ...], source: str) -> Iterable[M
     return tuple(follows.values())
 
 
-def _shapes(root: Element) -> Iterable[Shape]:
-    """Yield the collision geometry of all links; what cannot be read is no error, but unread."""
+def _shapes(root: Element, tag: str) -> Iterable[Shape]:
+    """Yield the geometry of all links; what cannot be read is no error, but unread."""
     for link in root.findall('link'):
         name = link.get('name', '')
-        for collision in link.findall('collision'):
-            geometry = collision.find('geometry')
+        for element in link.findall(tag):
+            geometry = element.find('geometry')
             found = None if geometry is None else next(iter(geometry), None)
             kind = 'none' if found is None else str(found.tag)
+            mesh = found.get('filename') if found is not None and kind == 'mesh' else None
             try:
-                xyz, rotation = _origin(collision, '')
+                xyz, rotation = _origin(element, '')
                 size = None if found is None else _size(kind, found)
+                scale = (
+                    ONE if mesh is None or found is None else _triple(found, 'scale', '', '1 1 1')
+                )
             except BadConfig:
                 yield Shape(name, kind, ZERO, IDENTITY, None)
             else:
-                yield Shape(name, kind, xyz, rotation, size)
+                yield Shape(name, kind, xyz, rotation, size, mesh, scale)
 
 
 def _size(kind: str, element: Element) -> Vector | None:

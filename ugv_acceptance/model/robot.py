@@ -113,7 +113,8 @@ class Contact:
 class Shape:
     """One collision geometry of a link: `size` is its half extent (m) along its own axes.
 
-    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None).
+    `kind` is box, cylinder, sphere, or that of a geometry that is not read (`size` None). Of a mesh
+    `mesh` is the name of its file as the URDF gives it, `scale` the factors along its own axes.
     """
 
     link: str
@@ -121,6 +122,8 @@ class Shape:
     xyz: Vector
     rotation: Matrix
     size: Vector | None
+    mesh: str | None = None
+    scale: Vector = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
