@@ -46,7 +46,7 @@ def print_found(found: 'Found') -> int:
         console.print(f'note: {escape(note)}', soft_wrap=True)
     console.print(table)
     for question in found.questions:
-        text = f'open: {question.text} -> {question.option}; until then {question.otherwise}'
+        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
         console.print(escape(text), soft_wrap=True)
     code = exit_code(found.checks)
     failed = [check.what for check in found.checks if check.state == 'FAILS']

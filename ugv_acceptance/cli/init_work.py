@@ -6,20 +6,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.bag.atomic_files import write_bytes, write_text
 from ugv_acceptance.cli import output_kinds as kinds
 from ugv_acceptance.cli.outputs import Input, Output, check_outputs, inputs_of
 from ugv_acceptance.config import Config, load
-from ugv_acceptance.config.urdf import Urdf, read_urdf
-from ugv_acceptance.configure.checks import Check, checks_of
+from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.configure.checks import OPEN, Check, checks_of
 from ugv_acceptance.configure.derive import Given, contacts_of, draft_of
 from ugv_acceptance.configure.draft import Draft
 from ugv_acceptance.configure.evidence import Evidence
 from ugv_acceptance.configure.home import positions
 from ugv_acceptance.configure.joints import rest_posture
+from ugv_acceptance.configure.picture import Scene, picture_of
 from ugv_acceptance.configure.questions import Answers, Question, answered, ask, questions_of
-from ugv_acceptance.configure.sources import MeshFinder, Sources, mesh_finder, sources_of
+from ugv_acceptance.configure.sources import Sources, mesh_finder, sources_of
 from ugv_acceptance.configure.yaml_text import yaml_of
 
 # A URDF so many folders up from the YAML is named by its absolute path.
@@ -69,16 +70,23 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     draft = _answer(given, draft_of(given), answers, prompt)
     written = yaml_of(draft)
     config = _loaded(written, text, out)
+    draft, told = _with_efforts(draft, config, sources, asked)
+    if told:
+        written = yaml_of(draft)
+        config = _loaded(written, text, out)
     checks = checks_of(config, positions(draft.home), evidence, questions_of(draft))
+    if draft.joints.question:
+        checks = (*checks, Check('joint names', OPEN, draft.joints.question))
     if made:
         write_bytes(described, text)
     write_text(out, written)
     files = [out, *([described] if made else [])]
     if asked.picture is not None:
         asked.say('drawing')
-        _draw(asked.picture, config, draft.urdf, positions(draft.home), finder, checks)
+        scene = Scene(config, draft.urdf, positions(draft.home), finder, checks, evidence)
+        _draw(asked.picture, scene)
         files.append(asked.picture)
-    notes = tuple(dict.fromkeys(_notes(draft, sources, evidence)))
+    notes = tuple(dict.fromkeys((*_notes(draft, sources, evidence), *told)))
     done = f'ugv-acceptance evaluate RECORDING --config {out}'
     return Found(checks, notes, questions_of(draft), tuple(files), done)
 
@@ -98,7 +106,7 @@ def check_it(path: Path, asked: Asked) -> Found:
     checks = checks_of(config, posture, evidence)
     if asked.picture is not None:
         finder = mesh_finder(config.urdf_path, asked.meshes)
-        _draw(asked.picture, config, urdf, posture, finder, checks)
+        _draw(asked.picture, Scene(config, urdf, posture, finder, checks, evidence))
     files = () if asked.picture is None else (asked.picture,)
     return Found(checks, config.warnings, (), files, 'no check fails')
 
@@ -175,6 +183,30 @@ def _answer(given: Given, draft: Draft, answers: Answers, prompt: Prompt | None)
     return draft
 
 
+def _with_efforts(
+    draft: Draft, config: Config, sources: Sources, asked: Asked
+) -> tuple[Draft, tuple[str, ...]]:
+    """Return the draft with what the efforts of a recording mean, and that in words."""
+    evidence = draft.evidence
+    if not sources.recordings or evidence is None or not any(j.effort for j in evidence.joints):
+        return draft, ()
+    from ugv_acceptance.configure.efforts import effort_remarks
+
+    asked.say('comparing the efforts with the model')
+    try:
+        remarks = {one.joint: one for one in effort_remarks(config, [*sources.recordings])}
+    except AcceptanceError as error:
+        return draft, (f'what the efforts mean is not known: {error}',)
+    measured = tuple(
+        replace(j, effort_sign=of.effort_sign, effort_scale=of.effort_scale)
+        if (of := remarks.get(j.name)) is not None
+        else j
+        for j in draft.joints.measured
+    )
+    words = tuple(f'{name}: {one.sentence}' for name, one in remarks.items())
+    return replace(draft, joints=replace(draft.joints, measured=measured)), words
+
+
 def _loaded(yaml: str, urdf: bytes, out: Path) -> Config:
     """Return the configuration that a text and a URDF describe, before they are written."""
     with tempfile.TemporaryDirectory(prefix='ugv_acceptance_init_') as folder:
@@ -187,18 +219,10 @@ def _loaded(yaml: str, urdf: bytes, out: Path) -> Config:
             raise BadConfig(str(error).replace(str(files[0]), str(out))) from None
 
 
-def _draw(
-    path: Path,
-    config: Config,
-    urdf: Urdf,
-    posture: Mapping[str, float],
-    finder: MeshFinder,
-    checks: tuple[Check, ...],
-) -> None:
-    from ugv_acceptance.configure.picture import picture_of
+def _draw(path: Path, scene: Scene) -> None:
     from ugv_acceptance.report.robot_picture import picture_html, picture_png
 
-    picture = picture_of(config, urdf, posture, finder, checks)
+    picture = picture_of(scene)
     if path.suffix.lower() == '.png':
         write_bytes(path, picture_png(picture))
     else:

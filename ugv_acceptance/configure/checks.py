@@ -13,12 +13,14 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.configure.evidence import Evidence, SeenImu
 from ugv_acceptance.configure.imu_gravity import up_of
 from ugv_acceptance.configure.questions import Question
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.inputs.frames import place_of
+from ugv_acceptance.evaluation.settings import AUTO, UNKNOWN, Settings
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
-from ugv_acceptance.model.robot import ZERO, Robot
+from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
 from ugv_acceptance.model.roles import chain_to, roles_of
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES, stability_of, stances_of
 from ugv_acceptance.model.stability import standing as stance_by
+from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of, tree_of
 from ugv_acceptance.type_aliases import Floats
 
 OK, FAILS, OPEN, UNSEEN = 'ok', 'FAILS', 'open', 'not seen'
@@ -53,16 +55,12 @@ def checks_of(
     found = [
         *_stands(config, posture),
         _told(settings, evidence),
-        _gravity(settings, evidence, config),
-        *(Check(q.key, OPEN, f'{q.text} -> {q.option}') for q in questions),
+        _gravity(config, posture, evidence),
+        *(Check(q.key, OPEN, q.text) for q in questions),
     ]
-    said = {q.key for q in questions}
-    found += [
-        Check(key, OPEN, 'the configuration says unknown')
-        for key in settings.unknown
-        if not said or not any(key.startswith(k) or k in key for k in said)
-    ]
-    return tuple(found)
+    if not questions:
+        found += [Check(key, OPEN, 'the configuration says unknown') for key in settings.unknown]
+    return tuple(one for one in found if one is not None)
 
 
 def exit_code(checks: Sequence[Check]) -> int:
@@ -80,8 +78,8 @@ def _stands(config: Config, posture: Mapping[str, float]) -> Iterator[Check]:
     """Yield what the geometry of the contact points says."""
     settings = config.settings
     if not settings.judges_tilt:
-        why = 'contacts are unknown' if settings.hears_imu else 'no IMU: tip-over is not judged'
-        yield Check('stands', OPEN if settings.hears_imu else UNSEEN, why)
+        if not settings.hears_imu:
+            yield Check('stands', UNSEEN, 'no IMU: tip-over is not judged')
         return
     yield _balance(settings.robot, posture)
 
@@ -118,9 +116,7 @@ def _told(settings: Settings, evidence: Evidence | None) -> Check:
     if missing:
         return Check(what, FAILS, f'{_list(missing)}: under joints, but no message tells them')
     if untold:
-        return Check(
-            what, FAILS, f'told by nobody, but where they stand matters: {_list(untold)}'
-        )
+        return Check(what, FAILS, f'told by nobody, but where they stand matters: {_list(untold)}')
     return Check(what, OK, f'{len(robot.joint_names)} measured; held: {_list(_held(robot))}')
 
 
@@ -151,26 +147,65 @@ def _that_matter(robot: Robot) -> list[str]:
     return found
 
 
-def _gravity(settings: Settings, evidence: Evidence | None, config: Config) -> Check:
+def _gravity(config: Config, posture: Mapping[str, float], evidence: Evidence | None) -> Check:
     """Return whether gravity at rest, by the IMU as it is mounted, is along the root link."""
-    what = 'IMU against gravity'
+    what, settings = 'IMU against gravity', config.settings
     if not settings.hears_imu:
         return Check(what, UNSEEN, 'the robot has no IMU')
+    if settings.imu.placed == UNKNOWN:
+        return Check(what, OPEN, 'how the IMU is mounted is unknown')
     if evidence is None:
         return Check(what, UNSEEN, 'no recording: the monitor and evaluate look at it')
     imu = _imu_of(config, evidence)
     if imu is None:
-        return Check(what, FAILS, f'no IMU on {config.topics.imu.name} in {evidence.where}')
+        return Check(what, FAILS, f'no IMU on {config.topics.imu.name} in {evidence.place}')
+    return Check(what, *_by_gravity(config, posture, evidence, imu))
+
+
+def _by_gravity(
+    config: Config, posture: Mapping[str, float], evidence: Evidence, imu: SeenImu
+) -> tuple[str, str]:
+    """Return the state of the check, and how far (deg) up is off the root link's z axis."""
     up = up_of(imu)
     if not up.directions:
-        return Check(what, UNSEEN, f'{imu.topic} does not tell gravity at rest')
-    turn: Floats = np.array(settings.imu.mounting)
-    lean = [_lean(turn @ np.array(direction)) for direction in up.directions]
-    worst = max(lean)
-    words = f'at rest up is {math.degrees(worst):.1f} deg off the root link'
-    if worst > SLOPE:
-        return Check(what, FAILS, f'{words}: wrong mounting, or it stood on a slope')
-    return Check(what, OK, words)
+        return UNSEEN, f'{imu.topic} does not tell gravity at rest'
+    place = imu_place(config, posture, evidence, imu.frame)
+    if place is None:
+        return FAILS, f'its frame {imu.frame} is nowhere on the robot'
+    turn: Floats = np.array(place[1])
+    lean = max(_lean(turn @ np.array(direction)) for direction in up.directions)
+    words = f'at rest up is {math.degrees(lean):.1f} deg off the root link'
+    if lean > SLOPE:
+        return FAILS, f'{words}: wrong mounting, or it stood on a slope'
+    return OK, words
+
+
+def imu_place(
+    config: Config, posture: Mapping[str, float], evidence: Evidence | None, frame: str = ''
+) -> tuple[Vector, Matrix] | None:
+    """Return where the IMU is in the root link's axes in a posture, and its axes; None: unknown.
+
+    `frame` is what its messages name, where the configuration names none.
+    """
+    robot, imu = config.settings.robot, config.settings.imu
+    link, xyz, turn = imu.link or robot.root, imu.position, imu.mounting
+    if imu.placed == UNKNOWN:
+        return None
+    if imu.placed == AUTO:
+        told = evidence.transforms if evidence is not None else ()
+        transforms = [(t.parent, t.child, t.xyz, t.rotation) for t in told]
+        name = frame or imu.frame
+        found = place_of(robot, name, transforms) if name else None
+        if found is None:
+            return None
+        link, xyz, turn = found.link, found.xyz, found.rotation
+    tree = tree_of(robot)
+    pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
+    body, own, _ = tree.frames[link]
+    x, y, z = map(float, point_of(tree, pose, link, xyz)[1])
+    axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
+    a, b, c = ((float(i), float(j), float(k)) for i, j, k in axes)
+    return (x, y, z), (a, b, c)
 
 
 def _lean(up: Floats) -> float:

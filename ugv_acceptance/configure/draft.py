@@ -52,12 +52,17 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True)
 class DerivedJoint:
-    """A joint that messages tell: its name there and its limit (N m, N; None: not known)."""
+    """A joint that messages tell: its name there and its limit (N m, N; None: not known).
+
+    `effort_sign` and `effort_scale` make a torque of its effort, where that is known to need them.
+    """
 
     name: str
     topic_name: str
     limit: Derived[float]
     passive: bool = False
+    effort_sign: Derived[float] | None = None
+    effort_scale: Derived[float] | None = None
 
 
 @dataclass(frozen=True, slots=True)

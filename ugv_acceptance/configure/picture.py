@@ -2,19 +2,19 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.urdf import Urdf
-from ugv_acceptance.configure.checks import FAILS, OPEN, Check, positions_of
+from ugv_acceptance.configure.checks import FAILS, OPEN, Check, imu_place, positions_of
 from ugv_acceptance.configure.collision import geometry_of
+from ugv_acceptance.configure.evidence import Evidence
 from ugv_acceptance.configure.posture import posture_of
 from ugv_acceptance.configure.sources import MeshFinder
-from ugv_acceptance.evaluation.inputs.frames import place_of
-from ugv_acceptance.evaluation.settings import AUTO, UNKNOWN
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
-from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
+from ugv_acceptance.model.robot import ZERO, Robot
 from ugv_acceptance.model.stability import NO_CONTACT, stability_of, stances_of, standing
 from ugv_acceptance.model.tree import Pose, body_positions, drives_of, point_of, pose_of, tree_of
 from ugv_acceptance.report.robot_picture import Mark, Part, RobotPicture
@@ -28,19 +28,26 @@ _TURNS, _ALL_OVER = 72, 200
 _MOST = 20_000
 
 
-def picture_of(
-    config: Config,
-    urdf: Urdf,
-    posture: Mapping[str, float],
-    meshes: MeshFinder,
-    checks: Sequence[Check] = (),
-) -> RobotPicture:
-    """Return what is drawn of a configuration in a posture (rad, m), with what is wrong with it."""
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A configuration in a posture (rad, m), what was found of it, and where meshes are found."""
+
+    config: Config
+    urdf: Urdf
+    posture: Mapping[str, float]
+    meshes: MeshFinder
+    checks: tuple[Check, ...] = ()
+    evidence: Evidence | None = None
+
+
+def picture_of(scene: Scene) -> RobotPicture:
+    """Return what is drawn of a configuration, with what is wrong with it."""
+    config, posture = scene.config, scene.posture
     robot = config.settings.robot
     q = positions_of(robot, posture)
     tree = tree_of(robot)
     pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
-    parts = tuple(_parts(urdf, posture, meshes))
+    parts = tuple(_parts(scene.urdf, posture, scene.meshes))
     mechanics = mechanics_of(robot)
     found = posture_once(robot, q, 0.0, ZERO)
     gravity = (0.0, 0.0, -robot.gravity)
@@ -57,9 +64,9 @@ def picture_of(
         (cog[0], cog[1], cog[2]),
         robot.ground if robot.contacts else math.nan,
         tuple(angles),
-        _imu(config, posture),
+        imu_place(config, posture, scene.evidence) if config.settings.hears_imu else None,
         robot.root,
-        tuple(f'{c.state}: {c.what}: {c.text}' for c in checks if c.state in {FAILS, OPEN}),
+        tuple(f'{c.state}: {c.what}: {c.text}' for c in scene.checks if c.state in {FAILS, OPEN}),
     )
 
 
@@ -108,27 +115,6 @@ def _wrong(at: Floats, most: Floats) -> str:
         return ''
     off = float((_WAYS @ at - most).max(axis=1).min())
     return f'{off * 1e3:.0f} mm from the robot' if off > FAR else ''
-
-
-def _imu(config: Config, posture: Mapping[str, float]) -> tuple[Vector, Matrix] | None:
-    """Return where the IMU is in the root link's axes, and its axes there; None: not known."""
-    settings, imu = config.settings, config.settings.imu
-    if not settings.hears_imu or imu.placed == UNKNOWN:
-        return None
-    robot = settings.robot
-    link, xyz, turn = imu.link or robot.root, imu.position, imu.mounting
-    if imu.placed == AUTO:
-        found = place_of(robot, imu.frame) if imu.frame else None
-        if found is None:
-            return None
-        link, xyz, turn = found.link, found.xyz, found.rotation
-    tree = tree_of(robot)
-    pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
-    body, own, _ = tree.frames[link]
-    at = tuple(map(float, point_of(tree, pose, link, xyz)[1]))
-    axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
-    a, b, c = ((float(x), float(y), float(z)) for x, y, z in axes)
-    return (at[0], at[1], at[2]), (a, b, c)
 
 
 _WAYS = _ways()

@@ -86,9 +86,8 @@ def _contacts(draft: Draft) -> Question | None:
         f'Do these touch the ground: {_list(carriers(draft.contacts))}? {draft.contacts.question}'
     )
     guess = YES if len(draft.contacts.points) >= 3 else ''
-    return Question(
-        CONTACTS, text, '--contacts yes (or no, or LINK,LINK,...)', guess, 'tip-over is not checked'
-    )
+    option = '--contacts yes (or no; or LINK,LINK,...; or none: it is bolted down, and level)'
+    return Question(CONTACTS, text, option, guess, NO_TILT)
 
 
 def _tilt(draft: Draft) -> Question | None:
@@ -186,8 +185,12 @@ def _with_mass(draft: Draft, answers: Answers, _: Anew) -> Draft:
 
 def _with_contacts(draft: Draft, answers: Answers, anew: Anew) -> Draft:
     said, contacts = answers.contacts, draft.contacts
-    if said is None or said == NO:
-        return draft if said is None else replace(draft, contacts=_refused(contacts))
+    if said is None:
+        return draft
+    if said == NO:
+        return replace(draft, contacts=_refused(contacts))
+    if said == NONE:
+        return _bolted(draft, answers)
     if said != YES:
         links = [name.strip() for name in said.split(',') if name.strip()]
         _check_links(draft, links, '--contacts')
@@ -199,6 +202,21 @@ def _with_contacts(draft: Draft, answers: Answers, anew: Anew) -> Draft:
         )
     points = tuple(_said(point) for point in contacts.points)
     return replace(draft, contacts=replace(contacts, points=points, question=''))
+
+
+def _bolted(draft: Draft, answers: Answers) -> Draft:
+    """Return the draft of a robot that stands on nothing: it cannot tip, and needs no IMU."""
+    if answers.mounting not in {None, NONE}:
+        raise BadConfig(
+            f'--contacts {NONE}: expected no --mounting beside it: what is bolted down and level '
+            'is judged without an IMU'
+        )
+    why = f'{SAID}: it is bolted down, and level'
+    none: Derived[str] = Derived(None, CERTAIN, why)
+    contacts = replace(draft.contacts, points=(), question='', ground=Derived(None, CERTAIN, why))
+    return replace(
+        draft, contacts=contacts, mounting=replace(draft.mounting, topic=none, question='')
+    )
 
 
 def _refused(contacts: Contacts) -> Contacts:
@@ -221,7 +239,8 @@ def _check_links(draft: Draft, links: Sequence[str], option: str) -> None:
 
 def _with_tilt(draft: Draft, answers: Answers, _: Anew) -> Draft:
     contacts = draft.contacts
-    if answers.tilt is None or contacts.tilt < LEAST_TILT:
+    asked = _tilt(draft) is not None or 'this tilt real' in contacts.question
+    if answers.tilt is None or not asked:
         return draft
     if answers.tilt not in {REAL, NOT_REAL}:
         raise BadConfig(f'--tilt: expected {REAL} or {NOT_REAL}, got {cut(answers.tilt)}')
@@ -230,7 +249,7 @@ def _with_tilt(draft: Draft, answers: Answers, _: Anew) -> Draft:
         words = 'You said that the tilt of their plane is not real: which of them is wrong?'
         return replace(draft, contacts=replace(contacts, question=words))
     points = tuple(_said(point) for point in contacts.points)
-    return replace(draft, contacts=replace(contacts, points=points))
+    return replace(draft, contacts=replace(contacts, points=points, question=''))
 
 
 def _with_mounting(draft: Draft, answers: Answers, _: Anew) -> Draft:

@@ -135,6 +135,9 @@ def _joint(draft: Draft, joint: DerivedJoint) -> Iterator[str]:
     topic, limit = draft.joints.topic, joint.limit
     if joint.topic_name != joint.name:
         yield _line('topic_name', text_of(joint.topic_name), *_said(topic), 2)
+    for key, one in (('effort_sign', joint.effort_sign), ('effort_scale', joint.effort_scale)):
+        if one is not None and one.value is not None:
+            yield _line(key, number(one.value, 6), *_said(one), 2)
     if joint.passive:
         why = limit.source or 'no motor turns it'
         yield _line('passive', 'true', limit.grade, why, 2)
