@@ -11,12 +11,14 @@ from ugv_acceptance.config.build import Build, assumed_numbers, checked, setting
 from ugv_acceptance.config.contact_check import compared, uneven_tracks
 from ugv_acceptance.config.document import read_document
 from ugv_acceptance.config.schema import File
+from ugv_acceptance.config.setup_checks import setup_doubts
 from ugv_acceptance.config.strength import worst_torques
 from ugv_acceptance.config.topics import Topics, topics_from
 from ugv_acceptance.config.urdf import read_urdf
 from ugv_acceptance.evaluation.criteria.not_judged import LEAST
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.clearance import STANDS
+from ugv_acceptance.model.robot import Contact, Payload
 
 PACKAGE = 'ugv_acceptance'
 DEFAULT = Path('packbot')
@@ -210,4 +212,16 @@ def _check_contacts(build: Build, settings: Settings) -> tuple[str, ...]:
             f' that of three others, so {math.degrees(uneven.rocking):.1f} deg of rocking are taken'
             ' from every margin until all of them carry',
         )
+    _check_setup(build, settings)
     return tuple(contact.name for contact in found.unknown)
+
+
+def _check_setup(build: Build, settings: Settings) -> None:
+    """Warn of what is doubtful of how the robot stands; with few points build.py has warned."""
+    contacts = build.file.contacts
+    if len(contacts) < STANDS:
+        return
+    given = [Contact(name, c.link, c.position) for name, c in contacts.items()]
+    known = tuple(build.file.assumed or ())
+    for doubt in setup_doubts(settings.robot, build.urdf.shapes, given, known=known):
+        build.warn(doubt.field, doubt.words)

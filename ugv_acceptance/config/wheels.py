@@ -23,6 +23,9 @@ from ugv_acceptance.type_aliases import Floats
 # A wheel's centre of gravity lies this close to its axle (share of its radius); that of a flipper
 # does not. A point below the axle is at most this far from straight below it (rad).
 BALANCED, BELOW = 0.05, math.radians(10.0)
+# A point so far (rad) from straight below an axle is told; a joint whose axis is so upright (its
+# component along gravity) turns a caster or a turret, no wheel.
+ASKEW, UPRIGHT = math.radians(1.0), 0.7
 Refuse = Callable[[Path, str], BadConfig]
 
 
@@ -35,19 +38,19 @@ class Stands:
 
 
 def on_axles(robot: Robot, refuse: Refuse) -> Stands:
-    """Return the contact points of `robot` with those on measured wheels fixed below their axles.
+    """Return the contact points of `robot` with those on wheels fixed below their axles.
 
+    Wheels that are held count too: no message tells their angle, but they turn all the same.
     Raises `refuse` of a point elsewhere on a wheel: it would go round with it.
     """
-    endless = {j.name for j in robot.joints if j.kind == 'continuous' and j.name in _moving(robot)}
+    endless = {joint.name for joint in robot.joints if joint.kind == 'continuous'}
     if not endless:
         return Stands(robot.contacts, ())
-    tree = tree_of(robot)
-    drives = drives_of(robot, tree)
-    pose = pose_of(tree, body_positions(drives, [0.0] * len(robot.joint_names)))
+    turning = _turning(robot, endless)
+    tree, pose = _posed(turning, robot)
     contacts, moved = [], []
     for contact in robot.contacts:
-        found = _fixed(robot, tree, pose, contact, endless, refuse)
+        found = _fixed(turning, tree, pose, contact, endless, refuse)
         if found is not contact:
             moved.append(
                 f'{contact.name} is taken as the lowest point of the wheel {contact.link}, fixed '
@@ -57,23 +60,50 @@ def on_axles(robot: Robot, refuse: Refuse) -> Stands:
     return Stands(tuple(contacts), tuple(moved))
 
 
-def _moving(robot: Robot) -> set[str]:
-    return {*robot.joint_names, *(mimic.joint for mimic in robot.mimics)}
+def askew(robot: Robot) -> tuple[tuple[Contact, float], ...]:
+    """Return the contact points on wheels that are not straight below their axles, and by what.
+
+    By an angle (rad) about the axle, above ASKEW; `robot` has its contacts as its file gives them.
+    """
+    endless = {joint.name for joint in robot.joints if joint.kind == 'continuous'}
+    if not endless:
+        return ()
+    tree, pose = _posed(_turning(robot, endless), robot)
+    found = []
+    for contact in robot.contacts:
+        on = _on_wheel(tree, pose, contact, endless)
+        if on is not None:
+            _, arm, radius = on
+            off = math.acos(max(-1.0, min(1.0, -float(arm[2]) / radius)))
+            if off > ASKEW:
+                found.append((contact, off))
+    return tuple(found)
+
+
+def _turning(robot: Robot, endless: set[str]) -> Robot:
+    """Return `robot` with its held wheels moving, so that each is a body of its own."""
+    moving = {*robot.joint_names, *(mimic.joint for mimic in robot.mimics)}
+    held = tuple(sorted(endless - moving))
+    rest = tuple((name, at) for name, at in robot.held if name not in held)
+    return replace(robot, joint_names=(*robot.joint_names, *held), held=rest)
+
+
+def _posed(turning: Robot, robot: Robot) -> tuple[Tree, Pose]:
+    """Return the tree of a robot with turning wheels, in the zero posture of `robot`."""
+    tree, held = tree_of(turning), dict(robot.held)
+    at = [held.get(name, 0.0) for name in turning.joint_names]
+    return tree, pose_of(tree, body_positions(drives_of(turning, tree), at))
 
 
 def _fixed(
     robot: Robot, tree: Tree, pose: Pose, contact: Contact, endless: set[str], refuse: Refuse
 ) -> Contact:
     """Return a contact point on the link that carries the wheel it is on; else the point itself."""
-    body, point = point_of(tree, pose, contact.link, contact.position)
-    at = np.array(point, dtype=np.float64)
-    name = tree.bodies[body].joint
-    if name not in endless:
+    on = _on_wheel(tree, pose, contact, endless)
+    if on is None:
         return contact
-    arm = _across(at - np.array(pose.origin[body], dtype=np.float64), pose.axis[body])
-    radius = float(np.linalg.norm(arm))
-    if not _is_wheel(tree, body, radius):
-        return contact
+    at, arm, radius = on
+    name = tree.bodies[tree.frames[contact.link][0]].joint
     if -arm[2] < math.cos(BELOW) * radius:
         raise refuse(
             ('contacts', contact.name, 'position'),
@@ -87,6 +117,22 @@ def _fixed(
     origin = np.array(point_of(tree, pose, parent, (0.0, 0.0, 0.0))[1], dtype=np.float64)
     x, y, z = (turn.T @ (at - origin)).tolist()
     return replace(contact, link=parent, position=(x, y, z))
+
+
+def _on_wheel(
+    tree: Tree, pose: Pose, contact: Contact, endless: set[str]
+) -> tuple[Floats, Floats, float] | None:
+    """Return a contact's place (3,), its arm from the axle (3,) and their distance; m.
+
+    None for a point that is on no wheel.
+    """
+    body, point = point_of(tree, pose, contact.link, contact.position)
+    at, axis = np.array(point, dtype=np.float64), np.array(pose.axis[body], dtype=np.float64)
+    if tree.bodies[body].joint not in endless or abs(axis[2]) > UPRIGHT:
+        return None
+    arm = _across(at - np.array(pose.origin[body], dtype=np.float64), axis)
+    radius = float(np.linalg.norm(arm))
+    return (at, arm, radius) if _is_wheel(tree, body, radius) else None
 
 
 def _across(arm: Floats, axis: object) -> Floats:
