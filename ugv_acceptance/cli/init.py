@@ -17,7 +17,13 @@ if TYPE_CHECKING:
     from ugv_acceptance.cli.init_work import Found
 
 DONE, FAILS, OPEN = 0, 1, 3
-COLOURS = {'ok': 'green', 'FAILS': 'bold red', 'open': 'yellow', 'not seen': 'dim'}
+COLOURS = {
+    'ok': 'green',
+    'FAILS': 'bold red',
+    'open': 'yellow',
+    'not seen': 'dim',
+    'look': 'yellow',
+}
 
 
 def say(text: str) -> None:

@@ -74,7 +74,7 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     if told:
         written = yaml_of(draft)
         config = _loaded(written, text, out)
-    checks = checks_of(config, positions(draft.home), evidence, questions_of(draft))
+    checks = checks_of(config, draft.urdf, positions(draft.home), evidence, questions_of(draft))
     if draft.joints.question:
         checks = (*checks, Check('joint names', OPEN, draft.joints.question))
     if made:
@@ -103,7 +103,7 @@ def check_it(path: Path, asked: Asked) -> Found:
     urdf = read_urdf(config.urdf_path.read_bytes(), str(config.urdf_path))
     evidence = _evidence(replace(sources, urdf=config.urdf_path.read_bytes()), asked)
     posture = positions(rest_posture(urdf, evidence))
-    checks = checks_of(config, posture, evidence)
+    checks = checks_of(config, urdf, posture, evidence)
     if asked.picture is not None:
         finder = mesh_finder(config.urdf_path, asked.meshes)
         _draw(asked.picture, Scene(config, urdf, posture, finder, checks, evidence))
