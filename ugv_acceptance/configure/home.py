@@ -14,6 +14,8 @@ _NAMES = tuple(
 )
 # A gripper's fingers have so many joints each at most.
 _PHALANGES = 3
+# A chain of so many measured joints may be an arm, though none of them lifts; a head has two.
+_SEVERAL = 3
 
 
 def positions(home: Mapping[str, Derived[float]]) -> dict[str, float]:
@@ -29,11 +31,14 @@ def payload_link(robot: Robot) -> Derived[str]:
     """
     arm = roles_of(robot).arm
     if not arm:
-        return Derived(None, CHECK, 'no chain of measured joints that lifts a load')
+        ends = _rivals(robot, _SEVERAL)
+        if not ends:
+            return Derived(None, CHECK, 'no chain of measured joints that lifts a load')
+        return Derived(ends[-1], ASK, f'{ends[-1]} ends a chain of joints, none of which lifts')
     at, fingers = _palm(robot, arm)
     fixed = [robot.joint(name) for name in arm]
     ends = _fixed_to(robot, at)
-    rivals = _rivals(robot, arm)
+    rivals = _rivals(robot, len(arm), arm)
     link, why = _best(robot, at, ends)
     source = f'the end of {" -> ".join(_few(arm))}' + (', which carries the fingers' * fingers)
     if rivals:
@@ -89,13 +94,13 @@ def _best(robot: Robot, at: str, ends: tuple[str, ...]) -> tuple[str, str]:
     return (leaves[0], '') if len(leaves) == 1 else (at, '')
 
 
-def _rivals(robot: Robot, arm: tuple[str, ...]) -> list[str]:
+def _rivals(robot: Robot, length: int, arm: tuple[str, ...] = ()) -> list[str]:
     """Return the ends of other chains of as many measured joints that share none with the arm."""
     roles = roles_of(robot)
     other = {*roles.legs, *roles.flippers, *roles.wheels, *arm}
     found = []
     for link in robot.links:
         own = [n for n in chain_to(robot, link.name) if n in robot.joint_names]
-        if len(own) >= len(arm) and not set(own) & other:
+        if len(own) >= length and not set(own) & other:
             found.append(link.name)
     return found

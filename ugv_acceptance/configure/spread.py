@@ -13,12 +13,14 @@ from ugv_acceptance.model.robot import Link
 # deg of the IMU's mounting. Of a mass on scales, shared out by the URDF: share of it.
 MASS, COG, POINT, MOUNTING, WEIGHED = 0.1, 0.02, 0.005, 1.0, 0.03
 # Links named: at most so many, which have this share of the mass together; the centres of gravity
-# of those that have at least so much by themselves.
-MOST, TOGETHER, HEAVY = 8, 0.95, 0.1
+# of those that have at least so much by themselves, of so many.
+MOST, TOGETHER, HEAVY, HEAVIEST = 8, 0.95, 0.1, 3
 # Mass that the URDF lacks may lie so far (m) from where the URDF's own lies.
 ELSEWHERE = 0.15
 # Scales and URDF differ by less than this share: they agree.
 AGREE = 0.005
+# A reason is cut to so many characters.
+_LONGEST = 80
 _AXES = ('x', 'y', 'z')
 
 
@@ -83,7 +85,7 @@ def _assumed(draft: Draft) -> Iterator[tuple[str, str]]:
             yield f'{joint.name}.limit', 'the effort in the URDF'
     position = draft.mounting.position
     if draft.mounting.topic.value and position.value is not None and position.grade != CERTAIN:
-        yield 'imu.position', position.source
+        yield 'imu.position', position.source[:_LONGEST]
     if draft.contacts.points and not draft.open & {CONTACTS, TILT}:
         said = [p for p in draft.contacts.points if SAID in p.source]
         if said and draft.contacts.tilt >= math.radians(0.2):
@@ -109,7 +111,7 @@ def _of_links(draft: Draft) -> Iterator[tuple[str, float, str]]:
             mass = changed[1] if changed else link.mass
             share, why = WEIGHED, '+/-3 %: the robot was weighed'
         yield f'{link.name}.mass_kg', mass * share, why
-    for link in heaviest(draft.urdf):
+    for link in heaviest(draft.urdf)[:HEAVIEST]:
         if link.mass < HEAVY * total:
             continue
         far, why = COG, "+/-2 cm: only the URDF's word"

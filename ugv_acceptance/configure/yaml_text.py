@@ -29,7 +29,7 @@ _WORDS = frozenset({'y', 'n', 'yes', 'no', 'on', 'off', 'true', 'false', 'null',
 # A tilt of the plane of the contact points (rad) below this is not told.
 LEAST_TOLD = math.radians(0.005)
 # A source is cut to so many characters.
-_LONGEST = 150
+_LONGEST = 110
 HEAD = '# Written by ugv-acceptance init. Each line says how sure its value is, and its source:'
 _GRADES = (
     '#   certain: measured, or told by you;  check: look whether it is so;  ask: nobody told it.',
