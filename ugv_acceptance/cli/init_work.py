@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.bag.atomic_files import write_bytes, write_text
@@ -18,7 +19,6 @@ from ugv_acceptance.configure.draft import Draft
 from ugv_acceptance.configure.evidence import Evidence
 from ugv_acceptance.configure.home import positions
 from ugv_acceptance.configure.joints import rest_posture
-from ugv_acceptance.configure.picture import Scene, picture_of
 from ugv_acceptance.configure.questions import Answers, Question, answered, ask, questions_of
 from ugv_acceptance.configure.sources import Sources, mesh_finder, sources_of
 from ugv_acceptance.configure.yaml_text import yaml_of
@@ -58,11 +58,14 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     Raises AcceptanceError where a source cannot be used or a file must not be replaced.
     """
     sources = _sources(asked)
-    evidence = _evidence(sources, asked)
-    text, made = _description(sources, evidence)
-    described = out.with_suffix('.urdf') if made else sources.path
-    assert described is not None  # noqa: S101 - a URDF that was not made has a path
+    described = out.with_suffix('.urdf')
+    # A URDF that is in no file yet is written beside the YAML.
+    made = sources.made or sources.path is None
+    if not made and sources.path is not None:
+        described = sources.path
     _guard(out, described if made else None, sources, asked)
+    evidence = _evidence(sources, asked)
+    text = _description(sources, evidence)
     asked.say('looking for what carries the robot')
     name = str(sources.path or (evidence and evidence.where) or described)
     finder = mesh_finder(sources.path, asked.meshes)
@@ -83,8 +86,8 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     files = [out, *([described] if made else [])]
     if asked.picture is not None:
         asked.say('drawing')
-        scene = Scene(config, draft.urdf, positions(draft.home), finder, checks, evidence)
-        _draw(asked.picture, scene)
+        seen = (positions(draft.home), finder, checks, evidence)
+        _draw(asked.picture, config, draft.urdf, *seen)
         files.append(asked.picture)
     notes = tuple(dict.fromkeys((*_notes(draft, sources, evidence), *told)))
     done = f'ugv-acceptance evaluate RECORDING --config {out}'
@@ -106,7 +109,7 @@ def check_it(path: Path, asked: Asked) -> Found:
     checks = checks_of(config, urdf, posture, evidence)
     if asked.picture is not None:
         finder = mesh_finder(config.urdf_path, asked.meshes)
-        _draw(asked.picture, Scene(config, urdf, posture, finder, checks, evidence))
+        _draw(asked.picture, config, urdf, posture, finder, checks, evidence)
     files = () if asked.picture is None else (asked.picture,)
     return Found(checks, config.warnings, (), files, 'no check fails')
 
@@ -137,12 +140,12 @@ def _evidence(sources: Sources, asked: Asked) -> Evidence | None:
     return evidence_of([*sources.recordings], urdf)
 
 
-def _description(sources: Sources, evidence: Evidence | None) -> tuple[bytes, bool]:
-    """Return the text of the URDF, and whether it is in no file yet."""
+def _description(sources: Sources, evidence: Evidence | None) -> bytes:
+    """Return the text of the URDF: the one given, else that of /robot_description."""
     if sources.urdf is not None:
-        return sources.urdf, sources.made
+        return sources.urdf
     if evidence is not None and evidence.urdf is not None:
-        return evidence.urdf, True
+        return evidence.urdf
     where = evidence.where if evidence is not None else 'init'
     raise BadConfig(f'{where}: expected /robot_description in it, found none: give its URDF too')
 
@@ -153,9 +156,9 @@ def _guard(out: Path, made: Path | None, sources: Sources, asked: Asked) -> None
     if sources.path is not None:
         inputs.append(Input('the description', sources.path))
     outputs = [
-        Output('-o', out, kinds.CONFIGURATION),
-        Output('-o', made, kinds.DESCRIPTION),
         Output('--picture', asked.picture, kinds.PICTURE),
+        Output('--out', out, kinds.CONFIGURATION),
+        Output('--out', made, kinds.DESCRIPTION),
     ]
     check_outputs(outputs, inputs, overwrite=asked.overwrite)
 
@@ -219,10 +222,11 @@ def _loaded(yaml: str, urdf: bytes, out: Path) -> Config:
             raise BadConfig(str(error).replace(str(files[0]), str(out))) from None
 
 
-def _draw(path: Path, scene: Scene) -> None:
+def _draw(path: Path, *scene: Any) -> None:  # noqa: ANN401 - the fields of a Scene
+    from ugv_acceptance.configure.picture import Scene, picture_of
     from ugv_acceptance.report.robot_picture import picture_html, picture_png
 
-    picture = picture_of(scene)
+    picture = picture_of(Scene(*scene))
     if path.suffix.lower() == '.png':
         write_bytes(path, picture_png(picture))
     else:

@@ -24,9 +24,7 @@ from ugv_acceptance.model.robot import Vector
 MASS, CONTACTS, TILT, IMU = 'mass', 'contacts', 'tilt', 'mounting'
 LIMITS, LOAD = 'limit', 'load-link'
 YES, NO, REAL, NOT_REAL, URDF, NONE = 'yes', 'no', 'real', 'not-real', 'urdf', 'none'
-MOUNTINGS = (
-    '--mounting ROLL,PITCH,YAW such as 180deg,-90deg,0 (or yes: as guessed; or none: no IMU)'
-)
+MOUNTINGS = '--mounting 180deg,-90deg,0 (roll, pitch, yaw; or yes: as found; or none: no IMU)'
 NO_TILT = 'tip-over is not checked'
 # Tilt (rad) of the plane of the contact points from which a person has to say whether it is real.
 LEAST_TILT = math.radians(0.2)
