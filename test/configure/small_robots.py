@@ -1,119 +1,155 @@
-"""Small URDFs of our own for the tests of `init`: a rover, a tracked arm, an arm alone, a dog."""
+"""Small URDFs and meshes for the tests of configure."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
-INERTIA = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.configure.contact_points import derive_contacts
+from ugv_acceptance.configure.draft import Contacts
+
+Triangle = tuple[tuple[float, float, float], ...]
 
 
-def link(name: str, mass: float = 0.0, shape: str = '', at: str = '0 0 0', cog: str = '') -> str:
-    """Return a link with a mass at `cog` and a collision shape at `at`, both in its axes."""
-    body = ''
-    if mass:
-        place = cog or at
-        body += f'<inertial><origin xyz="{place}"/><mass value="{mass}"/>{INERTIA}</inertial>'
-    if shape:
-        body += f'<collision><origin xyz="{at}"/><geometry>{shape}</geometry></collision>'
-    return f'<link name="{name}">{body}</link>'
+def link(name: str, geometry: str = '', mass: float = 1.0, cog: str = '0 0 0') -> str:
+    """Return a link with collision elements and a mass; 0: without an inertial."""
+    inertial = (
+        f'<inertial><origin xyz="{cog}"/><mass value="{mass}"/>'
+        '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    return f'<link name="{name}">{inertial if mass else ""}{geometry}</link>'
 
 
 def joint(
-    name: str, kind: str, ends: tuple[str, str], xyz: str, axis: str = '0 1 0', limit: str = ''
+    child: str, xyz: str, kind: str = 'fixed', axis: str = '0 1 0', parent: str = 'base_link'
 ) -> str:
-    """Return a joint between two links; `limit` is the effort, with a range of 2 rad each way."""
-    parent, child = ends
-    text = f'<origin xyz="{xyz}"/><parent link="{parent}"/><child link="{child}"/>'
-    if kind != 'fixed':
-        text += f'<axis xyz="{axis}"/>'
-    if limit:
-        text += f'<limit lower="-2" upper="2" effort="{limit}" velocity="2"/>'
-    return f'<joint name="{name}" type="{kind}">{text}</joint>'
-
-
-def robot(name: str, *parts: str) -> str:
-    """Return a URDF."""
-    return f'<robot name="{name}">\n' + '\n'.join(parts) + '\n</robot>\n'
-
-
-def box(x: float, y: float, z: float) -> str:
-    """Return the geometry of a box (m)."""
-    return f'<box size="{x} {y} {z}"/>'
-
-
-def _imu() -> Iterator[str]:
-    yield link('imu_link')
-    yield joint('imu_mount', 'fixed', ('base_link', 'imu_link'), '0 0 0.1')
-
-
-def rover() -> str:
-    """Return a rover of 20 kg: four wheels of 0.1 m radius, 5 cm wide, tracks 0.5 m apart."""
-    parts = [link('base_link', 16.0, box(0.6, 0.3, 0.2)), *_imu()]
-    for end, x in (('front', 0.2), ('rear', -0.2)):
-        for side, y in (('left', 0.25), ('right', -0.25)):
-            name = f'{end}_{side}_wheel'
-            wheel = '<cylinder radius="0.1" length="0.05"/>'
-            body = link(f'{name}_link', 1.0, wheel)
-            body = body.replace(
-                '<collision><origin xyz="0 0 0"/>',
-                '<collision><origin xyz="0 0 0" rpy="1.5707963267948966 0 0"/>',
-            )
-            parts += [body]
-            parts += [joint(name, 'continuous', ('base_link', f'{name}_link'), f'{x} {y} -0.05')]
-    return robot('rover', *parts)
-
-
-def tracked_arm(shoulder: str = '60', elbow: str = '40') -> str:
-    """Return a tracked robot of 36 kg with turret, shoulder, elbow and a fixed gripper."""
-    return robot(
-        'tracked',
-        link('base_link', 30.0, box(0.7, 0.1, 0.2), '0 0.2 0.1', '0 0 0.08'),
-        link('right_track', 0.0, box(0.7, 0.1, 0.2)),
-        joint('right', 'fixed', ('base_link', 'right_track'), '0 -0.2 0.1'),
-        *_imu(),
-        link('turret_link', 1.0, box(0.1, 0.1, 0.05)),
-        joint('turret', 'revolute', ('base_link', 'turret_link'), '0 0 0.25', '0 0 1', '30'),
-        link('upper_link', 3.0, box(0.5, 0.05, 0.05), '0.25 0 0'),
-        joint(
-            'shoulder', 'revolute', ('turret_link', 'upper_link'), '0 0 0.05', '0 -1 0', shoulder
-        ),
-        link('fore_link', 2.0, box(0.4, 0.05, 0.05), '0.2 0 0'),
-        joint('elbow', 'revolute', ('upper_link', 'fore_link'), '0.5 0 0', '0 -1 0', elbow),
-        link('gripper_link'),
-        joint('grip', 'fixed', ('fore_link', 'gripper_link'), '0.4 0 0'),
-    )  # fmt: skip
-
-
-def arm_alone() -> str:
-    """Return an arm of three joints that stands on nothing: its root is the world."""
-    return robot(
-        'bench_arm',
-        link('world'),
-        link('base_link', 4.0, box(0.2, 0.2, 0.1), '0 0 0.05'),
-        joint('bolted', 'fixed', ('world', 'base_link'), '0 0 0'),
-        link('one', 1.0, box(0.05, 0.05, 0.1)),
-        joint('pan', 'revolute', ('base_link', 'one'), '0 0 0.15', '0 0 1', '20'),
-        link('two', 2.0, box(0.4, 0.05, 0.05), '0.2 0 0'),
-        joint('lift', 'revolute', ('one', 'two'), '0 0 0.05', '0 -1 0', '30'),
-        link('three', 1.0, box(0.3, 0.05, 0.05), '0.15 0 0'),
-        joint('bend', 'revolute', ('two', 'three'), '0.4 0 0', '0 -1 0', '15'),
-        link('tool0'),
-        joint('flange', 'fixed', ('three', 'tool0'), '0.3 0 0'),
+    """Return a joint to `child`; a moving one without limits turns up to 3 rad."""
+    limit = '<limit lower="-3" upper="3" effort="9" velocity="9"/>' if kind != 'fixed' else ''
+    return (
+        f'<joint name="{child}_joint" type="{kind}"><origin xyz="{xyz}"/><parent link="{parent}"/>'
+        f'<child link="{child}"/><axis xyz="{axis}"/>{limit}</joint>'
     )
 
 
-def dog() -> str:
-    """Return a robot of 12 kg on four legs of two joints, with balls as feet."""
-    parts = [link('base_link', 8.0, box(0.5, 0.2, 0.1)), *_imu()]
-    for end, x in (('front', 0.2), ('rear', -0.2)):
-        for side, y in (('left', 0.12), ('right', -0.12)):
-            name = f'{end}_{side}'
-            parts += [
-                link(f'{name}_thigh', 0.6, box(0.03, 0.03, 0.2), '0 0 -0.1'),
-                joint(f'{name}_hip', 'revolute', ('base_link', f'{name}_thigh'), f'{x} {y} 0',
-                      '0 1 0', '23.5'),
-                link(f'{name}_shank', 0.4, box(0.03, 0.03, 0.16), '0 0 -0.1'),
-                joint(f'{name}_knee', 'revolute', (f'{name}_thigh', f'{name}_shank'), '0 0 -0.2',
-                      '0 1 0', '45'),
-                link(f'{name}_foot', 0.0, '<sphere radius="0.02"/>'),
-                joint(f'{name}_ankle', 'fixed', (f'{name}_shank', f'{name}_foot'), '0 0 -0.2'),
-            ]  # fmt: skip
-    return robot('dog', *parts)
+def shape(geometry: str, xyz: str = '0 0 0', rpy: str = '0 0 0', tag: str = 'collision') -> str:
+    """Return a collision (or visual) element of a geometry such as box(...)."""
+    return f'<{tag}><origin xyz="{xyz}" rpy="{rpy}"/><geometry>{geometry}</geometry></{tag}>'
+
+
+def box(x: float, y: float, z: float) -> str:
+    """Return a box by its edges (m)."""
+    return f'<box size="{x} {y} {z}"/>'
+
+
+def sphere(radius: float) -> str:
+    """Return a sphere (m)."""
+    return f'<sphere radius="{radius}"/>'
+
+
+def tyre(radius: float, width: float, tag: str = 'collision') -> str:
+    """Return a cylinder about y (m) as a collision or visual element."""
+    cylinder = f'<cylinder radius="{radius}" length="{width}"/>'
+    return shape(cylinder, rpy=f'{math.pi / 2.0} 0 0', tag=tag)
+
+
+def mesh(name: str, scale: str = '1 1 1') -> str:
+    """Return a mesh."""
+    return f'<mesh filename="{name}" scale="{scale}"/>'
+
+
+def wheel(name: str, xyz: str, geometry: str, parent: str = 'base_link') -> str:
+    """Return a wheel and its joint about y."""
+    return link(name, geometry) + joint(name, xyz, 'continuous', parent=parent)
+
+
+def rover(geometry: str, wheels: str, more: str = '', cog: str = '0 0 0') -> str:
+    """Return a URDF: a base of 10 kg and what hangs on it."""
+    return f'<robot name="rover">{link("base_link", geometry, 10.0, cog)}{wheels}{more}</robot>'
+
+
+def four(geometry: str, x: float = 0.2, y: float = 0.2, z: float = 0.1) -> str:
+    """Return four wheels at +/-x, +/-y, z (m)."""
+    names = ('front_left', 'front_right', 'rear_left', 'rear_right')
+    places = [f'{a} {b} {z}' for a in (x, -x) for b in (y, -y)]
+    return ''.join(wheel(n, at, geometry) for n, at in zip(names, places, strict=True))
+
+
+def derived(
+    urdf: str,
+    posture: Mapping[str, float] | None = None,
+    meshes: Callable[[str], Path | None] = lambda _: None,
+) -> Contacts:
+    """Return what is derived of a URDF's text."""
+    return derive_contacts(read_urdf(urdf.encode(), 'test.urdf'), posture or {}, meshes)
+
+
+def block(
+    x: float, y: float, z: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> list[Triangle]:
+    """Return the triangles of a block by its edges, about `at` (m)."""
+    corners = [
+        (at[0] + a * x / 2.0, at[1] + b * y / 2.0, at[2] + c * z / 2.0)
+        for a in (1, -1)
+        for b in (1, -1)
+        for c in (1, -1)
+    ]
+    return [(corners[0], corners[k], corners[k + 1]) for k in range(1, 7)]
+
+
+def drum(radius: float, width: float, count: int = 48) -> list[Triangle]:
+    """Return the triangles of a wheel about y (m), with a boss on its axle that sticks out."""
+    rims = [
+        [(radius * math.cos(a), side * width / 2.0, radius * math.sin(a))
+         for a in (2.0 * math.pi * k / count for k in range(count))]
+        for side in (1.0, -1.0)
+    ]  # fmt: skip
+    found = []
+    for rim, side in zip(rims, (1.0, -1.0), strict=True):
+        boss = (0.0, side * width, 0.0)
+        found += [(boss, rim[k - 1], rim[k]) for k in range(count)]
+    return found
+
+
+def write_stl(path: Path, triangles: Sequence[Triangle]) -> Path:
+    """Write triangles as an STL file of text."""
+    lines = ['solid made']
+    for corners in triangles:
+        lines += ['facet normal 0 0 1', 'outer loop']
+        lines += [f'vertex {x} {y} {z}' for x, y, z in corners]
+        lines += ['endloop', 'endfacet']
+    path.write_text('\n'.join([*lines, 'endsolid made', '']), encoding='utf-8')
+    return path
+
+
+def write_obj(path: Path, triangles: Sequence[Triangle]) -> Path:
+    """Write triangles as an OBJ file, with a corner that is part of none."""
+    lines = ['v 9 9 -9', *(f'v {x} {y} {z}' for corners in triangles for x, y, z in corners)]
+    lines += [f'f {3 * k + 2} {3 * k + 3} {3 * k + 4}' for k in range(len(triangles))]
+    path.write_text('\n'.join([*lines, '']), encoding='utf-8')
+    return path
+
+
+def write_dae(path: Path, triangles: Sequence[Triangle], metres: float = 1.0) -> Path:
+    """Write triangles as a COLLADA file whose unit is `metres` (m)."""
+    numbers = ' '.join(f'{c}' for corners in triangles for corner in corners for c in corner)
+    count = 3 * len(triangles)
+    path.write_text(
+        f"""<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="made" meter="{metres}"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="{3 * count}">{numbers}</float_array>
+<technique_common><accessor source="#a" count="{count}" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+</accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="{len(triangles)}"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>{' '.join(map(str, range(count)))}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>
+""",
+        encoding='utf-8',
+    )
+    return path

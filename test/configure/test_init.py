@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 from cli.here import ugv
-from configure.small_robots import arm_alone, dog, rover, tracked_arm
+from configure.init_robots import arm_alone, dog, rover, tracked_arm
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter

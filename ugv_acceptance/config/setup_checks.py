@@ -87,7 +87,7 @@ def setup_doubts(
     if face is not None and not any(k in moves for k in carrying):
         found += _tilt(robot, face, 'contacts.tilt' in known)
     near = carrying if face else list(range(len(points)))
-    found += _balance(robot, tree, [points[k] for k in near], cog, given_posture=bool(posture))
+    found += _balance(robot, tree, [points[k] for k in near], cog, given_posture=posture is not None)
     return tuple(found)
 
 
@@ -194,8 +194,8 @@ def _under_wheels(
     """
     above = {joint.child: joint for joint in robot.joints if joint.kind == 'continuous'}
     found = []
-    for shape in shapes:
-        if shape.kind != 'cylinder' or shape.size is None or shape.link not in above:
+    for shape in _widest(shapes):
+        if shape.size is None or shape.link not in above:
             continue
         body, (x, y, z) = point_of(tree, pose, shape.link, shape.xyz)
         centre = np.array([x, y, z], dtype=np.float64)
@@ -214,6 +214,17 @@ def _under_wheels(
     return found
 
 
+def _widest(shapes: Sequence[Shape]) -> list[Shape]:
+    """Return the cylinder of the largest radius of each link: a tyre may be of several."""
+    found: dict[str, tuple[float, Shape]] = {}
+    for shape in shapes:
+        if shape.kind == 'cylinder' and shape.size is not None:
+            before = found.get(shape.link)
+            if before is None or before[0] < shape.size[0]:
+                found[shape.link] = (shape.size[0], shape)
+    return [shape for _, shape in found.values()]
+
+
 def _off_lowest(arm: Any, axle: Any, size: Vector) -> str | None:  # noqa: ANN401 - arrays (3,)
     """Return how a point in the footprint of a wheel misses its lowest point; None if it does not.
 
@@ -227,5 +238,5 @@ def _off_lowest(arm: Any, axle: Any, size: Vector) -> str | None:  # noqa: ANN40
     high = float(arm[2]) + radius
     if ahead <= slack and abs(high) <= slack:
         return None
-    side = 'above' if high > 0.0 else 'below'
+    side = 'above' if high > -5e-4 else 'below'
     return f'{1e3 * ahead:.0f} mm off along the ground and {1e3 * abs(high):.0f} mm {side} it'

@@ -81,11 +81,12 @@ def askew(robot: Robot) -> tuple[tuple[Contact, float], ...]:
 
 
 def _turning(robot: Robot, endless: set[str]) -> Robot:
-    """Return `robot` with its held wheels moving, so that each is a body of its own."""
+    """Return `robot`, bare of contacts, with its held wheels moving: each is a body of its own."""
     moving = {*robot.joint_names, *(mimic.joint for mimic in robot.mimics)}
     held = tuple(sorted(endless - moving))
     rest = tuple((name, at) for name, at in robot.held if name not in held)
-    return replace(robot, joint_names=(*robot.joint_names, *held), held=rest)
+    names = (*robot.joint_names, *held)
+    return replace(robot, joint_names=names, held=rest, contacts=(), shapes=())
 
 
 def _posed(turning: Robot, robot: Robot) -> tuple[Tree, Pose]:

@@ -23,6 +23,7 @@ from ugv_acceptance.type_aliases import Floats
 Meshes = Callable[[str], Path | None]
 # A larger mesh (bytes) is not collision geometry.
 LARGEST = 200_000_000
+FORMATS = ('.stl', '.obj', '.dae')
 # Points (m) so close are one; a rim that is not round is told by so many points.
 SAME, RIM = 1e-7, 16
 
@@ -248,28 +249,31 @@ def _corners(name: str, meshes: Meshes) -> Floats | str:
     path = meshes(name)
     if path is None:
         return 'file not found'
-    try:
-        import trimesh  # noqa: PLC0415 - an extra that only meshes need
-    except ImportError:
-        return f'expected trimesh ({pip_install("init")})'
+    if path.suffix.lower() not in FORMATS:
+        return f'expected a mesh in STL, OBJ or DAE, got {shown(path.suffix)}'
     try:
         if path.stat().st_size > LARGEST:
             return 'expected a mesh below 200 MB'
-        scene: Any = trimesh.load(str(path), force='scene', process=False)
-        return _merged([_part(scene, node) for node in scene.graph.nodes_geometry])
+        return _loaded(path)
     except ImportError as error:
-        return f'expected {error.name or error} ({pip_install("init")})'
+        return f'expected the package {error.name or error} ({pip_install("init")})'
     except Exception as error:  # noqa: BLE001 - a damaged mesh may raise anything
         return f'expected a mesh, got: {shown(str(error) or type(error).__name__)}'
+
+
+def _loaded(path: Path) -> Floats | str:
+    import trimesh  # noqa: PLC0415 - an extra that only meshes need
+
+    scene: Any = trimesh.load(str(path), force='scene', process=False)
+    return _merged([_part(scene, node) for node in scene.graph.nodes_geometry])
 
 
 def _part(scene: Any, node: str) -> Floats:  # noqa: ANN401 - trimesh's own types vary by version
     """Return the corners of one part of a scene, in m: COLLADA files tell their unit."""
     transform, name = scene.graph[node]
     part = scene.geometry[name]
-    corners = np.asarray(part.vertices, dtype=np.float64)
-    if len(getattr(part, 'faces', ())):
-        corners = corners[np.unique(np.asarray(part.faces))]
+    faces = np.asarray(getattr(part, 'faces', ()), dtype=np.int64)
+    corners = np.asarray(part.vertices, dtype=np.float64)[np.unique(faces)]
     placed: Floats = corners @ transform[:3, :3].T + transform[:3, 3]
     unit, _, of = str(part.units or '').partition(' * ')
     return placed * float(unit) if of.startswith('meter') else placed

@@ -205,7 +205,7 @@ class _Rolling:
         plane = Face((_triple(points[0]),) * 3, (0.0, 0.0, 1.0))
         for part in parts:
             found += self._taken(part, plane, UP, math.inf)
-        if outline(points):
+        if len(parts) > 2 and outline(points):
             off = mm(outside(points, posture.cog))
             notes.questions.append(
                 f'The centre of gravity is {off} outside of what {names} carry: '
@@ -236,6 +236,8 @@ class _Rolling:
         found = []
         for solid in self._rest:
             patch = [p for p in solid.patch(up, NEAR) if face.height(p.tolist()) <= NEAR]
+            if not patch:
+                continue
             corners = [patch[k] for k in fewer(patch, outline(patch), 4)] or patch[:2]
             for name, p in zip(corner_names(corners, stem_of(solid.link)), corners, strict=True):
                 contact = Contact(name, solid.link, posture.in_link(solid.link, p))
@@ -248,8 +250,8 @@ class _Rolling:
         return found, f' As read, it would lean by {deg:.1f} deg until {on} touches.'
 
     def _ask_of_wheels(self) -> None:
-        """Ask about guessed wheels and those on a spinning link; tell which swivel."""
-        notes, posture = self._notes, self._posture
+        """Ask what is doubtful of the wheels themselves."""
+        notes = self._notes
         guessed = [wheel for wheel in self._wheels if wheel.guess]
         if guessed:
             radii = dict.fromkeys(mm(wheel.radius) for wheel in guessed)
@@ -259,21 +261,56 @@ class _Rolling:
                 f'radius of {", ".join(radii)}: is it that?'
             )
         for wheel in self._wheels:
-            for joint in posture.chain(wheel.joint.parent):
-                axis = posture.axis(joint)
-                if not endless(joint):
-                    continue
-                if abs(axis[2]) < 0.5:
-                    notes.questions.append(
-                        f'{wheel.joint.child} is carried by {joint.child}, which {joint.name} turns'
-                        ' without end: where does that touch the ground?'
-                    )
-                    continue
+            self._say_of_carrier(wheel)
+        self._ask_of_unround()
+
+    def _say_of_carrier(self, wheel: Wheel) -> None:
+        """Say what moves the link that carries a wheel: its contact point goes with it."""
+        notes, posture, name = self._notes, self._posture, wheel.joint.child
+        bends = []
+        for joint in posture.chain(wheel.joint.parent):
+            upright = abs(posture.axis(joint)[2]) > 0.5
+            if joint.slides or (upright and not endless(joint)):
+                continue
+            if upright:
                 away = (wheel.centre - posture.frames[joint.child][1])[:2]
+                far = mm(2.0 * float(np.hypot(*away)))
                 notes.remarks.append(
-                    f'{wheel.joint.child} swivels: its point moves by up to '
-                    f'{mm(2.0 * float(np.hypot(*away)))} as {joint.name} turns'
+                    f'{name} swivels: its point moves by up to {far} as {joint.name} turns'
                 )
+            elif endless(joint):
+                notes.questions.append(
+                    f'{name} is carried by {joint.child}, which {joint.name} turns without end: '
+                    'where does that touch the ground?'
+                )
+            else:
+                bends.append(joint.name)
+        if len(bends) > 1 and not any(posture.positions.get(one, 0.0) for one in bends):
+            notes.questions.append(
+                f'{name} hangs on a leg that was taken with {listed(bends)} at 0: is that how the '
+                'robot stands? A recording of it standing tells its posture.'
+            )
+        elif bends:
+            notes.remarks.append(
+                f'{name} hangs on {wheel.joint.parent}, which {listed(bends)} turns: its point is '
+                'below the axle in this posture'
+            )
+
+    def _ask_of_unround(self) -> None:
+        """Ask about what turns without end as low as the wheels, but is not round."""
+        posture, known = self._posture, {wheel.joint.name for wheel in self._wheels}
+        high = max(float(wheel.centre[2]) + wheel.radius for wheel in self._wheels)
+        for joint in posture.urdf.joints:
+            across = joint.kind != 'fixed' and abs(posture.axis(joint)[2]) < 0.5
+            low = posture.frames[joint.child][1][2] <= high
+            if not (across and low and endless(joint)) or joint.name in known:
+                continue
+            if joint.child in self._turning or posture.inner(joint.child):
+                continue
+            self._notes.questions.append(
+                f'{joint.child} turns without end as low as the wheels, but its geometry is not '
+                f'round about {joint.name}: is it a wheel, and where does it touch the ground?'
+            )
 
     def _say_of_the_rest(self, face: Face) -> None:
         """Say what lies below the plane or on it and was not taken, and what was not read."""

@@ -26,6 +26,8 @@ ACROSS, ALONG, ROUND = 0.5, math.cos(math.radians(3.0)), 0.92
 TREAD, TREAD_M, SAME_RADIUS = 0.02, 0.002, 0.001
 # Rollers of a wheel have their axes within its radius.
 ROLLERS = 1.05
+# A joint that turns so far (rad) turns without end: some wheels are written with limits.
+MANY_TURNS = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,9 @@ def wheels_of(posture: Posture) -> tuple[Wheel, ...]:
 
 def endless(joint: Joint) -> bool:
     """Return whether a joint turns without end."""
-    return joint.kind == 'continuous' or (joint.kind == 'revolute' and math.isinf(joint.upper))
+    return joint.kind == 'continuous' or (
+        joint.kind == 'revolute' and joint.upper - joint.lower > MANY_TURNS
+    )
 
 
 def _below(posture: Posture, link: str) -> Iterator[Wheel]:
