@@ -89,6 +89,8 @@ def write_other(path: Path, messages: list[Message]) -> None:
     with Ros1Writer(path) as writer:
         held: dict[str, Any] = {}
         for topic, kind, time, data in messages:
+            if kind not in store.fielddefs:  # ROS 1 has it in a package that rosbags leaves out
+                store.register({kind: STORE.fielddefs[kind]})
             if topic not in held:
                 held[topic] = writer.add_connection(topic, kind, typestore=store)
             writer.write(held[topic], time, bytes(STORE.cdr_to_ros1(data, kind)))

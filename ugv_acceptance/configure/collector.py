@@ -96,7 +96,7 @@ class Collector:
                 parent, child = part.parent.lstrip('/'), part.child.lstrip('/')
                 told = StaticTransform(parent, child, part.xyz, part.rotation)
                 if self._transforms.get(child, told) != told:
-                    self.doubts.append(f'/tf_static tells of {child} twice, and differently')
+                    self.doubts.append(f'/tf_static has different transforms of {child}')
                 self._transforms[child] = told
         else:
             kind = JOINT_STATE if of.type == JOINT_STATE.type else IMU
@@ -151,7 +151,7 @@ class Collector:
                     f'{name}: {of.malformed} of {of.taken} messages cannot be read: {of.reason}'
                 )
             if of.joints.empty and of.joints.empty < of.taken:
-                found.append(f'{name}: {of.joints.empty} of {of.taken} messages tell no position')
+                found.append(f'{name}: {of.joints.empty} of {of.taken} messages have no position')
             if of.type in _UNREAD:
                 found.append(f'{of.type} on {name} is not read: {JOINT_STATE.type} is needed')
         return found
@@ -162,14 +162,14 @@ class Collector:
         held = {name: texts for name, texts in held.items() if texts}
         for name, texts in held.items():
             if len(texts) > 1:
-                doubts.append(f'{name} tells {len(texts)} different URDFs: the last one is taken')
+                doubts.append(f'{name} has {len(texts)} different URDFs: the last one is used')
         if not held:
             return '', None
         last = {name: texts[-1] for name, texts in held.items()}
         chosen = max(last, key=lambda name: self._fits(last[name]))
         if len(set(last.values())) > 1:
             names = ' and '.join(last)
-            doubts.append(f'{names} tell different URDFs: that of {chosen} is taken')
+            doubts.append(f'{names} have different URDFs: that of {chosen} is used')
         return chosen, last[chosen]
 
     def _fits(self, text: str) -> int:
@@ -210,7 +210,7 @@ class Collector:
             more = set(match_names(names, topics[name].joints.joints).told) - mine
             if more:
                 listed = ', '.join(sorted(more))
-                doubts.append(f'only {name} tells {listed}, but {liked[0]} alone is read')
+                doubts.append(f'only {name} has {listed}, but only {liked[0]} is read')
         return liked[0], tuple(liked[1:])
 
     def _fit(self, of: _Topic, names: Sequence[str]) -> tuple[int, int]:

@@ -82,12 +82,12 @@ def _on_link(urdf: Urdf, robot: Robot, link: str, frame: str, told: Sequence[Tra
     joints = _joints(urdf, (link,))
     remarks = list(_moves(link, joints))
     if place is None:
-        return Placed(link, None, Derived(ZERO, CHECK, 'nothing tells'), joints=joints)
+        return Placed(link, None, Derived(ZERO, CHECK, 'not known'), joints=joints)
     other = _by_transforms(robot, frame.lstrip('/'), told)
     if other is not None and turn_between(place.rotation, other) <= _SAME:
         other = None
     if other is not None:
-        remarks.append(f'the URDF and /tf_static turn {link} differently')
+        remarks.append(f'the URDF and /tf_static disagree on how {link} is turned')
     sure = link == frame.lstrip('/') or frame.endswith(f'/{link}')
     source = f"the URDF's link {link}"
     position = Derived(place.xyz, CERTAIN if sure else CHECK, source)
@@ -109,17 +109,17 @@ def _named(urdf: Urdf, robot: Robot, frame: str) -> Placed:
     imus = sorted((name for name in links if _is_imu(name)), key=len)
     if not on and not imus:
         none = f'no link and no transform is called {frame!r}' if frame else 'no link of an IMU'
-        position = Derived(ZERO, CHECK, f'{none}: taken at the origin of {robot.root}')
+        position = Derived(ZERO, CHECK, f'{none}: assumed at the origin of {robot.root}')
         return Placed('', None, position)
     chosen = (on or imus)[0]
     found = _on_link(urdf, robot, chosen, chosen, ())
     remarks = list(found.remarks)
     if frame and on:
-        remarks.append(f'the frame {frame} is taken as the axes of the link {chosen}')
+        remarks.append(f'the frame {frame} is assumed to have the axes of the link {chosen}')
     elif frame:
-        remarks.append(f'no link and no transform is called {frame}: {chosen} is taken for it')
+        remarks.append(f'no link and no transform is called {frame}: {chosen} is used')
     if not on and len(imus) > 1:
-        remarks.append(f'several links are called after an IMU: {", ".join(imus)}')
+        remarks.append(f'several links have the name of an IMU: {", ".join(imus)}')
     position = Derived(found.position.value, CHECK, found.source)
     return Placed(
         chosen,
@@ -157,7 +157,7 @@ def _joints(urdf: Urdf, steps: Sequence[str]) -> tuple[str, ...]:
 def _moves(link: str, joints: Sequence[str]) -> tuple[str, ...]:
     if not joints:
         return ()
-    return (f'{link} is moved by {", ".join(joints)}: its mounting holds in this posture alone',)
+    return (f'{link} is moved by {", ".join(joints)}: its mounting is right in this posture only',)
 
 
 def _plain(matrix: Sequence[Sequence[object]]) -> Matrix:

@@ -40,9 +40,9 @@ def up_of(imu: SeenImu) -> Up:
         # The world's z axis in sensor axes: the last row.
         found.append(imu.orientation[2])
     else:
-        remarks.append(f'{imu.topic} tells no orientation')
+        remarks.append(f'{imu.topic} has no valid orientation')
     if not found:
-        remarks.append(f'{imu.topic} tells neither gravity nor orientation')
+        remarks.append(f'{imu.topic} has neither gravity nor a valid orientation')
     apart = float(angle_between(found[0], found[1])) if len(found) > 1 else 0.0
     if apart <= AGREE:
         return Up(tuple(found[:1]), 0.0, tuple(remarks))

@@ -9,6 +9,7 @@ from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Derived, DerivedJoint, Joints
 from ugv_acceptance.configure.evidence import Evidence, SeenJoint
 from ugv_acceptance.configure.names import Matched, match_names
+from ugv_acceptance.configure.seen_joints import NEVER_RESTS
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.model.robot import Joint
 
@@ -92,7 +93,7 @@ def rest_posture(urdf: Urdf, evidence: Evidence | None) -> dict[str, Derived[flo
             held = _held(joint, known)
             found[joint.name] = Derived(held.value, ASK if odd else held.grade, odd or held.source)
             continue
-        moves = any(doubt.startswith(f'{evidence.joint_states}: ') for doubt in evidence.doubts)
+        moves = any(doubt.endswith(NEVER_RESTS) for doubt in evidence.doubts)
         at = math.remainder(told.at_rest, math.tau) if joint.kind == 'continuous' else told.at_rest
         source = f'{"median" if moves else "at rest"} in {evidence.place}'
         found[joint.name] = Derived(at, CHECK if moves else CERTAIN, source)
@@ -137,9 +138,9 @@ def _held(joint: Joint, known: _Known) -> Derived[float]:
     if joint.name in known.spinning:
         return Derived(0.0, CERTAIN, 'a balanced wheel: its angle changes nothing')
     if joint.lower <= 0.0 <= joint.upper:
-        return Derived(0.0, CHECK, 'nothing is told of it: its zero')
+        return Derived(0.0, CHECK, 'in no message: its zero position')
     return Derived(
-        0.5 * (joint.lower + joint.upper), CHECK, 'nothing is told of it: mid of its range'
+        0.5 * (joint.lower + joint.upper), CHECK, 'in no message: the middle of its range'
     )
 
 
@@ -153,15 +154,15 @@ def _limit(joint: Joint, known: _Known, same: float | None) -> Derived[float]:
     """Return the limit of a joint as the URDF gives it, with how far that can be trusted."""
     says = f'the URDF says {joint.effort:g} {joint.units.effort}'
     if _passive(joint):
-        return Derived(None, CERTAIN, 'no motor holds it')
+        return Derived(None, CERTAIN, 'passive: no motor')
     if joint.name in known.spinning:
-        return Derived(None, CERTAIN, 'a wheel: what its motor holds is not judged')
+        return Derived(None, CERTAIN, 'a wheel: its torque is not judged')
     if math.isinf(joint.effort):
         return Derived(None, ASK, 'the URDF gives no effort limit, or 0')
     if joint.effort >= _PLACEHOLDER:
-        return Derived(joint.effort, ASK, f'{says}, which looks like a placeholder')
+        return Derived(joint.effort, ASK, f'{says}: probably a placeholder')
     if joint.effort == same:
-        return Derived(joint.effort, ASK, f'{says} of every joint, which looks like a placeholder')
+        return Derived(joint.effort, ASK, f'{says} for every joint: probably a placeholder')
     return Derived(joint.effort, CHECK, says)
 
 
@@ -177,7 +178,7 @@ def _topic(known: _Known, evidence: Evidence | None) -> Derived[str]:
         others = ', '.join(evidence.rivals)
         return Derived(name, ASK, f'in {evidence.place}; {others} fits as well')
     if not known.told:
-        return Derived(name, ASK, f'in {evidence.place}, but it names no joint of the URDF')
+        return Derived(name, ASK, f'in {evidence.place}, but it has no joint of the URDF')
     return Derived(name, CERTAIN, f'in {evidence.place}')
 
 
@@ -190,25 +191,27 @@ def _remarks(urdf: Urdf, known: _Known, evidence: Evidence | None) -> Iterator[s
         return
     if known.told:
         how = f' with {known.matched.affix.words}' if known.matched.affix else ''
-        yield f'{len(known.told)} of {len(known.joints)} joints of the URDF are told{how}'
+        number = f'{len(known.told)} of {len(known.joints)}'
+        yield f'{number} joints of the URDF are in the messages{how}'
     for name in known.matched.spelt:
-        yield f'{name} is told as {known.matched.told[name]}'
+        yield f'{name} is called {known.matched.told[name]} in the messages'
     yield from _untold(known)
     used = {*known.matched.told.values(), *(mimic.joint for mimic in urdf.mimics)}
     foreign = [j.topic_name for j in evidence.joints if j.topic_name not in used]
     if foreign:
-        yield f'{evidence.joint_states} names what is no joint of the URDF: {names_words(foreign)}'
+        names = names_words(foreign)
+        yield f'{evidence.joint_states} has names that the URDF does not have: {names}'
     for joint in known.joints:
         if joint.name in known.told and (odd := _odd(joint, known.told[joint.name], known)):
             yield f'{joint.name} {odd}'
 
 
 def _assumed(known: _Known) -> Iterator[str]:
-    yield f'no joint states were seen: all {len(known.joints)} joints are taken as told'
+    yield f'no joint states were seen: all {len(known.joints)} joints are assumed to be published'
     passive = [joint.name for joint in known.joints if _passive(joint)]
     if passive:
         listed = names_words(passive)
-        yield f'what looks passive is often told by nobody, and is to be held then: {listed}'
+        yield f'passive joints are often not published; hold those that are not: {listed}'
 
 
 def _untold(known: _Known) -> Iterator[str]:
@@ -224,7 +227,7 @@ def _untold(known: _Known) -> Iterator[str]:
     at = {_held(joint, known).value: None for joint in known.untold}
     where = '0' if list(at) == [0.0] else '0, or the middle of the range'
     verb = 'is' if len(known.untold) == 1 else 'are'
-    yield f'{" and ".join(parts)} {verb} told by nobody: held at {where}'
+    yield f'{" and ".join(parts)} {verb} in no message: held at {where}'
 
 
 def _odd(joint: Joint, told: SeenJoint, known: _Known) -> str:
@@ -252,11 +255,11 @@ def _question(known: _Known, evidence: Evidence | None) -> str:
         return ''
     if evidence.rivals:
         named = ' or '.join((evidence.joint_states, *evidence.rivals))
-        return f'Which topic tells the joints of this robot: {named}?'
+        return f'Which topic has the joint states of this robot: {named}?'
     if known.matched.rivals:
         words = ' or '.join(affix.words for affix in known.matched.rivals)
-        return f'Which names are those of this robot, those with {words}?'
+        return f'Which names belong to this robot: those with {words}?'
     if known.joints and not known.told:
         listed = names_words([joint.topic_name for joint in evidence.joints])
-        return f'Is it this robot? {evidence.joint_states} names none of its joints, but {listed}'
+        return f'Is it this robot? {evidence.joint_states} has none of its joints, but {listed}'
     return ''

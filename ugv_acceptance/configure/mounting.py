@@ -26,7 +26,7 @@ from ugv_acceptance.model.tree import plain
 FITS, SAME, LEANS, TOLD = (math.radians(d) for d in (10.0, 2.0, 45.0, 3.0))
 _UPWARDS: Vector = (0.0, 0.0, 1.0)
 _USUAL = 'imu/data'
-_YAW = 'gravity cannot tell how far it is turned about the vertical'
+_YAW = 'gravity does not show its yaw'
 _AXES = ('x', 'y', 'z')
 
 
@@ -81,11 +81,11 @@ def _unseen(urdf: Urdf, topic: Derived[str], posture: Mapping[str, float]) -> Mo
     """Return what the URDF alone says."""
     place = placed(urdf, None, posture, ())
     if place.rotation is None:
-        rotation = Derived(IDENTITY, ASK, 'the URDF has no link of an IMU: taken as not turned')
+        rotation = Derived(IDENTITY, ASK, 'the URDF has no link of an IMU: assumed not turned')
         question = 'How is the IMU mounted? The URDF has no link of it, and no message was seen.'
         return Mounting(topic, '', place.position, rotation, question, place.remarks)
     grade = CHECK if topic.value else ASK
-    rotation = Derived(place.rotation, grade, f'{place.source}; no message was seen')
+    rotation = Derived(place.rotation, grade, f'{place.source}; no message')
     question = '' if topic.value else f'On which topic is the IMU? So far {topic.source}.'
     remarks, joints = place.remarks, place.joints
     return Mounting(topic, place.link, place.position, rotation, question, remarks, joints)
@@ -125,8 +125,8 @@ def _decided(place: Placed, up: Up, evidence: Evidence) -> _Decided:
     where = f'gravity at rest in {evidence.place}'
     rotation = IDENTITY if place.rotation is None else place.rotation
     if not up.directions:
-        source = f'{place.source or "not turned"}; {evidence.place} tells no gravity'
-        question = 'How is the IMU mounted? Its messages do not tell gravity at rest.'
+        source = f'{place.source or "not turned"}; no gravity in {evidence.place}'
+        question = 'How is the IMU mounted? Its messages do not show gravity at rest.'
         return _Decided(Derived(rotation, ASK, source), question)
     if up.apart:
         return _torn(place, up, where)
@@ -144,15 +144,15 @@ def _decided(place: Placed, up: Up, evidence: Evidence) -> _Decided:
         )
     if len(fit) > 1:
         return _several_fit(fit, where, remarks)
-    source = f'{best.says}, and {where} agrees'
+    source = f'{best.says}; {where} agrees, but does not show yaw'
     if best is not found[0]:
         question = (
-            f'How is the IMU mounted? Gravity at rest denies what {found[0].says} says and fits '
+            f'How is the IMU mounted? Gravity at rest contradicts {found[0].says} and fits '
             f'{best.says}, but {_YAW}.'
         )
         return _Decided(Derived(best.rotation, ASK, source), question, tuple(remarks))
     if best.rotation != IDENTITY:
-        remarks.append(f'{_YAW}: that is the word of {best.says}')
+        remarks.append(f'{_YAW}: that is as {best.says} has it')
     grade = CERTAIN if place.sure and not place.joints else CHECK
     return _Decided(Derived(best.rotation, grade, source), '', tuple(remarks))
 
@@ -178,10 +178,13 @@ def _several_fit(fit: list[_Candidate], where: str, remarks: list[str]) -> _Deci
     """Return the first of several mountings between which gravity cannot decide."""
     best = fit[0]
     if all(turn_between(best.rotation, other.rotation) <= FITS for other in fit):
-        source = f'{best.says}, and {where} agrees'
+        source = f'{best.says}; {where} agrees, but does not show yaw'
         return _Decided(Derived(best.rotation, CHECK, source), '', tuple(remarks))
     either = ' or '.join(f'{c.says} ({rpy_words(c.rotation)})' for c in fit)
-    question = f'In which axes does the IMU send: {either}? Both fit gravity at rest, but {_YAW}.'
+    question = (
+        f'In which axes are the messages of the IMU: {either}? Both fit gravity at rest, but '
+        f'{_YAW}.'
+    )
     source = f'{best.says}; {where} fits {fit[1].says} as well'
     return _Decided(Derived(best.rotation, ASK, source), question, tuple(remarks))
 
@@ -203,7 +206,7 @@ def _none_fits(found: list[_Candidate], up: Vector, where: str) -> _Decided:
     rotation = _quarter_turns(up, found[0].rotation)
     denied = ' and '.join(candidate.says for candidate in found)
     question = (
-        f'How is the IMU mounted? At rest {points}{upside}, which denies {denied}. '
+        f'How is the IMU mounted? At rest {points}{upside}, which contradicts {denied}. '
         f'{rpy_words(rotation)} would fit, but {_YAW}.'
     )
     return _Decided(Derived(rotation, ASK, f'{where}: {points}'), question)

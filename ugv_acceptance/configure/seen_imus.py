@@ -87,7 +87,7 @@ class ImusSeen:
             force = _mean(table[rest, _FORCE])
             found.append(SeenImu(topic, name, force, _orientation(table[rest, _QUATERNION])))
         if 'acceleration' in self.undeclared:
-            doubts.append(f'{topic} says, by a covariance of -1, that it holds no acceleration')
+            doubts.append(f'{topic} declares, by a covariance of -1, that it has no acceleration')
         return tuple(found), doubts
 
 

@@ -10,10 +10,14 @@ from ugv_acceptance.configure.evidence import SeenJoint
 from ugv_acceptance.evaluation.effort.rests import TURNED, find_rests
 from ugv_acceptance.type_aliases import Floats, Times
 
+# What is said of a robot whose joints move all the time.
+NEVER_RESTS = 'the joints never rest: their positions are medians of all messages'
 # Postures are kept this often (ns), so many at most, of so many joints.
 _EVERY, _ROWS, _NAMES = 50_000_000, 4000, 500
 # A joint that went further than this (rad) turns without end: where it stands is no posture.
 _TURNS = math.tau
+# Where no joint went further than this (rad, m) the robot rests, however rarely it is told.
+_STILL = 0.01
 # Larger numbers are no positions.
 _ABSURD = 1e9
 
@@ -89,13 +93,16 @@ class JointsSeen:
         time, table = np.array(self._times, np.int64), self._table()
         turning = [told.highest - told.lowest > _TURNS for told in self.joints.values()]
         everywhere = _medians(table)
+        moved = [told.highest - told.lowest for told in self.joints.values()]
+        if max((way for way in moved if way >= 0.0), default=0.0) <= _STILL:
+            return everywhere, ''
         for used in (np.ones(len(turning), bool), ~np.array(turning)):
             found = _longest_rest(time, table[:, used]) if used.any() else None
             if found is not None:
                 rest = everywhere.copy()
                 rest[used] = np.where(np.isnan(found), everywhere[used], found)
                 return rest, ''
-        return everywhere, 'the joints never rest: their positions are medians of all messages'
+        return everywhere, NEVER_RESTS
 
     def _table(self) -> Floats:
         """Return the kept postures (n, joints); NaN before a joint's first message."""

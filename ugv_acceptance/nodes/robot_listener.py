@@ -79,10 +79,19 @@ class Listener:
             if known and name not in self.topics and self._node.count_publishers(name):
                 self.topics[name] = known[0]
                 self._collector.topic(name, known[0])
-                take = self._taker(name)
-                of = message_type(known[0])
-                self._node.create_subscription(of, name, take, _QOS[known[0]], raw=True)
+                self._subscribe(name, known[0])
         return bool(self.topics)
+
+    def _subscribe(self, name: str, kind: str) -> None:
+        of, take = message_type(kind), self._taker(name)
+        if of is None:
+            package = kind.partition('/')[0]
+            self._collector.doubts.append(
+                f'{name} is not heard: the package {package} is not installed '
+                f'(ros-jazzy-{package.replace("_", "-")})'
+            )
+            return
+        self._node.create_subscription(of, name, take, _QOS[kind], raw=True)
 
     def close(self) -> None:
         """Note what was odd with the publishers."""

@@ -78,7 +78,7 @@ def _on_link(robot: Robot, frame: str, transforms: Sequence[Transform]) -> Place
     for one in above:
         link = link_of(robot, one.link)
         if link is not None:
-            return Place(link, one.xyz, one.rotation, one.steps)
+            return Place(link, one.xyz, one.rotation, (*one.steps[:-1], link))
     # Transforms may lead both to a frame above the robot's root, which is then on the way.
     root = Place(robot.root)
     for common in _climb(root, transforms):
