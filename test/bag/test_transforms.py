@@ -22,7 +22,10 @@ def message() -> Any:
     """Return ROWS as rosbags' message object."""
     types = STORE.types
     header, time = types['std_msgs/msg/Header'], types['builtin_interfaces/msg/Time']
-    stamped, vector = types['geometry_msgs/msg/TransformStamped'], types['geometry_msgs/msg/Vector3']
+    stamped, vector = (
+        types['geometry_msgs/msg/TransformStamped'],
+        types['geometry_msgs/msg/Vector3'],
+    )
     transform, turn = types['geometry_msgs/msg/Transform'], types['geometry_msgs/msg/Quaternion']
     return types[TYPE](
         transforms=[
@@ -42,7 +45,9 @@ def test_frames_places_and_rotations_are_read() -> None:
     for data in (written(), bytes(STORE.serialize_cdr(message(), TYPE, little_endian=False))):
         for found, (parent, child, xyz, q) in zip(transforms_of(data), ROWS, strict=True):
             assert (found.parent, found.child, found.xyz) == (parent, child, xyz)
-            np.testing.assert_allclose(found.rotation, Rotation.from_quat(q).as_matrix(), atol=1e-15)
+            np.testing.assert_allclose(
+                found.rotation, Rotation.from_quat(q).as_matrix(), atol=1e-15
+            )
 
 
 def test_ros_1_is_read_too() -> None:
@@ -63,7 +68,9 @@ def test_a_message_that_is_cut_off_is_refused(cut: int) -> None:
         transforms_of(written()[:cut])
 
 
-@pytest.mark.parametrize('quaternion', [(0.0,) * 4, (1.0, 1.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)])
+@pytest.mark.parametrize(
+    'quaternion', [(0.0,) * 4, (1.0, 1.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)]
+)
 def test_a_quaternion_that_is_no_rotation_is_refused(quaternion: tuple[float, ...]) -> None:
     """It would turn the robot's attitude into anything."""
     with pytest.raises(BadSample, match='unit quaternion'):

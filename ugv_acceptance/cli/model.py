@@ -155,7 +155,9 @@ def _boundless(d: Values) -> bool:
 
 
 def _contacts(d: Values) -> Table:
-    table = _table(f'Contact points ({d["robot"]["root"]})', 'point', 'link', 'x m', 'y m', 'z m', 'polygon')
+    table = _table(
+        f'Contact points ({d["robot"]["root"]})', 'point', 'link', 'x m', 'y m', 'z m', 'polygon'
+    )
     for contact in d['contacts']:
         xyz = _numbers(contact['position_m'])
         corner = 'corner' if contact['corner'] else ''

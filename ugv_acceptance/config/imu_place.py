@@ -17,7 +17,7 @@ Warn = Callable[[Path, str], None]
 
 
 def imu_from(file: File, robot: Robot, refuse: Refuse) -> ImuInput:
-    """Return how the IMU is mounted and used; `refuse` of what is said twice, or an unknown link."""
+    """Return how the IMU is mounted and used; `refuse` of what is said twice, and of no link."""
     section, given = file.imu, file.imu.model_fields_set
     values = section.model_dump()
     rotation = rotation_from_rpy(values.pop('mounting_rpy'))
@@ -47,5 +47,7 @@ def base_frame_from(file: File, robot: Robot, refuse: Refuse, warn: Warn) -> str
         warn(path, f'{frame} is no link of the URDF: taken as another name of {robot.root}')
     elif moved_by := carriers(robot, frame):
         names: Sequence[str] = [robot.joint_names[j] for j in moved_by]
-        raise refuse(path, f'expected a link that no joint moves, got {frame}, on {", ".join(names)}')
+        raise refuse(
+            path, f'expected a link that no joint moves, got {frame}, on {", ".join(names)}'
+        )
     return frame

@@ -98,7 +98,7 @@ class LiveEvaluator:
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self.mount = ImuMount(self.settings, self.watch.placing, self.watch.attitude.motion.mounting)
+        self.mount = ImuMount(self.settings, *self.watch.mounting)
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisMotion(placed, self.watch.chassis)

@@ -105,7 +105,7 @@ class RecordedEvaluator:
         robot = self.settings.robot
         self._mechanics = mechanics_of(robot)
         self._joints = JointMerger(self.settings, self.watch.jump_signals)
-        self.mount = ImuMount(self.settings, self.watch.placing, self.watch.attitude.motion.mounting)
+        self.mount = ImuMount(self.settings, *self.watch.mounting)
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisColumns(ChassisMotion(placed, self.watch.chassis))

@@ -40,9 +40,9 @@ class ImuInput:
     """How the IMU is mounted on the robot, and how its messages are used.
 
     `mounting` rotates sensor axes into those of `link`, `position` is the sensor in it (m); '' is
-    the root link. If a joint moves that link, the base's attitude follows from its position. `placed`
-    is GIVEN; AUTO: by the frame of its messages, the robot's links and `transforms` (of /tf_static);
-    or UNKNOWN: no attitude is known.
+    the root link. If a joint moves that link, the base's attitude follows from its position.
+    `placed` is GIVEN; AUTO: by the frame of its messages, the robot's links and `transforms` (those
+    of /tf_static); or UNKNOWN: no attitude is known.
     `attitude` is auto (orientation if it can be trusted, else accelerometer), orientation or
     accelerometer. With `specific_force` the accelerometer replaces gravity in every margin.
     `low_pass` (s) is the filter's time constant; `rest_acceleration` (m/s2) and `rest_rate` (rad/s)

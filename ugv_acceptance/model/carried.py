@@ -25,7 +25,7 @@ Quaternion = tuple[Scalar, Scalar, Scalar, Scalar]
 
 
 def carriers(robot: Robot, link: str) -> tuple[int, ...]:
-    """Return the numbers (of `robot.joint_names`) of the joints that move a link; () on the base."""
+    """Return which of `robot.joint_names` (numbers) move a link; () on the base."""
     tree = tree_of(robot)
     drives = drives_of(robot, tree)
     return tuple(dict.fromkeys(drives[body - 1].joint for body in _path(tree, link)))

@@ -7,6 +7,8 @@ import numpy as np
 
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.inputs.frames import link_of
+from ugv_acceptance.evaluation.settings import AUTO
 from ugv_acceptance.simulation.corruption import Corruption
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Noise, Recording
 
@@ -49,7 +51,7 @@ class Driver:
     def imu(self, log: ImuLog) -> Iterator[tuple[float, bytes]]:
         """Yield time (s) and CDR bytes of an Imu for every row of a log."""
         log = self.corruption.imu(log)
-        frame = self.config.topics.imu.frame_id or 'imu_link'
+        frame = imu_frame(self.config)
         covariances = imu_covariances(self.noise)
         orientation, rate = log.orientation.tolist(), log.angular_velocity.tolist()
         force = log.linear_acceleration.tolist()
@@ -60,6 +62,15 @@ class Driver:
     def nanoseconds(self, time: float) -> int:
         """Return the header stamp (ns) of a simulated time (s)."""
         return self.epoch + round(time * 1e9)
+
+
+def imu_frame(config: Config) -> str:
+    """Return the frame that the simulated IMU names: where its mounting is found, if it can be."""
+    named, settings = config.topics.imu.frame_id, config.settings
+    if named:
+        return named
+    alone = settings.imu.placed == AUTO and link_of(settings.robot, 'imu_link') is None
+    return settings.robot.root if alone else 'imu_link'
 
 
 def imu_covariances(noise: Noise) -> tuple[list[float], list[float], list[float]]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.inputs.imu_mount import mounted
 from ugv_acceptance.run.catalogue import Case
-from ugv_acceptance.run.messages import EPOCH, Message, messages
+from ugv_acceptance.run.messages import EPOCH, Message, imu_frame, messages
 from ugv_acceptance.simulation.corruption import Corruption, overload, overloaded, weakened
 from ugv_acceptance.simulation.scenario import TIPPED, Recording
 from ugv_acceptance.simulation.simulation import BUILD
@@ -47,8 +48,11 @@ class Outcome:
 
 def build_of(config: Config) -> Build:
     """Return how to build the simulated robot, with its IMU placed as the configuration says."""
-    imu = config.settings.imu
-    return replace(BUILD, imu_position=imu.position, imu_rotation=imu.mounting)
+    place = mounted(config.settings, imu_frame(config))
+    if place is None:  # nobody knows where it is: at the base's origin
+        return BUILD
+    at, turned = place.xyz, place.rotation
+    return replace(BUILD, imu_position=at, imu_rotation=turned, imu_link=place.link)
 
 
 def play(config: Config, case: Case, seed: int, length: float = STRETCH) -> Iterator[Recording]:

@@ -47,7 +47,7 @@ class Build:
     `armature` (kg m2) as the rotor's share of inertia. `bulk` adds what touches the ground only
     after a tip-over. `contact_time` (s) is the time constant of a contact: short is hard;
     `impratio` is how much harder friction is than contact: more creeps less. `blocks` lie on the
-    ground.
+    ground. The IMU is on `imu_link` ('': the root link), in whose axes its place is.
     """
 
     base: str = 'free'
@@ -63,6 +63,7 @@ class Build:
     blocks: tuple[shape.Block, ...] = ()
     imu_position: Vector = (0.0, 0.0, 0.0)
     imu_rotation: tuple[Vector, Vector, Vector] = IDENTITY
+    imu_link: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +172,8 @@ def _add_bodies(world: ET.Element, robot: Robot, build: Build) -> None:
         )
         _add_mass(load, Link('payload', max(robot.payload.mass, LEAST)))
     x, y = (tuple(row[k] for row in build.imu_rotation) for k in (0, 1))
-    ET.SubElement(top, 'site', name='imu', pos=numbers(build.imu_position), xyaxes=numbers(x + y))
+    sensor = {'pos': numbers(build.imu_position), 'xyaxes': numbers(x + y)}
+    ET.SubElement(bodies.get(build.imu_link, top), 'site', sensor, name='imu')
     if build.base == 'free':
         shape.add_contacts(bodies, robot, _wheels(robot, build), build.wheel_radius)
         if build.bulk:

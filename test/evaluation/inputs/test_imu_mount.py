@@ -134,9 +134,7 @@ def test_messages_without_a_frame_are_not_believed_until_one_names_it() -> None:
     """Then the mounting is known from that message on."""
     run = run_of(4.0, imu=measured(LEANING, SIDEWAYS))
     half = T0 + 3 * S
-    messages = [
-        replace(m, frame='') if isinstance(m, Imu) and m.time < half else m for m in run
-    ]
+    messages = [replace(m, frame='') if isinstance(m, Imu) and m.time < half else m for m in run]
     found, alerts = gravities(with_imu(settings(AUTO)), messages)
     first = next(k for k, m in enumerate(messages) if isinstance(m, Imu) and m.time >= half)
     assert set(found[:first]) == {None}
@@ -187,8 +185,8 @@ def test_a_mounting_that_gravity_denies_is_not_believed(attitude: str) -> None:
     wrong = next(a for a in alerts if a.rule.code == 'IMU_MOUNTING')
     assert describe(wrong, told) == (
         'from the first message on imu leans by over 45 degrees, so it seems mounted otherwise '
-        'than configured: its y axis points up: imu.mounting_rpy_deg: [90, 0, 0]: how it is '
-        'mounted was taken from the URDF (imu_link - base)'
+        'than configured: its y axis points up: imu.mounting_rpy_deg: [90, 0, 0]: '
+        'imu.mounting: auto took it from the URDF (imu_link - base)'
     )
 
 
@@ -278,7 +276,7 @@ def test_limits_can_change_while_the_mounting_stays() -> None:
     evaluator.start(T0)
     last: Margins | None = None
     for message in run_of(1.0, imu=measured(LEANING, SIDEWAYS)):
-        last = give(evaluator, message) if isinstance(message, Imu) else give(evaluator, message)
+        last = give(evaluator, message)
         evaluator.adopt(replace(told, limits=replace(told.limits, tip_warn=0.3)))
     assert last is not None
     np.testing.assert_allclose(last.gravity, down(LEANING), atol=1e-9)

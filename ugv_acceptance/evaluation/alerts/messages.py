@@ -12,7 +12,6 @@ from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
 
-
 # A level as people read it; machines (ROS, JSON, CSV, files of criteria and plans) read LEVELS.
 LEVELS_FOR_PEOPLE = dict(zip(LEVELS, ('OK', 'CAUTION', 'DANGER', 'NO DATA'), strict=True))
 

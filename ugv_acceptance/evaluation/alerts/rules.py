@@ -257,6 +257,11 @@ class RuleSet:
         )
 
     @property
+    def mounting(self) -> tuple[Signal, Signal]:
+        """The signals of an IMU's mounting that is not known, and of one that gravity denies."""
+        return self.placing, self.attitude.motion.mounting
+
+    @property
     def active(self) -> list[Alert]:
         """Alerts that are active now, the most severe first."""
         found = [signal.alert for signal in self.signals() if signal.alert is not None]

@@ -25,6 +25,7 @@ class MountExamination:
 
     def statement(self, start: int, end: int) -> Statement:
         """Return the mounting in force; an unknown one is an objection."""
+        del start, end
         settings, found = self.mount.settings, self.mount.found
         if not settings.hears_imu:
             return Statement({'imu_mounting': None})
@@ -70,7 +71,7 @@ def mounting_json(settings: Settings, found: Mounted | None, why: str = '') -> d
         'position_m': list(found.xyz),
         'steps': list(found.steps),
         'moved_by': moved_by,
-        'held': {name: position for name, position in found.held},
+        'held': dict(found.held),
     }
 
 

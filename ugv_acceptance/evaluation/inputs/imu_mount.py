@@ -162,7 +162,7 @@ class ImuMount:
         names, every = in_order(columns)
         time = every.log_time
         first = int(np.argmax(names != '')) if (names != '').any() else len(names)
-        if self.found is None and not self.frame and 0 < first:
+        if self.found is None and not self.frame and first > 0:
             yield self._part(names[:first], rows_of(every, slice(None, first)), joints)
             names, every = names[first:], rows_of(every, slice(first, None))
             time = time[first:]
@@ -207,7 +207,7 @@ class ImuMount:
             of = found.link, found.rotation, found.xyz
             self._turn = Turn(self.settings, found.joints, *of)
         if found is not None and self.settings.imu.placed == AUTO:
-            self.doubt.detail = f'how it is mounted was taken from {source_words(found)}'
+            self.doubt.detail = f'imu.mounting: auto took it from {source_words(found)}'
 
 
 def source_words(found: Mounted) -> str:

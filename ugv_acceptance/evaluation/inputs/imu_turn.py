@@ -1,8 +1,9 @@
-"""Turns messages of an IMU on a moving link into those of one at the base's origin, in base axes."""
+"""Turns messages of an IMU on a moving link into those of one at the base's origin."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -74,7 +75,9 @@ class Turn:
 
         `joints` are joint states in order of receipt, the first of them older than all messages.
         """
-        raw = np.column_stack((every.orientation, every.angular_velocity, every.linear_acceleration))
+        raw = np.column_stack(
+            (every.orientation, every.angular_velocity, every.linear_acceleration)
+        )
         at = np.searchsorted(joints.time, every.log_time, side='right') - 1
         q, rates = joints.q[at], joints.qd[at]
         mine = list(self.joints)
@@ -100,8 +103,8 @@ class Turn:
         last = self._raw
         rows = np.arange(len(raw))
         if not self.settings.imu.noise_free:
-            begins = ~np.isfinite(raw).all(axis=1)
-            begins[1:] |= (raw[1:] != raw[:-1]).any(axis=1)
+            other = np.append(False, (raw[1:] != raw[:-1]).any(axis=1))
+            begins = other | ~np.isfinite(raw).all(axis=1)
             again = before is not None and not begins[0] and tuple(raw[0].tolist()) == last
             begins[0] = True
             starts = np.flatnonzero(begins)
@@ -137,8 +140,7 @@ def rows_of(every: ImuColumns, rows: slice, frame: str = '') -> ImuColumns:
 def runs_of(names: NDArray[np.str_], every: ImuColumns) -> list[ImuColumns]:
     """Return messages as columns of one frame each, in order of receipt."""
     edges = [0, *(np.flatnonzero(names[1:] != names[:-1]) + 1).tolist(), len(names)]
-    ends = zip(edges[:-1], edges[1:], strict=True)
-    return [rows_of(every, slice(a, b), str(names[a])) for a, b in ends]
+    return [rows_of(every, slice(a, b), str(names[a])) for a, b in pairwise(edges)]
 
 
 _FIELDS = tuple(f.name for f in fields(ImuColumns) if f.name != 'frame_id')

@@ -11,17 +11,19 @@ from ugv_acceptance.evaluation.effort.facts import NONE, TORQUE, UNKNOWN
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests
 from ugv_acceptance.evaluation.effort.understanding import understand
 from ugv_acceptance.evaluation.ground import ground_words
+from ugv_acceptance.evaluation.inputs.imu_mount import NAMELESS, mounted
 from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
 from ugv_acceptance.evaluation.inputs.joint_words import position_words
 from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
 from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.settings import UNKNOWN as UNPLACED
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import (
     angle_between,
     up_from_acceleration,
     up_from_orientation,
 )
-from ugv_acceptance.model.robot import Joint, Vector
+from ugv_acceptance.model.robot import Joint, Matrix, Vector
 from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
 
@@ -233,14 +235,33 @@ def _imu(samples: Sequence[ImuSample], config: Config) -> Iterator[Finding]:
     ax, ay, az = (fmean(sample.linear_acceleration[k] for sample in samples) for k in range(3))
     size = math.sqrt(ax * ax + ay * ay + az * az)
     yield _gravity(size, g)
-    up: Vector = up_from_acceleration(ax, ay, az, imu.mounting)
-    if size > g / 2:
-        yield _mounting(up)
-    yield from _orientation(samples, imu, up, known=abs(size - g) <= 0.15 * g)
+    found = mounted(config.settings, samples[-1].frame_id)
+    if found is None:
+        yield _unplaced(config, samples[-1].frame_id)
+    elif found.joints:
+        names = ', '.join(config.settings.robot.joint_names[j] for j in found.joints)
+        yield Finding(OK, 'imu mounting', f'on {found.link}, which {names} moves: not judged here')
+    else:
+        up: Vector = up_from_acceleration(ax, ay, az, found.rotation)
+        if size > g / 2:
+            yield _mounting(up)
+        yield from _orientation(samples, imu, found.rotation, up, known=abs(size - g) <= 0.15 * g)
     expected, frames = config.topics.imu.frame_id, {sample.frame_id for sample in samples}
     if expected is not None and frames != {expected}:
         text = f'frame_id is {", ".join(sorted(frames)) or "empty"}, expected {expected}'
         yield Finding(WARN, 'imu frame', text, 'check that this is the IMU whose mounting is given')
+
+
+def _unplaced(config: Config, frame: str) -> Finding:
+    """Return that nobody says how the IMU is mounted, as far as the URDF tells."""
+    if config.settings.imu.placed == UNPLACED:
+        text, do = 'declared as unknown', 'set imu.mounting_rpy_deg'
+    elif not frame:
+        text, do = NAMELESS, 'set imu.mounting_rpy_deg, or let the driver name its frame'
+    else:
+        text = f'its frame {frame!r} is no link of the URDF'
+        do = 'unless /tf_static tells it, set imu.mounting_rpy_deg'
+    return Finding(WARN, 'imu mounting', text, do)
 
 
 def _gravity(size: float, g: float) -> Finding:
@@ -268,7 +289,7 @@ def _mounting(up: Vector) -> Finding:
 
 
 def _orientation(
-    samples: Sequence[ImuSample], imu: ImuInput, up: Vector, *, known: bool
+    samples: Sequence[ImuSample], imu: ImuInput, mounting: Matrix, up: Vector, *, known: bool
 ) -> Iterator[Finding]:
     about, last = 'imu orientation', samples[-1]
     x, y, z, w = last.orientation
@@ -281,7 +302,7 @@ def _orientation(
     elif x == y == z == 0.0:
         yield Finding(WARN, about, 'always the identity: taken for not given', do)
     elif known:
-        angle = angle_between(up_from_orientation(x, y, z, w, imu.mounting), up)
+        angle = angle_between(up_from_orientation(x, y, z, w, mounting), up)
         seen = f'{math.degrees(angle):.1f} deg from the acceleration'
         if angle <= imu.agreement:
             yield Finding(OK, about, seen)

@@ -219,6 +219,12 @@ _CHOICES = (
         lambda s: s.imu.specific_force,
         lambda s, v: replace(s, imu=replace(s.imu, specific_force=bool(v))),
     ),
+    TunableParameter(
+        'frame_prefix',
+        "what stands before the names of this robot's frames, such as r1/",
+        lambda s: s.frame_prefix,
+        lambda s, v: replace(s, frame_prefix=v),
+    ),
 )
 
 

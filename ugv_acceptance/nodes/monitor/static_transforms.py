@@ -18,7 +18,7 @@ _QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
-_MISSING = 'the package tf2_msgs is not installed, so {topic} is not heard; install ros-jazzy-tf2-msgs'
+_MISSING = 'the ROS package tf2_msgs is not installed, so {topic} is not heard'
 
 
 class StaticTransforms:
@@ -46,14 +46,13 @@ class StaticTransforms:
             self._session.on_problem(_MISSING.format(topic=TOPIC))
             return
         kind: Any = TFMessage
-        self._subscription = self._node.create_subscription(
-            kind, TOPIC, self.take, _QOS, raw=True
-        )
+        self._subscription = self._node.create_subscription(kind, TOPIC, self.take, _QOS, raw=True)
 
     def take(self, data: bytes) -> None:
         """Take a serialised TFMessage: the newest transform of each frame counts."""
         with suppress(BadSample):  # one that cannot be read tells nothing
-            self._told |= {transform.child: transform for transform in transforms_of(data)}
+            for transform in transforms_of(data):
+                self._told[transform.child] = transform
         session = self._session
         if session.evaluator.mount.seeks:
             imu = replace(session.settings.imu, transforms=tuple(self._told.values()))
