@@ -9,10 +9,12 @@ import yaml
 from cli.here import ugv
 from configure.init_robots import arm_alone, dog, rover, tracked_arm
 
-from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
+from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr, string_message
 from ugv_acceptance.bag.writer import BagWriter
+from ugv_acceptance.cli.init_work import Asked, make_it
 from ugv_acceptance.config import load
 from ugv_acceptance.config.uncertain import sources_from
+from ugv_acceptance.configure.questions import Answers
 
 S, MS = 1_000_000_000, 1_000_000
 T0 = 1_700_000_000 * S
@@ -239,6 +241,68 @@ def test_the_picture_is_drawn(tmp_path: Path, ending: str) -> None:
         assert done.returncode == 3, done.stderr
     start = b'\x89PNG' if ending == 'png' else b'<!DOCTYPE html>'
     assert path.read_bytes().startswith(start)
+
+
+def test_a_person_is_asked_what_no_file_tells(tmp_path: Path) -> None:
+    """Each open question is asked, again where the answer cannot be used; Enter takes the guess."""
+    (tmp_path / 'my.urdf').write_text(tracked_arm(shoulder='1000'), 'utf-8')
+    asked = Asked((tmp_path / 'my.urdf',), (), None, {}, None, overwrite=False, say=lambda _: None)
+    typed, texts = ['heavy', '', 'shoulder=55'], []
+
+    def person(text: str, guess: str) -> str:
+        texts.append((text, guess))
+        return typed[len(texts) - 1]
+
+    found = make_it(tmp_path / 'robot.yaml', asked, Answers(), person)
+    assert [guess for _, guess in texts] == ['urdf', 'urdf', '']
+    assert 'on scales' in texts[0][0]
+    assert found.questions == ()
+    assert load(tmp_path / 'robot.yaml').settings.limits.torque == (30.0, 55.0, 40.0)
+
+
+def test_a_tyre_of_two_cylinders_stands_on_the_larger(tmp_path: Path) -> None:
+    """A narrow ring around a wider hub: the points are under the ring, and no check minds."""
+    hub = '<collision><origin rpy="1.5707963267948966 0 0"/><geometry>'
+    hub += '<cylinder radius="0.09" length="0.08"/></geometry></collision>'
+    text = rover().replace(
+        '<collision><origin xyz="0 0 0" rpy', f'{hub}<collision><origin xyz="0 0 0" rpy'
+    )
+    assert text.count('0.09') == 4
+    done = init(tmp_path, text, '--mass', 'urdf')
+    assert done.returncode == 0, done.stdout
+    assert {c.position[2] for c in load(tmp_path / 'robot.yaml').settings.robot.contacts} == {-0.15}
+
+
+def test_an_arm_that_is_bolted_down_is_done_without_an_imu(tmp_path: Path) -> None:
+    """`--contacts none`: it stands on nothing, its torques are judged, tip-over is not."""
+    open_ = init(tmp_path, arm_alone(), '--mass', 'urdf')
+    assert open_.returncode == 3
+    done = init(tmp_path, arm_alone(), '--mass', 'urdf', '--contacts', 'none', '--overwrite')
+    assert done.returncode == 0, done.stdout
+    settings = load(tmp_path / 'robot.yaml').settings
+    assert not settings.hears_imu
+    assert settings.robot.payload_link == 'tool0'
+
+
+def test_the_urdf_of_a_recording_is_written_beside_the_yaml(tmp_path: Path) -> None:
+    """A recording with /robot_description alone is enough; without it the URDF is asked for."""
+    run = tmp_path / 'run'
+    with BagWriter(run) as bag:
+        bag.add_topic('/robot_description', 'std_msgs/msg/String')
+        bag.add_topic('/imu/data', 'sensor_msgs/msg/Imu')
+        bag.write('/robot_description', T0, string_message(rover()))
+        for k in range(500):
+            now = T0 + k * 10 * MS
+            still, level = (0.0, 0.0, 0.0), (0.0005, 0.0, 0.0, 1.0)
+            bag.write('/imu/data', now, imu_cdr(now, 'imu_link', level, still, (0.0, 0.0, 9.81)))
+    done = ugv('init', run, '-o', tmp_path / 'robot.yaml', '--mass', 'urdf')
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / 'robot.urdf').read_text('utf-8') == rover()
+    assert load(tmp_path / 'robot.yaml').urdf_path == (tmp_path / 'robot.urdf').resolve()
+    bare = recorded(tmp_path / 'bare', ['a'], [0.0], (0.0, 0.0, 9.81))
+    none = ugv('init', bare, '-o', tmp_path / 'other.yaml')
+    assert none.returncode == 2
+    assert '/robot_description' in none.stderr
 
 
 def test_a_source_is_needed(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.bag.atomic_files import write_bytes, write_text
 from ugv_acceptance.cli import output_kinds as kinds
@@ -25,6 +27,8 @@ from ugv_acceptance.configure.yaml_text import yaml_of
 
 # A URDF so many folders up from the YAML is named by its absolute path.
 _UP = 3
+# A question whose answer cannot be used is asked so many times.
+_TIMES = 3
 Prompt = Callable[[str, str], str]
 
 
@@ -180,9 +184,13 @@ def _answer(given: Given, draft: Draft, answers: Answers, prompt: Prompt | None)
     if prompt is None:
         return draft
     for question in questions_of(draft):
-        said = ask(question, lambda text, of=question: prompt(text, of.guess))  # type: ignore[misc]
-        if said:
-            draft = answered(draft, Answers(**said), anew)  # type: ignore[arg-type]
+        for _ in range(_TIMES):
+            said = ask(question, lambda text, of=question: prompt(text, of.guess))  # type: ignore[misc]
+            try:
+                draft = answered(draft, Answers(**said), anew)  # type: ignore[arg-type]
+                break
+            except BadConfig as error:
+                typer.echo(str(error), err=True)
     return draft
 
 

@@ -118,7 +118,7 @@ def _limits(draft: Draft) -> Question | None:
     units = {joint.name: joint.units.effort for joint in draft.urdf.joints}
     said = _list([f'{j.name} {_limit_text(j)} {units[j.name]}' for j in doubtful])
     text = f'What torque can these joints hold? The URDF is in doubt: {said}'
-    option = f'--limit {doubtful[0].name}=50 (or none, or urdf; a pattern such as "*=urdf")'
+    option = f'--limit {doubtful[0].name}=50 (or =none, or =urdf; a pattern such as "*=urdf")'
     return Question(LIMITS, text, option, '', 'their torque is not judged')
 
 
@@ -321,7 +321,8 @@ def _with_load(draft: Draft, answers: Answers, _: Anew) -> Draft:
 
 def ask(question: Question, say: Callable[[str], str]) -> Mapping[str, str | tuple[str, ...]]:
     """Ask a question by `say` (text -> answer) and return the answer as a field of Answers."""
-    text = say(question.text).strip() or question.guess
+    form = question.option.partition(' ')[2]
+    text = say(f'{question.text}\n  {form}').strip() or question.guess
     if not text:
         return {}
     if question.key == LIMITS:

@@ -144,8 +144,7 @@ def _joint(draft: Draft, joint: DerivedJoint) -> Iterator[str]:
         return
     key = 'limit_n' if of.slides else 'limit_nm'
     if limit.grade == ASK and LIMITS in draft.open:
-        said = '' if limit.value is None else f'; the URDF says {limit.value:g}'
-        yield _line(key, 'unknown', ASK, f'{limit.source}{said}; --limit {joint.name}=50', 2)
+        yield _line(key, 'unknown', ASK, f'{limit.source}; --limit {joint.name}=50', 2)
     else:
         value = 'null' if limit.value is None else number(limit.value, 3)
         yield _line(key, value, *_said(limit), 2)
