@@ -87,7 +87,9 @@ def setup_doubts(
     if face is not None and not any(k in moves for k in carrying):
         found += _tilt(robot, face, 'contacts.tilt' in known)
     near = carrying if face else list(range(len(points)))
-    found += _balance(robot, tree, [points[k] for k in near], cog, given_posture=posture is not None)
+    found += _balance(
+        robot, tree, [points[k] for k in near], cog, given_posture=posture is not None
+    )
     return tuple(found)
 
 
@@ -194,8 +196,8 @@ def _under_wheels(
     """
     above = {joint.child: joint for joint in robot.joints if joint.kind == 'continuous'}
     found = []
-    for shape in _widest(shapes):
-        if shape.size is None or shape.link not in above:
+    for shape in _tyres(shapes):
+        if shape.link not in above or shape.size is None:
             continue
         body, (x, y, z) = point_of(tree, pose, shape.link, shape.xyz)
         centre = np.array([x, y, z], dtype=np.float64)
@@ -214,14 +216,14 @@ def _under_wheels(
     return found
 
 
-def _widest(shapes: Sequence[Shape]) -> list[Shape]:
-    """Return the cylinder of the largest radius of each link: a tyre may be of several."""
+def _tyres(shapes: Sequence[Shape]) -> list[Shape]:
+    """Return the largest cylinder of each link: others are rims and hubs."""
     found: dict[str, tuple[float, Shape]] = {}
     for shape in shapes:
         if shape.kind == 'cylinder' and shape.size is not None:
-            before = found.get(shape.link)
-            if before is None or before[0] < shape.size[0]:
-                found[shape.link] = (shape.size[0], shape)
+            radius = shape.size[0]
+            if radius > found.get(shape.link, (0.0, shape))[0]:
+                found[shape.link] = radius, shape
     return [shape for _, shape in found.values()]
 
 
