@@ -90,12 +90,11 @@ class ImuMount:
         if found is None or (settings.imu.placed == GIVEN and not settings.imu.link):
             return settings
         frame = settings.imu.frame or (found.frame if settings.imu.placed == AUTO else '')
-        here = {'placed': GIVEN, 'link': '', 'frame': frame, 'transforms': ()}
+        here = replace(settings.imu, placed=GIVEN, link='', frame=frame, transforms=())
+        turned, place = found.rotation, found.xyz
         if self._turn is not None:
-            imu = replace(settings.imu, mounting=IDENTITY, position=ZERO, **here)
-        else:
-            imu = replace(settings.imu, mounting=found.rotation, position=found.xyz, **here)
-        return replace(settings, imu=imu)
+            turned, place = IDENTITY, ZERO
+        return replace(settings, imu=replace(here, mounting=turned, position=place))
 
     @property
     def seeks(self) -> bool:

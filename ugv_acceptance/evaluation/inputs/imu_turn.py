@@ -81,7 +81,8 @@ class Turn:
         at = np.searchsorted(joints.time, every.log_time, side='right') - 1
         q, rates = joints.q[at], joints.qd[at]
         mine = list(self.joints)
-        known = np.isfinite(q[:, mine]).all(axis=1) & np.isfinite(rates[:, mine]).all(axis=1)
+        whole = np.isfinite(np.column_stack((q[:, mine], rates[:, mine])))
+        known = np.logical_and.reduce(whole, axis=1)
         numbers = [np.where(np.isfinite(x), x, 0.0) for x in (*q.T, *rates.T)]
         turned = np.empty((len(raw), WIDTH))
         with np.errstate(all='ignore'):
