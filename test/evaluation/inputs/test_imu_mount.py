@@ -9,6 +9,7 @@ import pytest
 from evaluation.streams import (
     MS,
     T0,
+    Carry,
     Imu,
     Joints,
     Message,
@@ -105,6 +106,29 @@ def test_a_prefix_before_every_frame_is_understood() -> None:
     run = run_of(1.0, imu=measured(LEANING, SIDEWAYS, 'r1_imu_link'))
     told = replace(with_imu(settings(AUTO)), frame_prefix='r1_')
     np.testing.assert_allclose(gravities(told, run)[0][-1], down(LEANING), atol=1e-9)
+
+
+def test_another_robots_imu_is_not_taken_for_ours() -> None:
+    """Where the prefix of our frames is known, another namespace is another robot."""
+    told = replace(with_imu(settings(AUTO)), frame_prefix='r1/')
+    for frame, ours in (('r1/imu_link', True), ('/r1/imu_link', True), ('r2/imu_link', False)):
+        found, _ = gravities(told, run_of(0.5, imu=measured(LEANING, SIDEWAYS, frame)))
+        assert (found[-1] is not None) == ours
+
+
+def test_a_payload_in_a_frame_with_the_prefix_is_carried() -> None:
+    """Live and recorded alike."""
+    told = replace(settings(), frame_prefix='r1_')
+    run: list[Message] = [Carry(T0, 3.0, frame='r1_hand'), *run_of(0.5)]
+    evaluator = LiveEvaluator(told)
+    evaluator.start(T0)
+    for message in run:
+        give(evaluator, message)
+    assert evaluator.load_known
+    assert evaluator.payload.mass == 3.0
+    _, other = recorded(told, [run], T0 + S)
+    assert other.first_payload is not None
+    assert not [a for a in other.watch.log if a.rule.code == 'PAYLOAD_INVALID']
 
 
 def test_static_transforms_tell_it_where_the_urdf_does_not() -> None:

@@ -117,6 +117,8 @@ class ImuMount:
     def learn(self, settings: Settings) -> None:
         """Take settings with other transforms: they may tell where the named frame is."""
         self.settings = settings
+        if self._turn is not None:
+            self._turn.settings = settings
         if self.seeks:
             self._decide(self.frame)
 
@@ -232,7 +234,10 @@ def mounted(settings: Settings, frame: str) -> Mounted | None:
         (without_prefix(parent, prefix), without_prefix(child, prefix), xyz, rotation)
         for parent, child, xyz, rotation in imu.transforms
     ]
-    place = place_of(robot, without_prefix(frame, prefix), transforms)
+    bare = without_prefix(frame, prefix)
+    if prefix and '/' in bare:  # another robot's
+        return None
+    place = place_of(robot, bare, transforms)
     links = {link.name for link in robot.links}
     source = URDF if place is not None and place.steps[0] in links else TF_STATIC
     return _on(robot, source, frame.lstrip('/'), place)
