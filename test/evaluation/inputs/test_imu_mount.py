@@ -250,6 +250,29 @@ def test_on_an_arm_the_attitude_of_the_base_follows_from_the_joints(
     assert not [a for a in alerts if a.rule.code.startswith('IMU_')]
 
 
+@pytest.mark.parametrize('velocities', [True, False])
+def test_old_joint_states_of_a_fast_arm_tell_no_attitude(
+    velocities: bool,  # noqa: FBT001 - a case
+) -> None:
+    """What the arm may have turned since would be a wrong tilt; nor is the IMU blamed for it."""
+    messages: list[Message] = []
+    for k in range(800):
+        now, phase = T0 + 10 * k * MS, k / 60.0
+        q, rate = 0.6 * math.sin(phase), math.cos(phase)
+        if k % 10 == 0:
+            given = (-rate, 0.0) if velocities else ()
+            messages.append(Joints(now, position=(0.1 - q, 0.0), velocity=given))
+        turn = Rotation.from_rotvec([0.0, -q, 0.0]) * SIDEWAYS
+        omega = tuple(turn.inv().apply([0.0, -rate, 0.0]))
+        messages.append(replace(on_the_arm(q, LEANING), time=now + MS, omega=omega))
+    found, alerts = gravities(with_imu(settings(AUTO), 'arm'), messages)
+    known = np.array([row for row in found if row is not None])
+    assert 0.5 < len(known) / len(found) < 0.9
+    cosine = known @ down(LEANING) / 9.81**2
+    assert np.degrees(np.arccos(np.minimum(cosine, 1.0))).max() < 5.0
+    assert not alerts
+
+
 def test_a_joint_that_is_not_known_makes_the_attitude_unknown() -> None:
     """And blames the joint, not the IMU."""
     told = with_imu(settings(AUTO), 'arm')
