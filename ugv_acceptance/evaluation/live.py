@@ -102,7 +102,7 @@ class LiveEvaluator:
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisMotion(placed, self.watch.chassis)
-        self.mount.settle = (self._imu.adopt, self._chassis.place)
+        self.mount.serve(self._imu, self._chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
@@ -198,10 +198,10 @@ class LiveEvaluator:
         mount = self.mount
         if mount.busy:
             felt = orientation, covariance_0, omega, acceleration
-            felt = mount.one(now, frame, felt, self._joints.q, self._joints.qd)
+            felt = mount.one(now, frame, felt, self._joints)
             orientation, covariance_0, omega, acceleration = felt
         gravity, unusable = self._imu.step(
-            now, stamp, orientation, covariance_0, omega, acceleration, frame
+            now, stamp, orientation, covariance_0, omega, acceleration, frame, mount.raw
         )
         if not mount.told:
             gravity, unusable = NOWHERE, False

@@ -109,7 +109,7 @@ class RecordedEvaluator:
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisColumns(ChassisMotion(placed, self.watch.chassis))
-        self.mount.settle = (self._imu.adopt, self._chassis.place)
+        self.mount.serve(self._imu, self._chassis.place)
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         self._payload = PayloadHistory(robot.payload)
