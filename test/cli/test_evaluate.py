@@ -143,7 +143,8 @@ def test_less_than_a_second_is_no_pass(tmp_path: Path) -> None:
 
 def test_joint_states_of_another_robot_are_told_as_such(tmp_path: Path) -> None:
     """Joint states of another robot's joints are reported as that, not as silence."""
-    done = evaluate(write_run(tmp_path / 'run', names=['a', 'b', 'c', 'd']))
+    run = write_run(tmp_path / 'run', names=['a', 'b', 'c', 'd'])
+    done = evaluate(run, '--config', 'packbot')
     assert done.returncode == 3
     assert '/joint_states: 150 messages' in done.stdout
     assert 'none contains a joint of this robot' in done.stdout

@@ -14,13 +14,15 @@ from config.robot_files import YAML, write_robot
 from nodes.live_case import FOLDED, NAMES, Live, imu, joints
 from sensor_msgs.msg import JointState
 
+from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.nodes.doctor.checks import FAIL, OK, WARN, Finding, examine
-from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
+from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings, Told
 
 CONFIG = load()
+URDF = CONFIG.urdf_text.decode()
 MS = 1_000_000
 T0 = 1_700_000_000_000 * MS
 
@@ -51,6 +53,26 @@ def healthy(joint: Any = None, inertial: Any = None) -> Surroundings:
     )
     imus = heard('/imu/data', 'sensor_msgs/msg/Imu', inertial or imu_sample(), 2 * MS)
     return Surroundings('jazzy', 'rmw', '0', 'SUBNET', [], 1.0, joint_states, imus)
+
+
+@pytest.mark.parametrize(
+    ('texts', 'obstacle', 'level', 'words'),
+    [
+        ((), 'nobody', OK, 'compared with nothing'),
+        ((URDF,), '', OK, 'is that of'),
+        ((URDF.replace('value="1', 'value="2'),), '', FAIL, 'kg in the file'),
+        ((BadSample('not UTF-8'),), '', FAIL, 'cannot be read: not UTF-8'),
+        ((URDF, f'{URDF} '), 'two publishers', WARN, 'two publishers'),
+    ],
+)
+def test_the_robots_own_description_is_held_against_the_configured_urdf(
+    texts: tuple[str | BadSample, ...], obstacle: str, level: str, words: str
+) -> None:
+    """Whether the robot tells its URDF, and whether that is the one in force."""
+    around = replace(healthy(), robot=Told('/robot_description', texts, obstacle))
+    (found,) = [f for f in examine(around, CONFIG) if f.about == 'robot_description']
+    assert found.level == level
+    assert words in found.seen
 
 
 def findings(around: Surroundings) -> list[Finding]:

@@ -1,6 +1,7 @@
 """A simulated run as a recording: the same seed gives the same bytes, other tools read it."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ from mcap.stream_reader import StreamReader
 from rosbags.highlevel import AnyReader
 
 from ugv_acceptance import BadBag, BadConfig
+from ugv_acceptance.bag.raw import Offered, offered
+from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.config import load
 from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.run.catalogue import case_of, names
@@ -59,11 +62,24 @@ def test_rosbags_reads_what_is_recorded(tmp_path: Path) -> None:
     assert counts['/payload'][1] == 3
 
 
-def test_the_load_is_declared_before_anything_else(tmp_path: Path) -> None:
+def test_the_load_is_declared_before_anything_that_is_measured(tmp_path: Path) -> None:
     """Else the first margins would be those of the load that the configuration assumes."""
     with AnyReader([recorded(tmp_path / 'run')]) as reader:
-        first = next(iter(reader.messages()))[0].topic
-    assert first == '/payload'
+        topics = [connection.topic for connection, _, _ in reader.messages()]
+    assert topics[:2] == ['/robot_description', '/payload']
+
+
+def test_a_recording_holds_the_robot_it_is_of(tmp_path: Path, repository: Path) -> None:
+    """Its URDF is told once, latched, so that the recording can be judged without the file."""
+    folder = recorded(tmp_path / 'run', seconds=1.5)
+    text = (repository / 'msg_configs' / 'packbot.yaml').read_text('utf-8')
+    bare = tmp_path / 'robot.yaml'
+    bare.write_text(re.sub(r'(?m)^urdf:.*$', '', text), 'utf-8')
+    told, filed = evaluate(folder, config=bare), evaluate(folder)
+    assert told.result['robot']['description'] == 'recorded'
+    assert told.result['robot']['urdf_sha256'] == filed.result['robot']['urdf_sha256']
+    assert told.result['stability'] == filed.result['stability']
+    assert offered(open_bag(folder))['/robot_description'] == Offered('reliable', 'transient_local')
 
 
 def test_every_chunk_has_a_checksum_and_no_more_than_half_a_second(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +20,7 @@ from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
     from ugv_acceptance.campaign.carry_out import Effort
+    from ugv_acceptance.campaign.sources import Source
     from ugv_acceptance.campaign.statement import Origin
     from ugv_acceptance.campaign.work import Brief, Done
 
@@ -266,9 +267,9 @@ def campaign(
 
     check_requirement(require_mtbf)
     question = Question(confidence, require_mtbf, ended_by_failure, groups_from(compare or []))
-    brief, origin = terms_of(config, urdf, criteria)
     entries = read_log(failures) if failures else []
     sources = find_sources(places)
+    brief, origin = terms_of(config, urdf, criteria, sources)
     recorded = [Path(file) for s in sources if not s.remote for file in s.files]
     inputs = inputs_of(brief.config, recorded, criteria=criteria, failures=failures)
     check_folder('--out', out, CAMPAIGN, inputs, overwrite=overwrite)
@@ -315,15 +316,29 @@ def groups_from(compare: list[str]) -> tuple[tuple[str, str], ...]:
 
 
 def terms_of(
-    config: Path | None, urdf: Path | None, criteria: Path | None
+    config: Path | None,
+    urdf: Path | None,
+    criteria: Path | None,
+    sources: 'Sequence[Source]' = (),
 ) -> 'tuple[Brief, Origin]':
-    """Return the configuration and criteria that runs are judged by, with names and hashes."""
+    """Return the configuration and criteria that runs are judged by, with names and hashes.
+
+    A configuration without a URDF takes the description that the first run recorded: a campaign is
+    of one robot, and every run is held against it.
+    """
+    from ugv_acceptance.bag.recording import open_recording
+    from ugv_acceptance.campaign.sources import local_paths
     from ugv_acceptance.campaign.statement import Origin
     from ugv_acceptance.campaign.work import Brief
-    from ugv_acceptance.config import load
+    from ugv_acceptance.config import description_topic, load
     from ugv_acceptance.config.criteria import load_criteria
+    from ugv_acceptance.offline.own_robot import robot_of
 
-    loaded = load(config, urdf=urdf)
+    if sources and description_topic(config, urdf=urdf) is not None:
+        with local_paths(sources[0]) as paths:
+            loaded = robot_of(open_recording(paths), config, urdf=urdf)
+    else:
+        loaded = load(config, urdf=urdf)
     found = load_criteria(criteria, loaded.settings) if criteria else None
     name = found.name if found else 'limits of the configuration'
     origin = Origin(loaded.name, loaded.sha256, name, found.sha256 if found else None)

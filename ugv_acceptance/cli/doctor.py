@@ -20,16 +20,15 @@ _NO_ROS = (
 
 def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[str]) -> int:
     """Print the findings and return the exit code: 1 if any has failed."""
-    from ugv_acceptance.config import load
-
     console = Console(highlight=False)
     if find_spec('rclpy') is None:
         tell(console, 'FAIL', 'ROS', 'not found', _NO_ROS)
         return AILING
     from ugv_acceptance.nodes.doctor.checks import examine
     from ugv_acceptance.nodes.doctor.probe import listen
+    from ugv_acceptance.nodes.monitor.own_description import load_live
 
-    loaded = load(config, urdf=urdf)
+    loaded = load_live(config, urdf, args)
     console.print(f'Listening for {seconds:g} s; let the robot stand still.')
     levels = []
     for finding in examine(listen(loaded.topics, seconds, args), loaded):

@@ -76,14 +76,17 @@ def evaluate(
     from ugv_acceptance.cli.evidence import Papers, evaluate_files, write_junit
     from ugv_acceptance.cli.ground_option import ground_from
     from ugv_acceptance.cli.result_text import print_result, while_read
-    from ugv_acceptance.config import load
+    from ugv_acceptance.config import description_topic, load
+    from ugv_acceptance.config.files import find
     from ugv_acceptance.config.identity import file_of, identity_from
 
     under = ground_from(ground)
     papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria, annotate, under)
-    groups, loaded = recordings(bags), load(config, urdf=urdf)
+    groups = recordings(bags)
+    told = description_topic(config, urdf=urdf) is not None
+    robot = find(config) if config and told else load(config, urdf=urdf)
     of_all = [Output('--json', json_file, kinds.RESULT), Output('--junit', junit, kinds.JUNIT)]
-    inputs = inputs_of(loaded, bags, criteria=criteria, identity=file_of(identity))
+    inputs = inputs_of(robot, bags, criteria=criteria, identity=file_of(identity))
     check_outputs([*of_all, *papers.outputs(len(groups))], inputs, overwrite=overwrite)
     entered = identity_from(identity)
     results: list[dict[str, Any]] = []
@@ -91,7 +94,7 @@ def evaluate(
     for paths in groups:
         try:
             result = evaluate_files(
-                paths, loaded, papers, compare_effort=compare_effort, identity=entered
+                paths, robot, papers, compare_effort=compare_effort, identity=entered
             ).result
         except AcceptanceError as error:
             typer.echo(f'ugv-acceptance: {error}', err=True)

@@ -63,21 +63,27 @@ class Papers:
 
 def evaluate_files(
     paths: list[Path],
-    config: 'Config',
+    config: 'Config | Path',
     papers: Papers,
     *,
     compare_effort: bool = False,
     identity: 'Mapping[str, str] | None' = None,
 ) -> 'Evaluation':
-    """Evaluate one recording, write the files asked for, and return the evaluation."""
+    """Evaluate one recording, write the files asked for, and return the evaluation.
+
+    `config` is a path where the recording has to tell the robot's URDF.
+    """
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli.result_text import progress_of
     from ugv_acceptance.evaluation.downsampling import StripRecorder
     from ugv_acceptance.offline.evaluate import evaluate
     from ugv_acceptance.offline.judge import Options
     from ugv_acceptance.offline.output import CsvSink, ParquetSink
+    from ugv_acceptance.offline.own_robot import robot_of
 
-    recording, settings = open_recording(paths), config.settings
+    recording = open_recording(paths)
+    robot = robot_of(recording, config) if isinstance(config, Path) else config
+    settings = robot.settings
     start, end = recording.start_ns, recording.bag.end_ns
     recorder = StripRecorder(settings, start) if papers.paged else None
     with (
@@ -90,7 +96,7 @@ def evaluate_files(
         takers += [recorder.add] if recorder else []
         found = evaluate(
             recording,
-            config=config,
+            config=robot,
             criteria=papers.criteria,
             ground=papers.ground,
             identity=identity,

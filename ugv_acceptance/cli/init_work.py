@@ -14,6 +14,7 @@ from ugv_acceptance.bag.atomic_files import write_bytes, write_text
 from ugv_acceptance.cli import output_kinds as kinds
 from ugv_acceptance.cli.outputs import Input, Output, check_outputs, inputs_of
 from ugv_acceptance.config import Config, load
+from ugv_acceptance.config.loading import description_topic
 from ugv_acceptance.config.urdf import read_urdf
 from ugv_acceptance.configure.checks import OPEN, Check, checks_of
 from ugv_acceptance.configure.derive import Given, contacts_of, draft_of
@@ -100,19 +101,22 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
 
 def check_it(path: Path, asked: Asked) -> Found:
     """Check a configuration, against what a recording or the running robot tells if asked for."""
-    config = load(path)
     sources = sources_of(asked.sources)
     if sources.path is not None:
         raise BadConfig(f'{sources.path}: expected a recording beside --check, got a description')
-    output = Output('--picture', asked.picture, kinds.PICTURE)
-    inputs = inputs_of(config, asked.sources)
+    named = description_topic(path) is None
+    config = load(path) if named else None
+    output, inputs = Output('--picture', asked.picture, kinds.PICTURE), inputs_of(config)
+    inputs += [*inputs_of(None, asked.sources), Input('the configuration', path)]
     check_outputs([output], inputs, overwrite=asked.overwrite)
-    urdf = read_urdf(config.urdf_path.read_bytes(), str(config.urdf_path))
-    evidence = _evidence(replace(sources, urdf=config.urdf_path.read_bytes()), asked)
+    evidence = _evidence(replace(sources, urdf=config.urdf_text if config else None), asked)
+    if config is None:
+        config = load(path, urdf_text=evidence.urdf if evidence else None)
+    urdf = config.urdf
     posture = positions(rest_posture(urdf, evidence))
     checks = checks_of(config, urdf, posture, evidence)
     if asked.picture is not None:
-        finder = mesh_finder(config.urdf_path, asked.meshes)
+        finder = mesh_finder(config.path, asked.meshes)
         _draw(asked.picture, config, urdf, posture, finder, checks, evidence)
     files = () if asked.picture is None else (asked.picture,)
     return Found(checks, config.warnings, (), files, 'no check fails')

@@ -63,15 +63,17 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import whole
+    from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
     from ugv_acceptance.config import load
+    from ugv_acceptance.offline.own_robot import robot_of
     from ugv_acceptance.report.map_data import map_of
     from ugv_acceptance.report.map_figure import assumptions, write_map
     from ugv_acceptance.studies.maps import CLASSES, area_fraction, classes
 
-    loaded = load(config)
+    loaded = robot_of(open_recording(from_bag), config) if from_bag else load(config)
     paths = out or [Path(f'{kind}_map.svg')]
     outputs = [Output('--out', path, kinds.MAP) for path in paths]
     check_outputs(outputs, inputs_of(loaded, from_bag or ()), overwrite=overwrite)

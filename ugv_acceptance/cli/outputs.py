@@ -37,11 +37,16 @@ class Output:
 
 
 def inputs_of(
-    config: 'Config | None' = None, bags: Iterable[Path] = (), **files: Path | None
+    config: 'Config | Path | None' = None, bags: Iterable[Path] = (), **files: Path | None
 ) -> list[Input]:
-    """Return all files a verb reads: the robot's, recordings with their folders, others by name."""
+    """Return all files a verb reads: the robot's, recordings with their folders, others by name.
+
+    `config` is a path where a recording tells the URDF.
+    """
     found = [Input(f'the {name}', path) for name, path in files.items() if path is not None]
-    if config is not None:
+    if isinstance(config, Path):
+        found.append(Input('the configuration', config))
+    elif config is not None:
         found += [Input('the configuration', config.path), Input('the URDF', config.urdf_path)]
     return [*found, *(Input('the recording', path) for bag in bags for path in _parts(bag))]
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 # Relative difference of numbers that is rounding of another machine's arithmetic.
 ROUNDING = 1e-9
 MOST_SHOWN = 12
+# The safeguard that older results do not have.
+SAFEGUARD = 'robot_description'
 
 
 def verify(
@@ -107,23 +109,26 @@ def again(
     """Return the result computed again from the files it names, beside it, or as given."""
     import json
 
-    from ugv_acceptance.config import load
+    from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.offline.evaluate import evaluate
     from ugv_acceptance.offline.judge import Options
+    from ugv_acceptance.offline.own_robot import robot_of
 
     try:
         paths = bag or [_near(path, folder, '--bag') for path in told['bag']['path']]
         robot, named = told['robot'], told['criteria']['path']
         at = config or _near(robot['config'], folder, '--config')
-        model = urdf or _near(robot['urdf'], folder, '--urdf')
+        recorded = urdf is None and robot.get('description') == 'recorded'
+        model = None if recorded else urdf or _near(robot['urdf'], folder, '--urdf')
     except (KeyError, TypeError) as error:
         raise AcceptanceError(f'expected a result of evaluate; there is no {error}') from None
-    loaded = load(at, urdf=model)
+    opened = open_recording(paths)
+    loaded = robot_of(opened, at, urdf=model)
     if criteria is None and named is not None:
         criteria = _near(named, folder, '--criteria')
     options = Options(compare_effort='effort' in told)
     result = evaluate(
-        paths,
+        opened,
         config=loaded,
         criteria=criteria,
         payload=payload_of(told),
@@ -134,7 +139,16 @@ def again(
     for key, first in _LATER.items():  # written before results said it
         if first not in told:
             found.pop(key, None)
+    if 'urdf_sha256' not in told['robot']:
+        _without_description(found)
     return found
+
+
+def _without_description(found: Json) -> None:
+    """Take from a result what older ones did not say of the robot's own description."""
+    del found['robot']['urdf_sha256'], found['robot']['description']
+    fine = [s for s in found['safeguards'] if s['name'] != SAFEGUARD or s['verdict'] != 'PASS']
+    found['safeguards'] = fine
 
 
 # What results did not say once, and the key by whose absence that is seen.

@@ -89,20 +89,22 @@ def feed_of(
     context: typer.Context, bag: Path | None, config: Path | None, urdf: Path | None
 ) -> 'Iterator[tuple[Feed, Callable[[], bool]]]':
     """Yield the feed to show, of a recording or the live robot, and a function for when to end."""
-    from ugv_acceptance.config import load
+    from ugv_acceptance.bag.recording import open_recording
+    from ugv_acceptance.offline.own_robot import robot_of
 
     # Where no bag is given, click takes --ros-args for it.
     if bag is not None and str(bag) == '--ros-args':
         context.args, bag = [str(bag), *context.args], None
-    ros, loaded = ros_arguments(context), load(config, urdf=urdf)
+    ros = ros_arguments(context)
     if bag is not None:
-        recording = recording_feed(bag, loaded)
+        recording = recording_feed(bag, robot_of(open_recording(bag), config, urdf=urdf))
         with asked_to_end() as asked:
             yield recording, asked
         return
     from ugv_acceptance.nodes.console_feed import live_feed
+    from ugv_acceptance.nodes.monitor.own_description import load_live
 
-    with live_feed(loaded, ros) as (feed, stop):
+    with live_feed(load_live(config, urdf, ros), ros) as (feed, stop):
         yield feed, lambda: stop.asked
 
 

@@ -2,28 +2,27 @@
 
 import hashlib
 import math
-import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import Build, assumed_numbers, checked, settings_from
 from ugv_acceptance.config.contact_check import compared, uneven_tracks
-from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.document import Document, read_document
+from ugv_acceptance.config.files import LARGEST_FILE, beside, find, read, text
 from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.setup_checks import setup_doubts
 from ugv_acceptance.config.strength import worst_torques
 from ugv_acceptance.config.topics import Topics, topics_from
-from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.config.urdf import Urdf, read_urdf
 from ugv_acceptance.evaluation.criteria.not_judged import LEAST
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.clearance import STANDS
 from ugv_acceptance.model.robot import Contact, Payload
 
-PACKAGE = 'ugv_acceptance'
 DEFAULT = Path('packbot')
-# A larger file (bytes) is not a robot description.
-LARGEST_FILE = 20_000_000
+NO_URDF = Urdf('', (), (), (), ())
 # Share of the largest torque of any joint from which one without a limit is warned of.
 HEAVY = 0.2
 
@@ -36,7 +35,9 @@ class Config:
     as written in the file. `warnings` do not stop an evaluation; each names file and field.
     `not_compared` are the contact points that no collision geometry of the URDF could confirm.
     `assumed` pairs the names of numbers that nobody measured with the reason for their values; None
-    if the file does not say which those are.
+    if the file does not say which those are. `urdf_text` is the URDF in force as it was read,
+    `urdf` what it means, and `description` says where it came from: a file, or the robot's own
+    topic (then `urdf_path` is that topic's name). `defaulted`: nobody named a configuration.
     """
 
     name: str
@@ -50,13 +51,28 @@ class Config:
     warnings: tuple[str, ...]
     not_compared: tuple[str, ...] = ()
     assumed: tuple[tuple[str, str], ...] | None = None
+    urdf: Urdf = field(repr=False, default=NO_URDF)
+    urdf_text: bytes = field(repr=False, default=b'')
+    description: Literal['file', 'robot_description'] = 'file'
+    defaulted: bool = field(compare=False, default=False)
+
+    @property
+    def urdf_sha256(self) -> str:
+        """The SHA-256 of the URDF in force."""
+        return hashlib.sha256(self.urdf_text).hexdigest()
 
 
-def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> Config:
+def load(
+    path: Path | str | None = None,
+    *,
+    urdf: Path | str | None = None,
+    urdf_text: bytes | None = None,
+) -> Config:
     """Load a robot's configuration from a YAML file; `urdf` replaces the URDF that it names.
 
     A name without folder and ending, such as packbot (the default), is a configuration that ships
-    with this package.
+    with this package. `urdf_text` is the robot's own description, as on /robot_description; it is
+    used if neither the file nor `urdf` names a URDF.
 
     Raises
     ------
@@ -70,14 +86,8 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
     >>> config.settings.robot.joint_names[:2]
     ('turret_joint', 'shoulder_joint')
     """
-    at = find(DEFAULT if path is None else Path(path))
-    yaml_bytes = _read(at, 'configuration')
-    document = read_document(_text(yaml_bytes, at), str(at))
-    file = checked(document, File)
-    if urdf is None and file.urdf is None:
-        raise BadConfig(f'{at}: urdf: expected the path of a URDF here or with --urdf, got none')
-    urdf_at = _beside(at, str(file.urdf)) if urdf is None else Path(urdf)
-    urdf_bytes = _read(urdf_at, 'URDF (give its path with --urdf)')
+    at, yaml_bytes, document, file = _read_file(path)
+    urdf_bytes, urdf_at, described = _urdf_of(at, file, urdf, urdf_text)
     model = read_urdf(urdf_bytes, str(urdf_at))
     build = Build(document, file, model, list(model.warnings))
     settings = settings_from(build)
@@ -97,72 +107,49 @@ def load(path: Path | str | None = None, *, urdf: Path | str | None = None) -> C
         tuple(build.warnings),
         doubts,
         assumed=assumed_numbers(build),
+        urdf=model,
+        urdf_text=urdf_bytes,
+        description='robot_description' if described else 'file',
+        defaulted=path is None,
     )
 
 
-def find(path: Path) -> Path:
-    """Return the file of a path, or of the name of a configuration that ships; else BadConfig."""
-    if path.parent != Path() or path.exists():
-        return path
-    name = path if path.suffix in ('.yaml', '.yml') else Path(f'{path}.yaml')
-    places = [folder / 'msg_configs' / name for folder in _shares()]
-    found = next((place for place in places if place.is_file()), None)
-    if found is None:
-        folders = [place.parent for place in places if place.parent.is_dir()]
-        known = sorted({file.stem for folder in folders for file in folder.glob('*.yaml')})
-        raise BadConfig(
-            f'{path}: expected a file, or one that ships ({", ".join(known) or "none found"})'
-        )
-    return found
+def description_topic(
+    path: Path | str | None = None, *, urdf: Path | str | None = None
+) -> str | None:
+    """Return the topic that the URDF must come from; None if a file is named.
 
-
-def _shares() -> list[Path]:
-    """Return the folders our data may be in: the checkout, and the installed share folders."""
-    checkout, ros = Path(__file__).resolve().parents[2], _share_of(PACKAGE)
-    return [checkout, *([ros] if ros else []), Path(sys.prefix) / 'share' / PACKAGE]
-
-
-def _share_of(package: str) -> Path | None:
-    """Return the share folder of a ROS package; None without ROS or without that package."""
-    try:
-        from ament_index_python.packages import (  # noqa: PLC0415 - ROS may be absent
-            get_package_share_directory,
-        )
-
-        return Path(get_package_share_directory(package))
-    except (ImportError, LookupError, OSError, ValueError):  # OSError: no AMENT_PREFIX_PATH
+    Raises BadConfig as `load` does for a YAML file that cannot be used.
+    """
+    _, _, _, file = _read_file(path)
+    if urdf is not None or file.urdf is not None:
         return None
+    return file.topics.robot_description.name
 
 
-def _beside(at: Path, urdf: str) -> Path:
-    """Return the path of a URDF: relative to its configuration file, or package://NAME/PATH."""
-    if urdf.startswith('package://'):
-        package, _, inside = urdf.removeprefix('package://').partition('/')
-        share = _share_of(package)
-        if share is None:
-            raise BadConfig(f'{at}: urdf: expected a ROS package of this set-up, got {package}')
-        return share / inside
-    try:
-        return (at.resolve().parent / urdf.removeprefix('file://')).resolve()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise BadConfig(f'{at}: urdf: expected a path, got {error}') from None
+def _read_file(path: Path | str | None) -> tuple[Path, bytes, Document, File]:
+    at = find(DEFAULT if path is None else Path(path))
+    content = read(at, 'configuration')
+    document = read_document(text(content, at), str(at))
+    return at, content, document, checked(document, File)
 
 
-def _read(path: Path, what: str) -> bytes:
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadConfig(f'{path}: expected a {what} below 20 MB, got a larger file')
-        return path.read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, 'strerror', None) or str(error)
-        raise BadConfig(f'{path}: expected a {what}, got: {reason}') from None
-
-
-def _text(content: bytes, path: Path) -> str:
-    try:
-        return content.decode('utf-8')
-    except UnicodeDecodeError as error:
-        raise BadConfig(f'{path}: expected UTF-8 text, got byte {error.start} of another') from None
+def _urdf_of(
+    at: Path, file: File, urdf: Path | str | None, told: bytes | None
+) -> tuple[bytes, Path, bool]:
+    """Return the URDF, where it is from, and whether that is the robot's own description."""
+    if urdf is None and file.urdf is None:
+        topic = Path('/', file.topics.robot_description.name)
+        if told is None:
+            raise BadConfig(
+                f'{at}: urdf: expected the path of a URDF here or with --urdf, or a robot or a'
+                f' recording that tells it on {topic}, got none'
+            )
+        if len(told) > LARGEST_FILE:
+            raise BadConfig(f'{topic}: expected a URDF below 20 MB, got a larger text')
+        return told, topic, True
+    urdf_at = beside(at, str(file.urdf)) if urdf is None else Path(urdf)
+    return read(urdf_at, 'URDF (give its path with --urdf)'), urdf_at, False
 
 
 def _check_strength(build: Build, settings: Settings) -> None:

@@ -86,6 +86,9 @@ Place = Annotated[Given, _given('angle', 'length')]
 Effort = Annotated[Given | None, BeforeValidator(_limit)]
 Rate = Annotated[Given | None, _given('angular rate', 'rate')]
 Name = Annotated[str, Field(min_length=1, strict=True)]
+TopicName = Annotated[
+    str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')
+]
 Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
 
 
@@ -147,21 +150,31 @@ class QosSection(Section):
 class TopicSection(Section):
     """A topic's name, type, QoS and frame; defaults for missing keys are in topics.py."""
 
-    name: Annotated[str, Field(pattern=r'^[/~]?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$')]
+    name: TopicName
     type: str | None = None
     qos: QosSection | None = None
     frame_id: str | None = None
+
+
+class DescriptionSection(Section):
+    """The name of the topic on which the robot tells its URDF."""
+
+    name: TopicName = 'robot_description'
 
 
 JOINT_STATES, IMU_DATA = TopicSection(name='joint_states'), TopicSection(name='imu/data')
 
 
 class TopicsSection(Section):
-    """The topics of the inputs: joint states, IMU, payload; null: the robot has no such input."""
+    """The topics of the inputs: joint states, IMU, payload; null: the robot has no such input.
+
+    And the topic on which the robot tells its URDF.
+    """
 
     joint_states: TopicSection | None = JOINT_STATES
     imu: TopicSection | None = IMU_DATA
     payload: TopicSection = TopicSection(name='payload')
+    robot_description: DescriptionSection = DescriptionSection()
 
 
 class LawSection(Section):

@@ -38,11 +38,12 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The topics of all inputs of an evaluation."""
+    """The topics of all inputs of an evaluation, and that on which the robot tells its URDF."""
 
     joint_states: Topic
     imu: Topic
     payload: Topic
+    robot_description: str = 'robot_description'
 
     @property
     def names(self) -> tuple[str | None, str | None, str]:
@@ -66,14 +67,16 @@ def topics_from(build: Build, settings: Settings) -> Topics:
         'payload': given.payload,
     }
     used = {'joint_states': settings.hears_joints, 'imu': settings.hears_imu, 'payload': True}
-    names = [section.name for section in sections.values()]
+    described = given.robot_description.name
+    names = [*(section.name for section in sections.values()), described]
     for key, section in sections.items():
         if names.count(section.name) > 1:
             raise build.refuse(
                 ('topics', key, 'name'),
                 f'expected a topic of its own, got {section.name}, which another input has too',
             )
-    return Topics(**{k: _topic(build, k, s, used=used[k]) for k, s in sections.items()})
+    found = {k: _topic(build, k, s, used=used[k]) for k, s in sections.items()}
+    return Topics(**found, robot_description=described)
 
 
 def _topic(build: Build, key: str, section: TopicSection, *, used: bool) -> Topic:

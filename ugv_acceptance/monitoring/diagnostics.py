@@ -303,6 +303,8 @@ def _monitor(verdict: Status, config: Config | None, session: Session | None) ->
             'robot': config.name,
             'config': config.path,
             'sha256': config.sha256,
+            'urdf_sha256': config.urdf_sha256,
+            'description': config.description,
             'warnings': len(config.warnings),
         }
     if session is not None:

@@ -1,10 +1,10 @@
 """Node `packbot_simulator`: a simulated robot with the topics of a real one.
 
-It publishes joint_states and imu/data (and /clock when asked) and obeys cmd_vel and
-arm_controller/joint_trajectory. What a person does on a test ground has topics of its own: ~/ground
-tilts the ground, ~/load puts a load into the gripper, ~/pull pulls it backwards (x: N, z: height in
-m), ~/reset stands it up again. At the start and after a reset its gripper holds the load that the
-configuration declares, because a monitor assumes that one.
+It publishes joint_states, imu/data and robot_description (and /clock when asked) and obeys
+cmd_vel and arm_controller/joint_trajectory. What a person does on a test ground has topics of its
+own: ~/ground tilts the ground, ~/load puts a load into the gripper, ~/pull pulls it backwards (x:
+N, z: height in m), ~/reset stands it up again. At the start and after a reset its gripper holds the
+load that the configuration declares, because a monitor assumes that one.
 """
 
 import math
@@ -22,14 +22,17 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import BadSample
+from ugv_acceptance.bag.told_robot import description_message
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.parameters import described
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 
 NAME = 'packbot_simulator'
@@ -72,6 +75,8 @@ class Simulator(Node):
             ),
             'imu': self.create_publisher(Imu, topics.imu.name, qos_of(topics.imu, 100)),
         }
+        self._description = self.create_publisher(String, topics.robot_description, LATCHED)
+        self._description.publish(description_message(config.urdf_text))
         self._clock_publisher = (
             self.create_publisher(ClockMessage, '/clock', 10) if self._clocked else None
         )

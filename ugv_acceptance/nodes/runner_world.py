@@ -24,6 +24,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -32,10 +33,13 @@ from ugv_acceptance.bag.cdr import joint_state_decoder
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
 from ugv_acceptance.nodes.executor import PATIENCE
+from ugv_acceptance.nodes.monitor.own_description import MOST
+from ugv_acceptance.nodes.monitor.own_description import QOS as OWN
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.plan.motions import HITCH
 from ugv_acceptance.run.actuation import OPERATOR, SIM
+from ugv_acceptance.run.own_description import tell_robot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
 SIMULATOR, MONITOR = 'packbot_simulator', 'acceptance_monitor'
@@ -191,6 +195,8 @@ class Guard(Node):
         self._fed, self._fed_at = 0.0, -1.0
         self._heard = False
         self._topics: list[tuple[str, str, Qos]] = []
+        self._own = self.resolve_topic_name(config.topics.robot_description)
+        self._described: dict[bytes, None] = {}
         self._subscribe()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK, self._look, clock=steady)
@@ -214,6 +220,8 @@ class Guard(Node):
             full = self.resolve_topic_name(name)
             self._topics.append((full, type_, offered))
             self.create_subscription(kind, name, self._recorder(full, take), qos, raw=True)
+        take = self._recorder(self._own, self._on_description)
+        self.create_subscription(String, self._own, take, OWN, raw=True)
         margins = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
         name = f'{MONITOR}/static_torque'
         self.create_subscription(JointState, name, self._on_word, margins, raw=True)
@@ -225,6 +233,7 @@ class Guard(Node):
         bag = BagWriter(folder, simulated=self._mode == SIM)
         for name, type_, qos in self._topics:
             bag.add_topic(name, type_, qos)
+        tell_robot(bag, self.config, self.stamp(), self._own, list(self._described))
         bag.flush()  # from now on it can be read, whatever happens
         with self._recording.lock:
             self._recording.bag = bag
@@ -265,6 +274,10 @@ class Guard(Node):
             self._fed_at = now
 
         return take
+
+    def _on_description(self, data: bytes) -> None:
+        if len(self._described) < MOST:
+            self._described[data] = None
 
     def _on_word(self, _: bytes) -> None:
         self._silent, self._heard = 0, True

@@ -13,7 +13,7 @@ import numpy as np
 
 from ugv_acceptance import BadConfig, __version__
 from ugv_acceptance.bag.recording import Paths, Recording, open_recording
-from ugv_acceptance.config import Config, load
+from ugv_acceptance.config import Config
 from ugv_acceptance.config.criteria import load_criteria
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.criteria.assumptions import unknown_load
@@ -22,7 +22,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CriteriaSet,
 )
 from ugv_acceptance.evaluation.criteria.safeguards import with_objection
-from ugv_acceptance.evaluation.criteria.statement import Objection
+from ugv_acceptance.evaluation.criteria.statement import Objection, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.criteria.verdict import not_checked_json
 from ugv_acceptance.evaluation.effort.plateaus import EffortComparison
@@ -35,6 +35,7 @@ from ugv_acceptance.offline.circumstances import assumed_of, load_of, origin_of
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
 from ugv_acceptance.offline.not_read import not_read
+from ugv_acceptance.offline.own_robot import check_default, description_statement, robot_of
 from ugv_acceptance.type_aliases import Json
 
 
@@ -57,7 +58,8 @@ def evaluate(
         paths are the parts of one recording.
     config
         The robot: a configuration, its YAML file, or the name of one that ships (packbot, the
-        default).
+        default, for a recording that has its joints). One that names no URDF is completed by the
+        recorded /robot_description.
     criteria
         The acceptance criteria or their YAML file; by default the limits of `config`.
     payload
@@ -86,10 +88,11 @@ def evaluate(
     >>> result.margins.sides
     ('front', 'left', 'rear', 'right')
     """
-    robot = config if isinstance(config, Config) else load(config)
-    settings = _carrying(robot, payload)
     opened = recording if isinstance(recording, Recording) else open_recording(recording)
+    robot = config if isinstance(config, Config) else robot_of(opened, config)
     opened = replace(opened, names=opened.names or robot.topics.names)
+    check_default(opened, robot)
+    settings = _carrying(robot, payload)
     demanded = _criteria(criteria, settings)
     settings = _on_ground(settings, demanded, ground)
     if demanded is not None and demanded.hand_may_touch:
@@ -98,8 +101,9 @@ def evaluate(
     if options.compare_effort:
         options = replace(options, takers=(effort.add, *options.takers))
     sources = sources_from(robot)
-    result, judgement = judge(opened, settings, demanded, sources, options)
-    result |= _both_loads(opened, judgement, demanded, sources, result)
+    told = (description_statement(opened, robot),)
+    result, judgement = judge(opened, settings, demanded, sources, options, told)
+    result |= _both_loads(opened, judgement, demanded, sources, result, told)
     result |= _circumstances(opened, robot, identity)
     unread = [not_checked_json(one) for one in not_read(opened, robot)]
     result['not_checked'] = [*result['not_checked'], *unread]
@@ -122,6 +126,7 @@ def _both_loads(
     criteria: CriteriaSet | None,
     sources: tuple[Source, ...],
     result: Json,
+    told: tuple[Statement, ...],
 ) -> Json:
     """Return the changes to a result if the verdict depends on a load told only later.
 
@@ -133,7 +138,7 @@ def _both_loads(
     if unknown_load(settings, first, judged.measurement) or first[0] <= judged.measurement.start:
         return {}
     carried = replace(settings, robot=replace(settings.robot, payload=first[1]))
-    other, _ = judge(opened, carried, criteria, sources)
+    other, _ = judge(opened, carried, criteria, sources, statements=told)
     if other['verdict'] == result['verdict']:
         return {}
     seconds = (first[0] - judged.measurement.start) / 1e9
@@ -192,6 +197,8 @@ def _circumstances(
             'config': str(config.path),
             'urdf': str(config.urdf_path),
             'sha256': config.sha256,
+            'urdf_sha256': config.urdf_sha256,
+            'description': 'file' if config.description == 'file' else 'recorded',
             'warnings': list(config.warnings),
             'assumed': assumed_of(config),
         },

@@ -22,7 +22,7 @@ from ugv_acceptance.evaluation.criteria.imu_mounting import MountExamination
 from ugv_acceptance.evaluation.criteria.imu_statement import ImuExamination
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
 from ugv_acceptance.evaluation.criteria.not_judged import absent_imu
-from ugv_acceptance.evaluation.criteria.statement import Examination
+from ugv_acceptance.evaluation.criteria.statement import Examination, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds, Source, margin_bounds
 from ugv_acceptance.evaluation.criteria.verdict import judge_criteria
 from ugv_acceptance.evaluation.dynamic_bound import DynamicBound
@@ -77,11 +77,13 @@ def judge(
     criteria: CriteriaSet | None = None,
     sources: tuple[Source, ...] = (),
     options: Options = DEFAULTS,
+    statements: Sequence[Statement] = (),
 ) -> tuple[Json, Judgement]:
     """Read a recording once; return its result for JSON and the objects it was made from.
 
     The result holds what follows from margins, alerts and data, without robot, software and
-    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty.
+    identity. `criteria` None means the limits of `settings`; `sources` are sources of uncertainty;
+    `statements` are about the recording as a whole, found before it is read.
     """
     bag, topics = recording.bag, recording.chosen(imu_required=False)
     settings = with_transforms(settings, bag)
@@ -103,7 +105,7 @@ def judge(
         'bag': _bag_result(bag, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
     }
-    statements = [e.statement(*span) for e in reading.examinations]
+    statements = [*statements, *(e.statement(*span) for e in reading.examinations)]
     statements.append(absent_imu(settings, topics.imu))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:

@@ -14,6 +14,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.inputs.imu_mount import mounted
 from ugv_acceptance.run.catalogue import Case
 from ugv_acceptance.run.messages import EPOCH, Message, imu_frame, messages
+from ugv_acceptance.run.own_description import tell_robot
 from ugv_acceptance.simulation.corruption import Corruption, overload, overloaded, weakened
 from ugv_acceptance.simulation.scenario import TIPPED, Recording
 from ugv_acceptance.simulation.simulation import BUILD
@@ -84,6 +85,8 @@ def record(
             waiting = list(
                 merge(waiting, messages(config, part, corruption, seed + k, factor), key=_due)
             )
+            if k == 0:
+                tell_robot(bag, config, waiting[0][1] if waiting else EPOCH)
             end = float(part.imu.stamp[-1])
             reached = bisect_right(waiting, EPOCH + round(end * 1e9), key=_due)
             _write(bag, waiting[:reached], outcome)

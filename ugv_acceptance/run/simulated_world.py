@@ -25,6 +25,7 @@ from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.run.own_description import tell_robot
 from ugv_acceptance.run.simulated_robot import VirtualRobot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
@@ -105,6 +106,7 @@ class Offline:
         sensor = Qos(reliability='best_effort')
         for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
             self.bag.add_topic(topic, kind, qos)
+        tell_robot(self.bag, self.config, self.stamp())
         self.bag.flush()  # from now on it can be read, whatever happens
 
     def stop_recording(self) -> None:

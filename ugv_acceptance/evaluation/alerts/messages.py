@@ -6,9 +6,8 @@ from ugv_acceptance.evaluation.alerts.alert_text import AlertText
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_alerts import IMU_ALERTS
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
-from ugv_acceptance.evaluation.alerts.robot_words import height, moving, tilt_left
+from ugv_acceptance.evaluation.alerts.robot_words import height, moving, relaxed_limit, tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
-from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING
 
@@ -190,6 +189,12 @@ ALERTS = {
         FailureSource.CONTROL_SYSTEM,
         level=WARN,
     ),
+    'CONFIG_DIFFERS': AlertText(
+        'the robot is not the configured one, by its own description: {detail}',
+        "configure the robot's own URDF, or none, and activate the monitor again",
+        FailureSource.DESIGN,
+        level=WARN,
+    ),
     'INPUT_MALFORMED': AlertText(
         '{subject}: {peak:.0f} messages could not be decoded; the last: {detail}',
         'check the type and the version of the node that publishes it',
@@ -275,17 +280,9 @@ def describe(alert: Alert, settings: Settings) -> str:
         window=window(alert),
         found=found(alert),
         seems=seems(alert),
-        relaxed=_relaxed(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
+        relaxed=relaxed_limit(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
         detail=alert.detail,
     )
-
-
-def _relaxed(name: str, settings: Settings) -> str:
-    """Return how far the limit of this name is relaxed now, and the reason given for it."""
-    found = next((b for b in relaxed(settings) if b.name == name), None)
-    if found is None:
-        return f'{name} was wider than permitted'
-    return f'{found.words}; reason: {settings.unsafe}'
 
 
 def _torque(subject: str, settings: Settings) -> float:

@@ -1,5 +1,8 @@
 """What the numbers of alerts about the robot mean in words: tilt left, motion, clearance."""
 
+from ugv_acceptance.evaluation.permitted_limits import relaxed
+from ugv_acceptance.evaluation.settings import Settings
+
 
 def tilt_left(degrees: float) -> str:
     """Return in words how much tilt is left, or how far the robot is past its tipping point."""
@@ -19,3 +22,11 @@ def moving(degrees: float) -> str:
     if degrees >= 0.0:
         return f'at the rate it turns, {degrees:.1f} degrees of tilt are left before it tips'
     return 'the robot turns so fast that it will tip over'
+
+
+def relaxed_limit(name: str, settings: Settings) -> str:
+    """Return how far the limit of this name is relaxed now, and the reason given for it."""
+    found = next((b for b in relaxed(settings) if b.name == name), None)
+    if found is None:
+        return f'{name} was wider than permitted'
+    return f'{found.words}; reason: {settings.unsafe}'

@@ -40,6 +40,7 @@ SAFEGUARDS = {
     'ground_contact': 'the arm touches the ground only where it may',
     'joint_positions': 'the positions of the joints are those of the arm',
     'imu': 'the IMU can be believed',
+    'robot_description': "the robot's own URDF, where it is told, is that of the configuration",
 }
 # Alerts that are objections by themselves: code -> safeguard and verdict.
 ALERT_OBJECTIONS: dict[str, tuple[str, str]] = {

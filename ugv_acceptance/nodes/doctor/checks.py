@@ -25,7 +25,8 @@ from ugv_acceptance.model.attitude import (
 )
 from ugv_acceptance.model.robot import Joint, Matrix, Vector
 from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
-from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
+from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings, Told
+from ugv_acceptance.nodes.monitor.own_description import difference_of
 
 OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
 # Difference of clocks (s) that is not reported.
@@ -59,6 +60,8 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
     where = f'{around.distribution}, {around.middleware}, domain {around.domain}'
     yield Finding(OK, 'ROS', f'{where}, discovery {around.discovery}')
     yield Finding(OK, 'configuration', f'{config.name} from {config.path}')
+    if around.robot is not None:
+        yield from _own_description(around.robot, config)
     for warning in config.warnings:
         yield Finding(WARN, 'configuration', warning, 'see docs/robot_configuration.md')
     if config.settings.judges_tilt:
@@ -81,6 +84,25 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
             yield from look(heard.samples, config)
     if around.joint_states is not None:
         yield from _efforts(around.joint_states, around.imu, config)
+
+
+def _own_description(told: Told, config: Config) -> Iterator[Finding]:
+    """Yield whether the robot tells its URDF, and whether it is the one in force."""
+    name = 'robot_description'
+    if not told.texts:
+        text = f'nobody tells a URDF on {told.topic}: the one in force is compared with nothing'
+        yield Finding(OK, name, text)
+        return
+    for text in told.texts:
+        if other := difference_of(config, text, told.topic):
+            do = "configure the robot's own URDF, or none"
+            yield Finding(FAIL, name, f'not the URDF in force: {other}', do)
+            return
+    if told.obstacle:
+        yield Finding(WARN, name, told.obstacle)
+        return
+    source = 'is taken' if config.description != 'file' else f'is that of {config.urdf_path}'
+    yield Finding(OK, name, f'the URDF on {told.topic} {source}')
 
 
 def _efforts(joints: Heard, imu: Heard | None, config: Config) -> Iterator[Finding]:

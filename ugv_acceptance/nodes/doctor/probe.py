@@ -16,6 +16,7 @@ from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointSt
 from ugv_acceptance.config import Topic, Topics
 from ugv_acceptance.nodes.bag_player import message_type
 from ugv_acceptance.nodes.executor import RANGE, ros, spin
+from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.publishers import MARGIN_TOPICS
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 
@@ -57,10 +58,22 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
+class Told:
+    """The robot's descriptions on `topic`: their texts, or why a message could not be read.
+
+    `obstacle` says why none of them could be taken as the robot's URDF; empty: one can.
+    """
+
+    topic: str
+    texts: tuple[str | BadSample, ...]
+    obstacle: str
+
+
+@dataclass(frozen=True, slots=True)
 class Surroundings:
     """The ROS environment, and the messages received on both inputs in `seconds`.
 
-    An input that the configuration does not use is None.
+    An input that the configuration does not use is None. `robot` is what the robot tells of itself.
     """
 
     distribution: str
@@ -71,6 +84,7 @@ class Surroundings:
     seconds: float
     joint_states: Heard | None
     imu: Heard | None
+    robot: Told | None = None
 
 
 def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
@@ -84,6 +98,8 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             for name, kind in kinds.items()
             if name in topics.used
         }
+        own = OwnDescription(node, lambda _: None)
+        own.listen(topics.robot_description)
         began = time.monotonic()
 
         def found_all() -> bool:
@@ -105,6 +121,7 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             seconds,
             inputs.get('joint_states'),
             inputs.get('imu'),
+            Told(own.topic, tuple(own.heard.values()), own.obstacle()),
         )
         node.destroy_node()
         return found

@@ -29,6 +29,9 @@ KEPT = 200_000
 # Seconds between flushes; time (s) to wait for a thread's end.
 FLUSH, PATIENCE = 0.25, 10.0
 
+# The channel of the robot's own description.
+DESCRIPTION = 'robot_description'
+
 Take = Callable[[bytes], None]
 # Time of receipt (ns), channel, content.
 Kept = tuple[int, str, bytes]
@@ -36,12 +39,24 @@ Kept = tuple[int, str, bytes]
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic to record. `lasting`: its newest message counts until the next comes."""
+    """A topic to record. `lasting`: its newest message counts until the next comes.
+
+    `latched`: it is offered as transient local.
+    """
 
     topic: str
     type: str
     reliability: str = 'best_effort'
     lasting: bool = False
+    latched: bool = False
+
+    @property
+    def qos(self) -> Qos:
+        """The quality of service that its recording says was offered."""
+        return Qos(
+            'reliable' if self.reliability == 'reliable' else 'best_effort',
+            'transient_local' if self.latched else 'volatile',
+        )
 
 
 def is_critical(alert: Alert) -> bool:
@@ -54,7 +69,8 @@ class BlackBox:
     """Keeps incoming messages in memory and writes recordings into `folder` (None: does nothing).
 
     Times in ns of receipt; `now` returns that of the message in hand. `on_problem` is called with
-    the reason why a recording could not be made; the box then goes on keeping. `saved` are the
+    the reason why a recording could not be made; the box then goes on keeping. `robot` is the
+    description in force, the first message of every recording (empty: none). `saved` are the
     recordings whose past is in the file. A thread writes, so that no message has to wait.
     """
 
@@ -63,6 +79,7 @@ class BlackBox:
     now: Callable[[], int]
     on_problem: Callable[[str], None] = lambda _text: None
     most: int = MOST
+    robot: bytes = b''
     saved: list[Path] = field(default_factory=list)
     _kept: deque[Kept] = field(default_factory=lambda: deque(maxlen=KEPT))
     _lasting: dict[str, bytes] = field(default_factory=dict)
@@ -93,6 +110,11 @@ class BlackBox:
         kept.append((now, name, data))
         if self._queue is not None and now <= self._until:
             self._queue.put((now, name, data))
+
+    def describe(self, now: int, data: bytes) -> None:
+        """Keep a description that the robot told at `now` (ns), if it is not the one in force."""
+        if self.folder is not None and data != self.robot:
+            self.keep(now, DESCRIPTION, data)
 
     def alerts(self, now: int, raised: Sequence[Alert], summary: bytes) -> None:
         """Take a message of the channel `alerts`, and the alerts that were raised in it.
@@ -130,6 +152,7 @@ class BlackBox:
         past = [message for message in self._kept if message[0] >= now - BEFORE]
         first = past[0][0] if past else now
         lasting = [(first, name, data) for name, data in self._lasting.items()]
+        lasting = [*([(first, DESCRIPTION, self.robot)] if self.robot else []), *lasting]
         self._queue = SimpleQueue()
         work = (path, [*lasting, *past], self._queue)
         thread = Thread(target=self._record, args=work, name='black_box', daemon=True)
@@ -142,8 +165,7 @@ class BlackBox:
             # Not compressed: that would keep the processor from the messages that come now.
             with BagWriter(path, compression='') as writer:
                 for channel in self.channels.values():
-                    qos = Qos('reliable' if channel.reliability == 'reliable' else 'best_effort')
-                    writer.add_topic(channel.topic, channel.type, qos)
+                    writer.add_topic(channel.topic, channel.type, channel.qos)
                 for when, name, data in past:
                     writer.write(self.channels[name].topic, when, data)
                 writer.flush()

@@ -21,7 +21,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from ugv_acceptance import AcceptanceError, BadConfig, BadSample
-from ugv_acceptance.config import Config, load
+from ugv_acceptance.config import Config
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
@@ -46,6 +46,7 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
     hand_allowed,
     operate,
 )
+from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.parameters import (
     LOAD,
     TunableParameter,
@@ -81,6 +82,9 @@ class Monitor(LifecycleNode):
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
         self._box: BlackBox | None = None
+        self.own = OwnDescription(self, self._on_description)
+        # Whether it is to bring itself up as soon as the robot tells its URDF.
+        self._awaits = False
         declare_all(self)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
@@ -97,12 +101,30 @@ class Monitor(LifecycleNode):
     # Lifecycle
 
     def bring_up(self) -> None:
-        """Configure and activate if `autostart`. Raises BadConfig where that is not possible."""
+        """Configure and activate if `autostart`. Raises BadConfig where that is not possible.
+
+        Where the robot itself tells its URDF, that is done as soon as it does.
+        """
         if not self._value('autostart'):
             return
-        success = TransitionCallbackReturn.SUCCESS
-        if self.trigger_configure() != success or self.trigger_activate() != success:
+        if self.own.is_needed(*self._files()):
+            self._awaits = True
+        elif not self._brought_up():
             raise BadConfig(self.problem)
+
+    def _brought_up(self) -> bool:
+        success = TransitionCallbackReturn.SUCCESS
+        return self.trigger_configure() == success and self.trigger_activate() == success
+
+    def _try_again(self) -> None:
+        """Come up if the robot's description is there now; else say why not, once."""
+        self._awaits = self._margins is None
+        obstacle = self.own.obstacle()
+        if self._awaits and obstacle and obstacle != self.problem:
+            self.problem = obstacle
+            self.get_logger().warning(obstacle)
+        if self._awaits and self.own.untried():
+            self._awaits = not self._brought_up()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Read the robot's files, declare its parameters, create the margin topics."""
@@ -136,9 +158,15 @@ class Monitor(LifecycleNode):
         success, failure = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
         return failure if self.problem else success
 
-    def _configure(self) -> None:
+    def _files(self) -> tuple[Path, Path | None]:
         urdf = self._value('urdf')
-        self.config = load(Path(self._value('config')), urdf=Path(urdf) if urdf else None)
+        return Path(self._value('config')), Path(urdf) if urdf else None
+
+    def _configure(self) -> None:
+        self._adopt(self.own.complete(*self._files(), wait=not self._awaits))
+
+    def _adopt(self, config: Config) -> None:
+        self.config = config
         defaults, self._sources = self.config.settings, sources_from(self.config)
         tunables = knobs_of(defaults)
         for tunable in tunables:
@@ -155,12 +183,34 @@ class Monitor(LifecycleNode):
     def _activate(self) -> None:
         if self._settings is None or self.config is None:
             raise BadConfig('expected a configured monitor')
+        if self.own.is_newer(self.config):
+            told = self.own.complete(*self._files(), wait=False)
+            self._clean_up()
+            self._adopt(told)
+        self._start()
+
+    def _start(self) -> None:
+        if self._settings is None or self.config is None:
+            raise BadConfig('expected a configured monitor')
         self.session = self._new_session(self._settings)
-        self._box = black_box_of(self, self.config.topics, self.session)
+        self._box = black_box_of(self, self.config, self.session)
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
         self._tick = self.create_timer(tick, guarded(self, self._on_tick), clock=self.steady)
+        for data in list(self.own.heard):
+            self._on_description(data)
+
+    def _on_description(self, data: bytes) -> None:
+        """Keep a description that is new, and hold the URDF in force against it at once."""
+        if self.session is None or self._box is None or self.config is None:
+            return
+        try:
+            self._box.describe(self.session.clock.now(), data)
+            self.own.compare(self.config, self.session)
+            self.session.tick()
+        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
+            self.session.fail('robot_description', error)
 
     def _new_session(self, settings: Settings) -> Session:
         return Session(
@@ -208,10 +258,15 @@ class Monitor(LifecycleNode):
             self.say()
 
     def _every_second(self) -> None:
+        self.own.look()
+        if self._awaits:
+            self._try_again()
         if self.session is not None and self._inputs is not None:
             self._inputs.look_around(self._value('allowed_publishers'))
             self.session.measure_rates()
             self.session.feel()
+            if self.config is not None:
+                self.own.compare(self.config, self.session)
             self.session.tick()
         if self._margins is not None:
             self._margins.look_for_listeners()
@@ -276,7 +331,7 @@ class Monitor(LifecycleNode):
         response.success, response.message = self.session is not None, INACTIVE
         if self.session is not None:
             self._deactivate()
-            self._activate()
+            self._start()
             response.message = 'started a new evaluation: filters, alerts and clock are fresh'
             self.say()
         return response

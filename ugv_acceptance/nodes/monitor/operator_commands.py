@@ -11,11 +11,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.config import Topics
+from ugv_acceptance.bag.description import TYPE
+from ugv_acceptance.bag.told_robot import description_message
+from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.alarms import Change, Key, State
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.monitoring.session import Session
-from ugv_acceptance.nodes.monitor.black_box import BlackBox, Channel
+from ugv_acceptance.nodes.monitor.black_box import DESCRIPTION, BlackBox, Channel
 
 # Says whether the arm may touch the ground; value: allowed, true or false.
 HAND = 'hand_may_touch'
@@ -92,8 +94,9 @@ def all_reset(session: Session) -> list[Change]:
     return [Change(now, alarm.alert, 'reset', State.NORMAL) for alarm in table.values()]
 
 
-def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
+def black_box_of(node: Node, config: Config, session: Session) -> BlackBox:
     """Return a black box for the inputs of a session; without a folder it does nothing."""
+    topics = config.topics
     channels = {
         name: Channel(
             node.resolve_topic_name(topic.name),
@@ -105,9 +108,12 @@ def black_box_of(node: Node, topics: Topics, session: Session) -> BlackBox:
     }
     alerts = node.resolve_topic_name('~/alerts')
     channels['alerts'] = Channel(alerts, 'diagnostic_msgs/msg/DiagnosticArray', 'reliable')
+    own = node.resolve_topic_name(topics.robot_description)
+    channels[DESCRIPTION] = Channel(own, TYPE, 'reliable', lasting=True, latched=True)
     folder = node.get_parameter('black_box').value
     path = Path(folder).expanduser() if folder else None
-    box = BlackBox(path, channels, session.clock.now, session.on_problem)
+    robot = description_message(config.urdf_text)
+    box = BlackBox(path, channels, session.clock.now, session.on_problem, robot=robot)
     session.take_joint_state = box.tap('joint_states', session.take_joint_state)
     session.take_imu = box.tap('imu', session.take_imu)
     session.take_payload = box.tap('payload', session.take_payload)
