@@ -1,5 +1,7 @@
 """Words of alerts for the robot at hand: its tilt left, motion, clearance, and what it has."""
 
+from ugv_acceptance.evaluation.permitted_limits import relaxed
+from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.roles import LEGGED, WHEELED, roles_of
 
@@ -24,10 +26,6 @@ def of_robot(text: str, robot: Robot) -> str:
     for words, instead in (*without, *_UNDER.get(roles.kind, ())):
         text = text.replace(words, instead)
     return text
-
-
-from ugv_acceptance.evaluation.permitted_limits import relaxed
-from ugv_acceptance.evaluation.settings import Settings
 
 
 def tilt_left(degrees: float) -> str:

@@ -64,7 +64,7 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
         yield from _own_description(around.robot, config)
     for warning in config.warnings:
         yield Finding(WARN, 'configuration', warning, 'see docs/robot_configuration.md')
-    if config.settings.hears_imu:
+    if config.settings.judges_tilt:
         kind = config.settings.ground.kind
         do = '' if kind else 'set ground.kind: flat, uneven or stairs'
         yield Finding(OK, 'ground', f'taken as {ground_words(kind)}', do)
