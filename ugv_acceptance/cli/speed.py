@@ -58,11 +58,7 @@ def speed(
 
     robot = load(config).settings.robot
     check_stands_still(robot, 'speed')
-    if not robot.joint_names:
-        raise BadConfig(
-            f'speed: expected measured joints, {robot.name} has none: without joints that move, '
-            'no speed of them bounds the static model'
-        )
+    _check_joints(robot)
     if reference <= 0.0:
         raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
     load_carried, doubts = payload_from(robot, payload), payload_doubts(robot, payload)
@@ -87,9 +83,24 @@ def speed(
         f'{robot.name}, {load_carried.mass:g} kg, '
         f'error of the static model {reference:g} N m, F < {bound:.4f}'
     )
+    for line in _lines(robot, limits):
+        typer.echo(line)
+
+
+def _check_joints(robot: 'Robot') -> None:
+    from ugv_acceptance import BadConfig
+
+    if not robot.joint_names:
+        raise BadConfig(
+            f'speed: expected measured joints, {robot.name} has none: without joints that move, '
+            'no speed of them bounds the static model'
+        )
+
+
+def _lines(robot: 'Robot', limits: list[float]) -> list[str]:
     wide = max(24, *(len(name) + 1 for name in robot.joint_names))
-    for name, limit in zip(robot.joint_names, limits, strict=True):
-        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
+    pairs = zip(robot.joint_names, limits, strict=True)
+    return [f'  {name:{wide}}{_speed(robot, name, limit)}' for name, limit in pairs]
 
 
 def _speed(robot: 'Robot', name: str, limit: float) -> str:

@@ -22,7 +22,14 @@ from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
 from ugv_acceptance.model.roles import chain_to, roles_of
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, stability_of, stances_of
 from ugv_acceptance.model.stability import standing as stance_by
-from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of, tree_of
+from ugv_acceptance.model.tree import (
+    body_positions,
+    drives_of,
+    plain,
+    point_of,
+    pose_of,
+    tree_of,
+)
 from ugv_acceptance.type_aliases import Floats
 
 OK, FAILS, OPEN, UNSEEN, LOOK = 'ok', 'FAILS', 'open', 'not seen', 'look'
@@ -223,7 +230,7 @@ def imu_place(
     tree = tree_of(robot)
     pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
     body, own, _ = tree.frames[link]
-    x, y, z = map(float, point_of(tree, pose, link, xyz)[1])
+    x, y, z = plain(point_of(tree, pose, link, xyz)[1])
     axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
     a, b, c = ((float(i), float(j), float(k)) for i, j, k in axes)
     return (x, y, z), (a, b, c)

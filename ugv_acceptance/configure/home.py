@@ -37,9 +37,9 @@ def payload_link(robot: Robot) -> Derived[str]:
         return Derived(ends[-1], ASK, f'{ends[-1]} ends a chain of joints, none of which lifts')
     at, fingers = _palm(robot, arm)
     fixed = [robot.joint(name) for name in arm]
-    ends = _fixed_to(robot, at)
+    fixed_ends = _fixed_to(robot, at)
     rivals = _rivals(robot, len(arm), arm)
-    link, why = _best(robot, at, ends)
+    link, why = _best(robot, at, fixed_ends)
     source = f'the end of {" -> ".join(_few(arm))}' + (', which carries the fingers' * fingers)
     if rivals:
         return Derived(link, ASK, f'{source}; but {rivals[0]} ends a chain as long')

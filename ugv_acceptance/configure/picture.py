@@ -16,7 +16,15 @@ from ugv_acceptance.configure.sources import MeshFinder
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
 from ugv_acceptance.model.robot import ZERO, Robot
 from ugv_acceptance.model.stability import NO_CONTACT, stability_of, stances_of, standing
-from ugv_acceptance.model.tree import Pose, body_positions, drives_of, point_of, pose_of, tree_of
+from ugv_acceptance.model.tree import (
+    Pose,
+    body_positions,
+    drives_of,
+    plain,
+    point_of,
+    pose_of,
+    tree_of,
+)
 from ugv_acceptance.report.robot_picture import Mark, Part, RobotPicture
 from ugv_acceptance.type_aliases import Floats
 
@@ -102,7 +110,7 @@ def _marks(robot: Robot, pose: Pose, parts: Sequence[Part]) -> Iterator[Mark]:
     most = np.array([height.max(axis=1) for height in heights]).reshape(-1, len(_WAYS))
     for contact in robot.contacts:
         _, at = point_of(tree, pose, contact.link, contact.position)
-        x, y, z = map(float, at)
+        x, y, z = plain(at)
         yield Mark(contact.name, (x, y, z), _wrong(np.array((x, y, z)), most))
 
 

@@ -199,8 +199,9 @@ class LiveEvaluator:
         mount = self.mount
         if mount.busy:
             felt = orientation, covariance_0, omega, acceleration
-            felt = mount.one(now, frame, felt, self.joints)
-            orientation, covariance_0, omega, acceleration = felt
+            orientation, covariance_0, omega, acceleration = mount.one(
+                now, frame, felt, self.joints
+            )
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame, mount.raw
         )
