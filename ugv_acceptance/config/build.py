@@ -225,11 +225,12 @@ def _list(names: Sequence[str]) -> str:
 def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
     measured = tuple(sections)
     file, links = build.file, [link.name for link in build.urdf.links]
-    for name, contact in file.contacts.items():
+    contacts = file.contacts or {}
+    for name, contact in contacts.items():
         _known(build, ('contacts', name, 'link'), contact.link, links, 'link')
-    if len(file.contacts) < 3:
+    if len(contacts) < 3:
         build.warn(
-            ('contacts',), f'{len(file.contacts)} contact points: no tip-over margin below 3'
+            ('contacts',), f'{len(contacts)} contact points: no tip-over margin below 3'
         )
     if file.payload is not None:
         _known(build, ('payload', 'link'), file.payload.link, links, 'link')
@@ -242,7 +243,7 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
         bodies,
         build.urdf.joints,
         measured,
-        tuple(Contact(name, c.link, c.position) for name, c in file.contacts.items()),
+        tuple(Contact(name, c.link, c.position) for name, c in contacts.items()),
         tuple(_held(build, measured)),
         None if file.payload is None else file.payload.link,
         load,
