@@ -315,7 +315,7 @@ def test_a_source_is_needed(tmp_path: Path) -> None:
 
 
 def test_legs_in_a_guessed_posture_are_asked_about(tmp_path: Path) -> None:
-    """Without a recording nobody knows how the legs stand; with one of it standing they are told."""
+    """Without a recording nobody knows how the legs stand; with one of it standing it is known."""
     guessed = init(tmp_path, dog(), '--mass', 'urdf', '--limit', '*=urdf')
     assert guessed.returncode == 3
     assert not load(tmp_path / 'robot.yaml').settings.judges_tilt

@@ -223,10 +223,10 @@ def imu_place(
     tree = tree_of(robot)
     pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
     body, own, _ = tree.frames[link]
-    x, y, z = map(float, point_of(tree, pose, link, xyz)[1])
+    at = np.array(point_of(tree, pose, link, xyz)[1], dtype=np.float64)
     axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
     a, b, c = ((float(i), float(j), float(k)) for i, j, k in axes)
-    return (x, y, z), (a, b, c)
+    return (float(at[0]), float(at[1]), float(at[2])), (a, b, c)
 
 
 def _lean(up: Floats) -> float:

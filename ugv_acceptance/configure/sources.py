@@ -89,7 +89,7 @@ def expanded(path: Path, folders: Sequence[Path], arguments: Mapping[str, str]) 
     try:
         import xacro  # noqa: PLC0415 - an extra
     except ImportError:
-        xacro = None  # type: ignore[assignment]
+        xacro = None
         program = shutil.which('xacro')
     if xacro is None and program is None:
         raise BadConfig(f'{path}: expected xacro, which expands it: {pip_install("init")}')
