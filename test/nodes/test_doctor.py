@@ -323,7 +323,7 @@ def test_it_says_what_the_ground_is_taken_for(kind: str | None, seen: str, asked
     ],
 )
 def test_it_says_how_the_imu_is_mounted(
-    imu: dict[str, str], frame: str, level: str, words: str
+    imu: dict[str, Any], frame: str, level: str, words: str
 ) -> None:
     """By the frame of its messages, by a link that moves, or that nobody knows."""
     settings = CONFIG.settings

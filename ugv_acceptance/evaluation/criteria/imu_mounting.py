@@ -54,9 +54,9 @@ def _unchecked(settings: Settings, found: Mounted) -> Iterator[NotChecked]:
         names = ', '.join(robot.joint_names[j] for j in found.joints)
         yield NotChecked(
             f'tilt while {names} moves',
-            'the IMU is on that link: the tilt follows from the newest joint states, and may be off '
-            f'by what the joints turned since then, about {math.degrees(LATE):.0f} degrees at '
-            'most: where it could be more, no margin is known',
+            'the IMU is on that link: the tilt follows from the newest joint states, and may be '
+            f'off by what the joints turned since, about {math.degrees(LATE):.0f} degrees at most: '
+            'where it could be more, no margin is known',
         )
 
 
