@@ -93,8 +93,8 @@ def _own_description(told: Told, config: Config) -> Iterator[Finding]:
         text = f'nobody tells a URDF on {told.topic}: the one in force is compared with nothing'
         yield Finding(OK, name, text)
         return
-    for text in told.texts:
-        if other := difference_of(config, text, told.topic):
+    for one in told.texts:
+        if other := difference_of(config, one, told.topic):
             do = "configure the robot's own URDF, or none"
             yield Finding(FAIL, name, f'not the URDF in force: {other}', do)
             return
