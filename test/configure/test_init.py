@@ -312,3 +312,21 @@ def test_a_source_is_needed(tmp_path: Path) -> None:
         assert done.returncode == 2
         assert 'expected a URDF' in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_legs_in_a_guessed_posture_are_asked_about(tmp_path: Path) -> None:
+    """Without a recording nobody knows how the legs stand; with one of it standing it is known."""
+    guessed = init(tmp_path, dog(), '--mass', 'urdf', '--limit', '*=urdf')
+    assert guessed.returncode == 3
+    assert not load(tmp_path / 'robot.yaml').settings.judges_tilt
+    names = [
+        f'{end}_{side}_{joint}'
+        for end in ('front', 'rear')
+        for side in ('left', 'right')
+        for joint in ('hip', 'knee')
+    ]
+    run = recorded(tmp_path / 'run', names, [0.4, -0.8] * 4, (0.0, 0.0, 9.81))
+    done = init(tmp_path, dog(), str(run), '--mass', 'urdf', '--limit', '*=urdf', '--overwrite')
+    assert done.returncode == 0, done.stdout
+    links = {contact.link for contact in load(tmp_path / 'robot.yaml').settings.robot.contacts}
+    assert len(links) == 4

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ugv_acceptance.config.loading import description_topic
 from ugv_acceptance.config.urdf import read_urdf
 from ugv_acceptance.configure.checks import OPEN, Check, checks_of
 from ugv_acceptance.configure.derive import Given, contacts_of, draft_of
-from ugv_acceptance.configure.draft import Draft
+from ugv_acceptance.configure.draft import Contacts, Draft
 from ugv_acceptance.configure.evidence import Evidence
 from ugv_acceptance.configure.home import positions
 from ugv_acceptance.configure.joints import rest_posture
@@ -181,17 +181,16 @@ def _shown(described: Path, out: Path) -> str:
 def _answer(given: Given, draft: Draft, answers: Answers, prompt: Prompt | None) -> Draft:
     """Return the draft with the answers given, and those of a person if one is there."""
 
-    def anew(links: tuple[str, ...]) -> object:
+    def anew(links: Sequence[str]) -> Contacts:
         return contacts_of(given, draft, links)
 
-    draft = answered(draft, answers, anew)  # type: ignore[arg-type]
+    draft = answered(draft, answers, anew)
     if prompt is None:
         return draft
     for question in questions_of(draft):
         for _ in range(_TIMES):
-            said = ask(question, lambda text, of=question: prompt(text, of.guess))  # type: ignore[misc]
             try:
-                draft = answered(draft, Answers(**said), anew)  # type: ignore[arg-type]
+                draft = answered(draft, ask(question, prompt), anew)
                 break
             except BadConfig as error:
                 typer.echo(str(error), err=True)

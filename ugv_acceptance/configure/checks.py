@@ -22,14 +22,7 @@ from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
 from ugv_acceptance.model.roles import chain_to, roles_of
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, stability_of, stances_of
 from ugv_acceptance.model.stability import standing as stance_by
-from ugv_acceptance.model.tree import (
-    body_positions,
-    drives_of,
-    plain,
-    point_of,
-    pose_of,
-    tree_of,
-)
+from ugv_acceptance.model.tree import body_positions, drives_of, point_of, pose_of, tree_of
 from ugv_acceptance.type_aliases import Floats
 
 OK, FAILS, OPEN, UNSEEN, LOOK = 'ok', 'FAILS', 'open', 'not seen', 'look'
@@ -230,10 +223,10 @@ def imu_place(
     tree = tree_of(robot)
     pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
     body, own, _ = tree.frames[link]
-    x, y, z = plain(point_of(tree, pose, link, xyz)[1])
+    at = np.array(point_of(tree, pose, link, xyz)[1], dtype=np.float64)
     axes = np.array(pose.rotation[body], dtype=np.float64) @ np.array(own) @ np.array(turn)
     a, b, c = ((float(i), float(j), float(k)) for i, j, k in axes)
-    return (x, y, z), (a, b, c)
+    return (float(at[0]), float(at[1]), float(at[2])), (a, b, c)
 
 
 def _lean(up: Floats) -> float:

@@ -22,6 +22,12 @@ from ugv_acceptance.configure.mounting import derive_mounting
 from ugv_acceptance.configure.sources import MeshFinder
 from ugv_acceptance.evaluation.criteria.not_judged import MOST_JOINTS, carried
 from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.roles import roles_of
+
+_LEGS = (
+    'Its legs were taken as they are with every joint at 0, or mid of its range: is that how it '
+    'stands? A recording of it standing contains its posture.'
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +52,7 @@ def draft_of(given: Given) -> Draft:
     contacts = derive_contacts(urdf, positions(home), given.meshes)
     joints = derive_joints(urdf, evidence)
     robot = robot_of(urdf, joints, contacts)
+    contacts = _asked_of_legs(robot, contacts, evidence)
     mass = math.fsum(link.mass for link in urdf.links)
     return Draft(
         urdf.name,
@@ -66,6 +73,13 @@ def contacts_of(given: Given, draft: Draft, links: Sequence[str]) -> Contacts:
     shapes = tuple(shape for shape in draft.urdf.shapes if shape.link in links)
     urdf = replace(draft.urdf, shapes=shapes)
     return derive_contacts(urdf, positions(draft.home), given.meshes)
+
+
+def _asked_of_legs(robot: Robot, contacts: Contacts, evidence: Evidence | None) -> Contacts:
+    """Return contact points with the question of the posture, where legs stand in a guessed one."""
+    if evidence is not None or contacts.question or not roles_of(robot).legs:
+        return contacts
+    return replace(contacts, question=_LEGS)
 
 
 def robot_of(urdf: Urdf, joints: Joints, contacts: Contacts) -> Robot:

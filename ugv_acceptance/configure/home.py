@@ -31,19 +31,18 @@ def payload_link(robot: Robot) -> Derived[str]:
     """
     arm = roles_of(robot).arm
     if not arm:
-        ends = _rivals(robot, _SEVERAL)
-        if not ends:
+        chains = _rivals(robot, _SEVERAL)
+        if not chains:
             return Derived(None, CHECK, 'no chain of measured joints that lifts a load')
-        return Derived(ends[-1], ASK, f'{ends[-1]} ends a chain of joints, none of which lifts')
+        return Derived(chains[-1], ASK, f'{chains[-1]} ends a chain of joints, none of which lifts')
     at, fingers = _palm(robot, arm)
-    fixed = [robot.joint(name) for name in arm]
-    fixed_ends = _fixed_to(robot, at)
+    ends = _fixed_to(robot, at)
     rivals = _rivals(robot, len(arm), arm)
-    link, why = _best(robot, at, fixed_ends)
+    link, why = _best(robot, at, ends)
     source = f'the end of {" -> ".join(_few(arm))}' + (', which carries the fingers' * fingers)
     if rivals:
         return Derived(link, ASK, f'{source}; but {rivals[0]} ends a chain as long')
-    return Derived(link, CHECK if fixed else ASK, source + why)
+    return Derived(link, CHECK, source + why)
 
 
 def _few(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """The at most five things that no file tells: asked on a terminal, options in a script."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -319,12 +319,19 @@ def _with_load(draft: Draft, answers: Answers, _: Anew) -> Draft:
     return replace(draft, payload_link=Derived(said, CERTAIN, SAID))
 
 
-def ask(question: Question, say: Callable[[str], str]) -> Mapping[str, str | tuple[str, ...]]:
-    """Ask a question by `say` (text -> answer) and return the answer as a field of Answers."""
+def ask(question: Question, say: Callable[[str, str], str]) -> Answers:
+    """Ask a question by `say` (text, guess -> answer); no answer is the guess."""
     form = question.option.partition(' ')[2]
-    text = say(f'{question.text}\n  {form}').strip() or question.guess
+    text = say(f'{question.text}\n  {form}', question.guess).strip() or question.guess
     if not text:
-        return {}
+        return Answers()
     if question.key == LIMITS:
-        return {'limits': tuple(part.strip() for part in text.split(',') if part.strip())}
-    return {question.key.replace('-', '_'): text}
+        return Answers(limits=tuple(part.strip() for part in text.split(',') if part.strip()))
+    fields = {
+        MASS: Answers(mass=text),
+        CONTACTS: Answers(contacts=text),
+        TILT: Answers(tilt=text),
+        IMU: Answers(mounting=text),
+        LOAD: Answers(load_link=text),
+    }
+    return fields[question.key]
