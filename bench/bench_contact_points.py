@@ -95,7 +95,7 @@ def _standing(thigh: float, calf: float) -> dict[str, float]:
 
 
 def _anymal(hip: float, knee: float) -> dict[str, float]:
-    found = {}
+    found: dict[str, float] = {}
     for leg, sign in (('LF', 1.0), ('RF', 1.0), ('LH', -1.0), ('RH', -1.0)):
         found |= {f'{leg}_HFE': sign * hip, f'{leg}_KFE': sign * knee}
     return found

@@ -29,6 +29,7 @@ from ugv_acceptance.simulation.vehicle import (
     SERVO,
     Build,
     Vehicle,
+    drive,
     gravity_on_slope,
     vehicle_of,
 )
@@ -232,8 +233,7 @@ def _course(
         speed, yaw = forward(t), 0.0
         if trial.kind == 'turn' and cruise < t < over:
             yaw = trial.push * min((t - cruise) / 0.2, (over - t) / 0.2, 1.0)
-        for wheel, y in vehicle.wheels:
-            data.ctrl[wheel] = (speed - yaw * y) / BUILD.wheel_radius
+        drive(vehicle, data.ctrl, speed, yaw)
         if trial.kind == 'swing' and cruise < t:
             way, rate = _swing(min(t, over) - cruise, trial.hold)
             data.ctrl[arm] = start + trial.push * (way + rate * 2.0 / SERVO)

@@ -20,8 +20,8 @@ import numpy as np
 from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.config import load
 from ugv_acceptance.run.catalogue import case_of
-from ugv_acceptance.run.messages import messages
-from ugv_acceptance.run.record import TOPICS, play
+from ugv_acceptance.run.messages import TYPES, messages, topics_of
+from ugv_acceptance.run.record import QOS, play
 from ugv_acceptance.simulation.corruption import Corruption, overload
 
 HOUR = 3_600_000_000_000
@@ -72,8 +72,8 @@ def make(made: Run, into: Path) -> str:
     folder = into / made.folder
     folder.parent.mkdir(parents=True, exist_ok=True)
     with BagWriter(folder) as bag:
-        for topic, kind, qos in TOPICS:
-            bag.add_topic(topic, kind, qos)
+        for source, topic in topics_of(config).items():
+            bag.add_topic(topic, TYPES[source], QOS[source])
         for topic, time, cdr in sorted(found, key=lambda message: message[1]):
             bag.write(topic, made.start + time, cdr)
     return made.scenario

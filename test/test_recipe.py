@@ -30,6 +30,14 @@ ASKS_FOR: dict[str, tuple[list[str], str]] = {
         ['foxglove'],
         'from ugv_acceptance.nodes.foxglove_bridge import _foxglove as f; f()',
     ),
+    'init': (
+        ['xacro', 'trimesh'],
+        # No program of that name on the path either.
+        (
+            'import os; from pathlib import Path; os.environ["PATH"] = "";'
+            'from ugv_acceptance.configure.sources import expanded as f; f(Path("r.xacro"), (), {})'
+        ),
+    ),
     'pdf': (['weasyprint'], 'from ugv_acceptance.report.acceptance import pdf_of; pdf_of("")'),
     'sim': (['mujoco'], 'from ugv_acceptance.nodes.packbot_simulator import main; main([])'),
     'table': (

@@ -110,7 +110,10 @@ def test_a_recorded_run_is_drawn(tmp_path: Path, repository: Path) -> None:
     [
         (('speed',), 'expected torque, rollover, payload, drag, got speed'),
         (('torque', '--x', 'knee'), '--x: expected a measured joint'),
-        (('torque', '--x', 'elbow_joint'), '--y: expected another joint than --x'),
+        (
+            ('torque', '--x', 'elbow_joint', '--y', 'elbow_joint'),
+            '--y: expected another joint than --x',
+        ),
         (('torque', '--x', 'shoulder_joint=2deg:1deg'), 'FROM below TO'),
         (('torque', '--x', 'shoulder_joint=2deg'), 'expected shoulder_joint=FROM:TO'),
         (('torque', '--orientation', 'upside'), '--orientation: expected one of level, right'),

@@ -43,13 +43,15 @@ FILES = {
     ('plan', '-o'): '.yml',
     ('plan', '--card'): '.html',
     ('map', '--out'): '.svg',
+    ('init', '--out'): '.yaml',
+    ('init', '--picture'): '.png',
 }
 MAPS = ('.svg', '.png', '.csv', '.npz')
 FOLDERS = {('campaign', '--out'), ('paper', '--out'), ('simulate', '--bag'), ('run', '--out')}
 # Paths that verbs read; whatever else is a path is written, and stands in one of the tables above.
 READ = {
     'config', 'urdf', 'bag', 'bags', 'criteria', 'result_file', 'failures', 'mission', 'existing',
-    'from_bag', 'plan',
+    'from_bag', 'plan', 'sources', 'meshes', 'check',
 }  # fmt: skip
 # Parameters that are called otherwise than their options.
 NAMES = {'json_file': '--json', 'csv_file': '--csv', 'init_criteria': '--init-criteria'}
@@ -124,6 +126,10 @@ GIVEN: dict[str, tuple[list[str], dict[str, str]]] = {
             'the configuration': 'robot.yaml',
             'the URDF': 'packbot.urdf',
         },
+    ),
+    'init': (
+        ['packbot.urdf', 'run'],
+        {'the description': 'packbot.urdf', 'the recording': 'run/packbot_pass_0.mcap'},
     ),
     'map': (
         ['torque', '--steps', '11', '-c', 'robot.yaml', '--from-bag', 'flat/alone.mcap'],
@@ -282,6 +288,8 @@ WRONG = {
     ('plan', '--out'): [('m.html', 'expected .yaml or .yml; for HTML use --card')],
     ('plan', '-o'): [('m.json', 'expected .yaml or .yml')],
     ('map', '--out'): [('m.gif', 'expected .svg, .png, .csv or .npz')],
+    ('init', '--out'): [('m.png', 'expected .yaml or .yml; for pictures use --picture')],
+    ('init', '--picture'): [('m.yaml', 'expected .png, .html or .htm; for YAML use --out')],
 }
 
 

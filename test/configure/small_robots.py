@@ -83,6 +83,16 @@ def derived(
     return derive_contacts(read_urdf(urdf.encode(), 'test.urdf'), posture or {}, meshes)
 
 
+def files_in(folder: Path) -> Callable[[str], Path | None]:
+    """Return what finds a mesh in a folder by the last part of its name."""
+
+    def find(name: str) -> Path | None:
+        path = folder / name.rpartition('/')[2]
+        return path if path.is_file() else None
+
+    return find
+
+
 def block(
     x: float, y: float, z: float, at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 ) -> list[Triangle]:
@@ -93,7 +103,8 @@ def block(
         for b in (1, -1)
         for c in (1, -1)
     ]
-    return [(corners[0], corners[k], corners[k + 1]) for k in range(1, 7)]
+    found: list[Triangle] = [(corners[0], corners[k], corners[k + 1]) for k in range(1, 7)]
+    return found
 
 
 def drum(radius: float, width: float, count: int = 48) -> list[Triangle]:
@@ -103,7 +114,7 @@ def drum(radius: float, width: float, count: int = 48) -> list[Triangle]:
          for a in (2.0 * math.pi * k / count for k in range(count))]
         for side in (1.0, -1.0)
     ]  # fmt: skip
-    found = []
+    found: list[Triangle] = []
     for rim, side in zip(rims, (1.0, -1.0), strict=True):
         boss = (0.0, side * width, 0.0)
         found += [(boss, rim[k - 1], rim[k]) for k in range(count)]

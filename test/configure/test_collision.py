@@ -11,6 +11,7 @@ from configure.small_robots import (
     Triangle,
     block,
     box,
+    files_in,
     link,
     mesh,
     shape,
@@ -23,7 +24,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.config.urdf import read_urdf
-from ugv_acceptance.configure.collision import Geometry, Solid, geometry_of, mesh_finder
+from ugv_acceptance.configure.collision import Geometry, Solid, geometry_of
 from ugv_acceptance.type_aliases import Floats
 
 ANGLES = st.floats(-3.0, 3.0)
@@ -103,6 +104,7 @@ def test_a_mesh_in_centimetres_is_read_in_metres(tmp_path: Path) -> None:
         ('bad.stl', b'no mesh', 'expected a mesh'),
         ('bad.dae', b'<COLLADA', 'expected a mesh, got'),
         ('empty.obj', b'v 0 0 0\n', 'expected a mesh'),
+        ('far.obj', b'v 0 0 0\nv 1 0 1e300\nv 0 1 nan\nf 1 2 3\n', 'expected'),
         ('part.step', b'ISO-10303-21;', 'expected a mesh'),
     ],
 )
@@ -112,7 +114,7 @@ def test_a_mesh_that_is_not_read_is_named_with_the_reason(
     """It is no error: what is read beside it counts, and nothing is taken in its place."""
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    found = read(shape(mesh(name)) + shape(box(1, 1, 1)), mesh_finder([tmp_path]))
+    found = read(shape(mesh(name)) + shape(box(1, 1, 1)), files_in(tmp_path))
     assert [solid.kind for solid in found.solids] == ['box']
     (unread,) = found.unread
     assert (unread.link, unread.drawn) == ('base_link', False)
@@ -128,7 +130,7 @@ def test_without_the_package_that_reads_it_a_mesh_is_not_read(
     write = write_stl if name.endswith('stl') else write_dae
     write(tmp_path / name, block(1.0, 1.0, 1.0))
     monkeypatch.setitem(sys.modules, package, None)
-    found = read(shape(mesh(name)), mesh_finder([tmp_path]))
+    found = read(shape(mesh(name)), files_in(tmp_path))
     assert not found.solids
     assert 'pip install' in found.unread[0].why
     assert 'trimesh' in found.unread[0].why
@@ -154,35 +156,3 @@ def test_what_a_link_is_drawn_with_stands_in_for_missing_collision_geometry() ->
     drawn = shape(sphere(0.1), tag='visual')
     assert [s.drawn for s in read(drawn).solids] == [True]
     assert [(s.kind, s.drawn) for s in read(drawn + shape(box(1, 1, 1))).solids] == [('box', False)]
-
-
-@pytest.mark.parametrize(
-    'name',
-    [
-        'package://husky_description/meshes/a.stl',
-        'model://husky_description/meshes/a.stl',
-        'file://{folder}/husky_description/meshes/a.stl',
-        'husky_description/meshes/a.stl',
-    ],
-)
-@pytest.mark.parametrize('beside', ['.', 'husky_description', 'husky_description/urdf'])
-def test_a_mesh_is_found_by_its_name(tmp_path: Path, name: str, beside: str) -> None:
-    """package:// from above, in or below the package; file:// and plain names as paths."""
-    package = tmp_path / 'husky_description'
-    for folder in ('meshes', 'urdf'):
-        (package / folder).mkdir(parents=True)
-    (package / 'meshes' / 'a.stl').write_bytes(b'')
-    folders = [tmp_path / beside, tmp_path]
-    found = mesh_finder(folders)(name.format(folder=tmp_path))
-    assert found is not None
-    assert found.samefile(package / 'meshes' / 'a.stl')
-    assert mesh_finder(folders)('package://husky_description/meshes/b.stl') is None
-    assert mesh_finder(folders)('https://x/husky_description/meshes/a.stl') is None
-
-
-def test_a_mesh_of_a_package_that_ros_knows_is_found(tmp_path: Path) -> None:
-    """The package's share folder comes first."""
-    (tmp_path / 'a.stl').write_bytes(b'')
-    find = mesh_finder([], {'some_description': tmp_path}.get)
-    assert find('package://some_description/a.stl') == tmp_path / 'a.stl'
-    assert find('package://other_description/a.stl') is None

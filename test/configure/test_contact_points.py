@@ -1,6 +1,7 @@
 """Contact points derived of small robots: what carries is found, what is doubtful is asked."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from configure.small_robots import (
     box,
     derived,
     drum,
+    files_in,
     four,
     joint,
     link,
@@ -26,7 +28,7 @@ from configure.small_robots import (
 
 from ugv_acceptance.config import load
 from ugv_acceptance.config.urdf import read_urdf
-from ugv_acceptance.configure.collision import geometry_of, mesh_finder
+from ugv_acceptance.configure.collision import geometry_of
 from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Contacts
 from ugv_acceptance.configure.posture import posture_of
 
@@ -51,7 +53,8 @@ def test_a_wheel_stands_on_two_points_under_its_axle_on_what_carries_it() -> Non
     assert {one.on for one in found.points} == {
         f'wheel {a}_{b}' for a in ('front', 'rear') for b in ('left', 'right')
     }
-    assert (found.ground.value, found.question, found.tilt) == (0.0, '', pytest.approx(0.0))
+    assert (found.ground.value, found.question) == (0.0, '')
+    assert found.tilt == pytest.approx(0.0)
     assert len({one.contact.name for one in found.points}) == 8
 
 
@@ -61,8 +64,7 @@ def test_a_wheel_that_is_a_mesh_stands_across_its_tread(tmp_path: Path, suffix: 
     write = {'stl': write_stl, 'obj': write_obj, 'dae': write_dae}[suffix]
     write(tmp_path / f'wheel.{suffix}', drum(0.1, 0.04))
     geometry = shape(mesh(f'package://rover/wheel.{suffix}'))
-    find = mesh_finder([tmp_path])
-    (tmp_path / 'rover').symlink_to(tmp_path)
+    find = files_in(tmp_path)
     found = derived(rover(BODY, four(geometry)), meshes=find)
     points = {(x, y, 0.0) for x in (0.2, -0.2) for y in (0.22, 0.18, -0.18, -0.22)}
     assert rounded(found) == points
@@ -151,7 +153,7 @@ def test_casters_inside_a_mesh_of_the_body_are_asked_about(tmp_path: Path) -> No
     parts = [*block(0.5, 0.3, 0.1, (0.0, 0.0, 0.15)), *block(0.02, 0.02, 0.1, (-0.2, 0.0, 0.05))]
     write_stl(tmp_path / 'base.stl', parts)
     urdf = rover(shape(mesh('base.stl')), PAIR)
-    seen = derived(urdf, meshes=mesh_finder([tmp_path]))
+    seen = derived(urdf, meshes=files_in(tmp_path))
     assert seen.question.startswith('Only left, right were found to carry')
     grades = {one.on: one.grade for one in seen.points}
     assert grades == {'wheel left': CERTAIN, 'wheel right': CERTAIN, 'body base_link': ASK}
@@ -177,14 +179,35 @@ def test_a_centre_of_gravity_outside_of_the_wheels_is_asked_about() -> None:
     assert len(found.points) == 8
 
 
+def test_an_arm_that_would_tip_a_rover_leaves_it_on_its_wheels() -> None:
+    """Stretched out it has the centre of gravity outside of them, which is said."""
+    arm = link('arm', shape(box(2.0, 0.1, 0.1), '1 0 0'), 20.0, '1 0 0')
+    found = derived(rover(BODY, four(WHEEL), arm + joint('arm', '0 0 0.4', 'revolute')))
+    assert (len(found.points), found.question) == (8, '')
+    assert any('the arm has the centre of gravity' in one for one in found.remarks)
+
+
 def test_a_wheel_above_the_plane_of_the_others_is_asked_about() -> None:
-    """One that hangs 30 mm high is not taken in silence; one of 5 mm is taken, to be checked."""
-    middle = wheel('middle', '0 0.2 {z}', WHEEL)
-    high = derived(rover(BODY, four(WHEEL), middle.format(z=0.13)))
-    assert 'wheel middle is 30.0 mm above the plane of the others: does it' in high.question
-    near = derived(rover(BODY, four(WHEEL), middle.format(z=0.105)))
+    """One of 5 mm is to be checked; one of 10 mm is asked about; one of 30 mm is not taken."""
+    middle = wheel('middle', '0 0.2 {z}', tyre(0.09, 0.04))
+    rover_of = [rover(BODY, four(WHEEL), middle.format(z=0.09 + z)) for z in (0.005, 0.01, 0.03)]
+    near, far, high = map(derived, rover_of)
     assert (near.question, len(near.points)) == ('', 10)
     assert {one.grade for one in near.points if one.on == 'wheel middle'} == {CHECK}
+    assert 'wheel middle is 10.0 mm above the plane of the others: does it' in far.question
+    assert len(far.points) == 10
+    assert 'wheel middle is 30.0 mm above' in high.question
+    assert len(high.points) == 8
+
+
+@pytest.mark.parametrize('suffix', ['cylinder', 'stl'])
+def test_wheels_that_overlap_are_asked_about(tmp_path: Path, suffix: str) -> None:
+    """As where a radius, or a mesh without a scale, is in millimetres."""
+    write_stl(tmp_path / 'wheel.stl', drum(100.0, 40.0))
+    geometry = tyre(100.0, 40.0) if suffix == 'cylinder' else shape(mesh('wheel.stl'))
+    found = derived(rover(BODY, four(geometry)), meshes=files_in(tmp_path))
+    assert 'front_left (radius 100000.0 mm) and front_right' in found.question
+    assert 'overlap: which number is wrong?' in found.question
 
 
 def test_a_wheel_that_swivels_stands_on_the_link_that_swivels() -> None:
@@ -264,7 +287,7 @@ def test_wheels_whose_geometry_is_not_read_are_asked_about() -> None:
         (x, y, round(0.1 - radius, 5)) for x in (0.2, -0.2) for y in (0.2, -0.2)
     }
     assert {one.grade for one in found.points} == {ASK}
-    assert f'a radius of {1e3 * radius:.1f} mm: is it that?' in found.question
+    assert f'gives a radius of {1e3 * radius:.1f} mm: is it that?' in found.question
 
 
 def test_wheels_that_nothing_tells_of_are_asked_about() -> None:
@@ -272,7 +295,7 @@ def test_wheels_that_nothing_tells_of_are_asked_about() -> None:
     bare = four(shape(mesh('wheel.dae'))).replace('<mass value="1.0"/>', '<mass value="0"/>')
     found = derived(rover('', bare))
     assert (found.points, found.ground.value) == ((), None)
-    assert found.question.startswith('Nothing tells the radius of front_left, front_right')
+    assert found.question.startswith('The radius of front_left, front_right')
 
 
 def test_a_wheel_at_the_end_of_an_arm_carries_nothing() -> None:
@@ -297,16 +320,37 @@ def test_tracks_stand_on_the_ends_of_their_flat_run() -> None:
     }
     assert {one.on for one in found.points} == {'track chassis_link'}
     assert (found.question, found.ground.value) == ('', 0.0)
-    assert any(
-        'flipper_link can reach the ground as flipper_joint turns' in r for r in found.remarks
-    )
+
+
+TRACKS = ''.join(shape(box(0.6, 0.1, 0.2), f'0 {y} 0.1') for y in (0.2, -0.2))
+
+
+@pytest.mark.parametrize('angle', [0.0, 0.2])
+def test_an_arm_that_would_tip_the_robot_leaves_it_on_its_tracks(angle: float) -> None:
+    """Stretched out it carries nothing; where it is below the ground that is asked about."""
+    arm = link('arm', shape(box(2.0, 0.1, 0.1), '1 0 0'), 20.0, '1 0 0')
+    found = derived(rover(TRACKS, arm + joint('arm', '0 0 0.25', 'revolute')), {'arm_joint': angle})
+    assert rounded(found) == {(x, y, 0.0) for x in (0.3, -0.3) for y in (0.25, -0.25)}
+    assert any('the centre of gravity is' in one for one in found.remarks)
+    below = 'In this posture arm is' in found.question and 'below the ground' in found.question
+    assert below == (angle > 0.0)
+
+
+def test_where_flippers_come_to_the_ground_is_told() -> None:
+    """The points that PackBot's configuration has, at the angle that its comment names."""
+    found = derived((ROOT / 'urdf' / 'packbot.urdf').read_text('utf-8'))
+    (told,) = [one for one in found.remarks if 'flipper_link reaches the ground' in one]
+    assert 'as flipper_joint turns by -14.9 deg' in told
+    points = [[float(x) for x in one.split(',')] for one in re.findall(r'\[(.*?)\]', told)]
+    flippers = [c for c in load('packbot').settings.robot.contacts if c.link == 'flipper_link']
+    assert points == [pytest.approx(one.position, abs=2e-5) for one in flippers]
 
 
 @pytest.mark.parametrize('geometry', [shape(box(0.6, 0.4, 0.2)), shape(mesh('body.stl'))])
 def test_a_body_without_wheels_is_asked_about(tmp_path: Path, geometry: str) -> None:
     """One shape, a box or a mesh, may have its tracks inside: its corners are a guess."""
     write_stl(tmp_path / 'body.stl', block(0.6, 0.4, 0.2))
-    found = derived(rover(geometry, ''), meshes=mesh_finder([tmp_path]))
+    found = derived(rover(geometry, ''), meshes=files_in(tmp_path))
     assert rounded(found) == {(x, y, -0.1) for x in (0.3, -0.3) for y in (0.2, -0.2)}
     assert {one.grade for one in found.points} == {ASK}
     assert 'does the robot stand on its corners?' in found.question
@@ -345,7 +389,7 @@ def legged(feet: str = shape(sphere(0.02)), more: str = '') -> str:
 
 def bent(*, lifted: float = 0.0) -> dict[str, float]:
     """Return a posture with bent knees; `lifted` (rad) bends one more."""
-    found = {}
+    found: dict[str, float] = {}
     for name in LEGS:
         more = lifted if name == 'fl' else 0.0
         found |= {f'{name}_thigh_joint': 0.6 + more, f'{name}_calf_joint': -1.2 - 2.0 * more}
@@ -406,7 +450,7 @@ def test_an_arm_alone_stands_on_nothing() -> None:
         parent = f'arm{k}'
     found = derived(rover(shape(box(0.1, 0.1, 0.05)), text))
     assert (found.points, found.ground.grade) == ((), ASK)
-    assert 'an arm alone stands on nothing' in found.question
+    assert 'only an arm: what is it mounted on?' in found.question
 
 
 @pytest.mark.parametrize('masses', ['', 'base'])

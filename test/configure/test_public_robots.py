@@ -13,7 +13,7 @@ ASKED = {
     'go2, legs at 0': 'is that how the robot stands?',
     'b1, legs at 0': 'is that how the robot stands?',
     'anymal_c, legs at 0': 'is that how the robot stands?',
-    'z1': 'stands on nothing',
+    'z1': 'only an arm: what is it mounted on?',
 }
 ABITOBOT = ROBOTS.parent / 'bags' / 'abitobot' / 'robot.urdf'
 

@@ -136,6 +136,22 @@ def test_margins_come_with_the_second_input() -> None:
     assert watched.level == OK
 
 
+def test_joints_of_another_robot_are_named_live() -> None:
+    """Messages that name no joint of the robot are told with their names, and `init` is."""
+    clock = Stopwatch(NS)
+    watched = Session(CONFIG.settings, lambda _s, _m: None, lambda: None, lambda _t: None, clock)
+    for _ in range(100):
+        clock.at += NS // 50
+        names = ('front_left_wheel', 'front_right_wheel')
+        watched.take_joint_state(joint_state_cdr(clock.at, '', names, (0.1, 0.2)))
+        watched.take_imu(imu(stamp=clock.at))
+        watched.tick()
+    status = verdict_of(watched)
+    assert status.level == STALE
+    assert 'front_left_wheel, front_right_wheel' in status.message
+    assert 'ugv-acceptance init' in status.message
+
+
 def test_any_clock_dates_what_is_heard() -> None:
     """Receipt, silence and faults are dated by the clock that is given, nothing by another."""
     clock, told = Stopwatch(time.time_ns()), list[str]()

@@ -324,3 +324,26 @@ def test_it_says_what_the_ground_is_taken_for(kind: str | None, seen: str, asked
     (found,) = (one for one in examine(healthy(), config) if one.about == 'ground')
     assert (found.level, found.seen) == (OK, seen)
     assert found.do.startswith('set ground.kind') == asked
+
+
+@pytest.mark.parametrize(
+    ('imu', 'frame', 'level', 'words'),
+    [
+        ({'placed': 'auto'}, 'chassis_link', OK, 'leans 1.1 deg'),
+        ({'placed': 'auto'}, 'xsens', WARN, "its frame 'xsens' is no link of the URDF"),
+        ({'placed': 'auto'}, '', WARN, 'name no frame'),
+        ({'placed': 'unknown'}, 'imu_link', WARN, 'declared as unknown'),
+        ({'link': 'arm_link_1'}, 'imu_link', OK, 'which turret_joint, shoulder_joint moves'),
+    ],
+)
+def test_it_says_how_the_imu_is_mounted(
+    imu: dict[str, Any], frame: str, level: str, words: str
+) -> None:
+    """By the frame of its messages, by a link that moves, or that nobody knows."""
+    settings = CONFIG.settings
+    told = replace(settings, imu=replace(settings.imu, frame='', **imu))
+    around = healthy(inertial=imu_sample(frame_id=frame))
+    found = [
+        f for f in examine(around, replace(CONFIG, settings=told)) if f.about == 'imu mounting'
+    ]
+    assert [(one.level, words in one.seen) for one in found] == [(level, True)]

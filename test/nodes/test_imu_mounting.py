@@ -19,6 +19,7 @@ from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
 provide_tf2_msgs()
 IMU = Rotation.from_euler('xyz', [1.5708, 0.0, 0.5])
+PLACED = (0.1, 0.0, 0.2), IMU.as_quat().tolist()
 
 
 def send(driver: Driver, frame: str) -> None:
@@ -72,7 +73,7 @@ def test_a_frame_that_nobody_knows_is_no_data_until_tf_static_tells(
     assert session_of(monitor).evaluator.margins is None
     assert said(driver).startswith('not known')
     publisher, heard = static_publisher(live), monitor.count_subscribers
-    publisher.publish(transforms_cdr([('base_link', 'xsens', (0.1, 0.0, 0.2), IMU.as_quat())]))
+    publisher.publish(transforms_cdr([('base_link', 'xsens', *PLACED)]))
     live.until(
         lambda: session_of(monitor).evaluator.margins is not None and 'tf_static' in said(driver),
         lambda: send(driver, 'xsens'),
@@ -85,7 +86,7 @@ def test_transforms_that_were_told_before_the_monitor_came_are_heard(
 ) -> None:
     """They are told once, and kept for who comes later (transient local)."""
     publisher = static_publisher(live)
-    publisher.publish(transforms_cdr([('r1/base_link', 'xsens', (0.1, 0.0, 0.2), IMU.as_quat())]))
+    publisher.publish(transforms_cdr([('r1/base_link', 'xsens', *PLACED)]))
     monitor, driver = live.monitor(config=str(robot_files(tmp_path))), live.driver()
     live.until(
         lambda: session_of(monitor).evaluator.margins is not None, lambda: send(driver, 'xsens')

@@ -1,5 +1,7 @@
 """The markers: what a viewer draws, from a real monitor over DDS."""
 
+from dataclasses import replace
+
 import numpy as np
 from nodes.live_case import FOLDED, Live
 from rclpy.node import Node
@@ -8,6 +10,7 @@ from visualization_msgs.msg import MarkerArray
 from ugv_acceptance.bag.encode_views import Shape
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.model.robot import Joint, Link
 from ugv_acceptance.monitoring.drawing import (
     GREEN,
     LIFETIME,
@@ -78,3 +81,23 @@ def test_a_monitor_draws_for_who_listens(live: Live) -> None:
         assert marker.header.frame_id == 'base_link'
         assert 0 < marker.lifetime.sec + marker.lifetime.nanosec / 1e9 <= LIFETIME
         assert marker.header.stamp.sec > 0
+
+
+def test_shapes_in_another_frame_of_the_base_are_where_they_were() -> None:
+    """In the axes of a link that is shifted and turned, under its name and the robot's prefix."""
+    margins = margins_at(FOLDED)
+    robot = SETTINGS.robot
+    turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    joint = Joint('mast_joint', 'fixed', robot.root, 'mast', (0.1, 0.2, 0.3), turned)
+    links, joints = (*robot.links, Link('mast')), (*robot.joints, joint)
+    there = replace(robot, links=links, joints=joints)
+    told = replace(SETTINGS, robot=there, base_frame='mast', frame_prefix='r1/')
+    figure, load = figure_of(there), robot.payload
+    skeleton = skeleton_of(figure, FOLDED, margins.gravity, load)
+    assert skeleton is not None
+    assert told.frame == 'r1/mast'
+    for shape in shapes_of(skeleton, margins, told):
+        back = points(shape).reshape(-1, 3) @ np.array(turned).T + (0.1, 0.2, 0.3)
+        np.testing.assert_allclose(
+            back, points(drawn(FOLDED)[shape.name]).reshape(-1, 3), atol=1e-9
+        )

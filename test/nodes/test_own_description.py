@@ -53,6 +53,11 @@ class Teller:
         self._publisher.publish(String(data=text) if isinstance(text, str) else text)
 
 
+def trigger(monitor: Any, transition: str) -> Any:
+    """Do as a lifecycle manager does."""
+    return getattr(monitor, f'trigger_{transition}')()
+
+
 def problem(monitor: Monitor) -> str:
     """Return what the verdict says."""
     return monitor.verdict().message
@@ -81,11 +86,11 @@ def test_a_lifecycle_manager_waits_for_the_description(
     monitor = live.monitor(config=bare, autostart=False)
     with monkeypatch.context() as patient:
         patient.setattr(own_description, 'WAIT', 0.1)
-        assert monitor.trigger_configure() == FAILURE
+        assert trigger(monitor, 'configure') == FAILURE
     assert 'nobody publishes it' in problem(monitor)
     Teller(live, urdf)
-    assert monitor.trigger_configure() == SUCCESS
-    assert monitor.trigger_activate() == SUCCESS
+    assert trigger(monitor, 'configure') == SUCCESS
+    assert trigger(monitor, 'activate') == SUCCESS
 
 
 def test_of_two_publishers_none_is_taken(live: Live, urdf: str, bare: str) -> None:
@@ -149,8 +154,8 @@ def test_a_description_that_changes_is_told_and_not_taken(live: Live, urdf: str,
     assert config is not None
     assert config.urdf_text.decode() == urdf
     live.until(lambda: len(monitor.own.heard) == 1, driver.send)  # the old one counts no longer
-    monitor.trigger_deactivate()
-    assert monitor.trigger_activate() == SUCCESS
+    trigger(monitor, 'deactivate')
+    assert trigger(monitor, 'activate') == SUCCESS
     taken = monitor.config
     assert taken is not None
     assert taken.urdf_text.decode() == heavier(urdf)
@@ -176,7 +181,7 @@ def test_the_black_box_holds_the_robot(live: Live, urdf: str, tmp_path: Path) ->
     monitor, driver = live.running(black_box=str(tmp_path))
     live.until(lambda: monitor.own.heard, driver.send)
     live.until(lambda: list(tmp_path.glob('*')), lambda: driver.send(roll=0.7))
-    monitor.trigger_deactivate()
+    trigger(monitor, 'deactivate')
     (folder,) = tmp_path.glob('*')
     found = evaluate(folder)
     told = descriptions_in(found.recording, 'robot_description')

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from foreign_robots import rover, write_robot
 from geometry_msgs.msg import Inertia, Twist, Vector3
 from nodes.live_case import Live, parameter, session_of
 from rclpy.qos import qos_profile_sensor_data
@@ -172,3 +173,26 @@ def test_a_fault_that_is_unknown_ends_the_node(live: Live) -> None:
     """A misspelt fault is said at the start, not ignored."""
     with pytest.raises(BadConfig, match='expected one of dropped'):
         live.add(Simulator(parameter_overrides=[parameter('faults', ['broken'])]))
+
+
+def test_it_is_the_robot_of_its_configuration(live: Live, tmp_path: Path) -> None:
+    """A rover of another make drives on its topics; its wheels are told as turning."""
+    path = write_robot(tmp_path, rover())
+    simulator: Simulator = live.add(Simulator(parameter_overrides=[parameter('config', str(path))]))
+    node = live.add(rclpy.create_node('driver'))
+    told: list[JointState] = []
+    felt: list[Imu] = []
+    node.create_subscription(JointState, 'drives/state', told.append, qos_profile_sensor_data)
+    node.create_subscription(Imu, 'sensors/imu', felt.append, qos_profile_sensor_data)
+    velocity = node.create_publisher(Twist, 'cmd_vel', 10)
+    simulator.bring_up()
+    live.until(lambda: told and felt and velocity.get_subscription_count())
+    ahead = Twist()
+    ahead.linear.x = 0.5
+
+    def turned() -> bool:
+        velocity.publish(ahead)
+        return min(told[-1].position) > 1.0
+
+    live.until(turned)
+    assert [name.endswith('_axle') for name in told[-1].name] == [True] * 4

@@ -77,7 +77,7 @@ def test_static_transforms_are_used_whenever_they_were_recorded(
 ) -> None:
     """They hold for the whole recording: all of it is evaluated."""
     transforms = [('plate', 'xsens', (0.0, 0.0, 0.05), (0.0, 0.0, 0.0, 1.0)),
-                  ('r1/base_link', 'plate', (0.1, 0.0, 0.0), IMU.as_quat())]  # fmt: skip
+                  ('r1/base_link', 'plate', (0.1, 0.0, 0.0), IMU.as_quat().tolist())]  # fmt: skip
     run = recorded(tmp_path / 'run', '/xsens', IMU, transforms)
     found = judged(run, robot_files(tmp_path), repository)
     assert found['imu_mounting']['source'] == 'tf_static'

@@ -19,7 +19,7 @@ from ugv_acceptance.plan.card import SHOWN, card_of, group_of
 from ugv_acceptance.plan.derive import Wanted, derive
 from ugv_acceptance.plan.order import distance, way
 from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Ground, Plan, Step, read_plan, vector_of
-from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.search import Arm
 from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
@@ -119,7 +119,7 @@ def test_the_robot_tips_over_in_simulation() -> None:
 
 def test_a_posture_behind_a_limit_is_reached_around_it() -> None:
     """Where the straight way passes a limit, the search finds postures between that do not."""
-    arm = Arm(CONFIG.settings, roles_of(CONFIG.settings))
+    arm = Arm(CONFIG.settings)
     home = vector(PLAN.home_deg)
     paths = Routes(arm, home).paths(('level', 0.0), 4.0)
     behind = [q for q in paths.q[paths.reachable] if not safe_path(arm, (home, q), *LEVEL)]
@@ -225,7 +225,7 @@ def test_a_drawing_leans_to_the_low_side(
         update={'ground': Ground(orientation=ground, tilt_deg=25.0), 'payload_kg': 1.0}
     )
     posture = {**PLAN.home_deg, 'turret_joint': turret, 'shoulder_joint': 0.0, 'elbow_joint': 0.0}
-    drawn = sketch(Arm(CONFIG.settings, roles_of(CONFIG.settings)), vector(posture), step)
+    drawn = sketch(Arm(CONFIG.settings), vector(posture), step)
     assert f'aria-label="the robot {view}"' in drawn
     assert float(re.findall(r'rotate\((-?[\d.]+)\)', drawn)[0]) == pytest.approx(lean)
     line = re.findall(r'polyline points="([^"]+)"', drawn)[0]
@@ -237,7 +237,7 @@ def test_a_drawing_leans_to_the_low_side(
 
 def test_the_card_says_what_each_step_stands_on() -> None:
     """Where a step's ground is not flat, the card says what the tilt left is worth there."""
-    step, arm = PLAN.steps[0], Arm(CONFIG.settings, roles_of(CONFIG.settings))
+    step, arm = PLAN.steps[0], Arm(CONFIG.settings)
     for ground, told in (
         (Ground(kind='stairs'), 'is an upper bound; tip-over not judged as passed)'),
         (Ground(kind='uneven', accept='trend', reason='r'), 'upper bound; tip-over by the trend)'),

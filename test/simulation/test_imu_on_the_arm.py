@@ -63,8 +63,8 @@ def gravity_of(told: Settings, joints: JointLog, imu: ImuLog) -> tuple[Floats, l
 
 def recorded(link: str) -> Recording:
     """Return the run with the IMU on a link."""
-    where = {'imu_position': PLACE, 'imu_rotation': turned(), 'imu_link': link}
-    return run(SETTINGS.robot, MOVES, 0, replace(BUILD, **where))
+    build = replace(BUILD, imu_position=PLACE, imu_rotation=turned(), imu_link=link)
+    return run(SETTINGS.robot, MOVES, 0, build)
 
 
 @pytest.fixture(scope='module')

@@ -23,6 +23,7 @@ NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS})
 # In the order in which people meet them; the code of a verb is cli/VERB.py, function VERB.
 VERBS = (
     'demo',
+    'init',
     'evaluate',
     'verify',
     'campaign',

@@ -22,11 +22,18 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     ] = None,
     config: RobotFile = None,
     x: Annotated[
-        str, typer.Option(help='Joint of the horizontal axis: JOINT or JOINT=0deg:180deg.')
-    ] = 'shoulder_joint',
+        str,
+        typer.Option(
+            help='Joint of the horizontal axis: JOINT or JOINT=0deg:180deg; by default the first '
+            'of the arm that lifts.'
+        ),
+    ] = '',
     y: Annotated[
-        str, typer.Option(help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg.')
-    ] = 'elbow_joint',
+        str,
+        typer.Option(
+            help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg; by default the second.'
+        ),
+    ] = '',
     posture: Annotated[str, typer.Option(help='Posture of the other joints: joint=30deg,...')] = '',
     orientation: Annotated[
         str,

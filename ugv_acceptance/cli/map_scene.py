@@ -10,8 +10,9 @@ from ugv_acceptance.cli.robot_description import payload_from, posture_from
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import parse, quantity
 from ugv_acceptance.evaluation.settings import Limits
-from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.robot import Joint, Robot
 from ugv_acceptance.report.map_data import MapData, Scene
+from ugv_acceptance.studies.axes import check_stands_still, map_axes
 from ugv_acceptance.studies.bilinear import Grid
 from ugv_acceptance.studies.maps import Levels
 from ugv_acceptance.studies.orientations import ORIENTATIONS, gravity_of
@@ -36,8 +37,10 @@ class Wanted:
 def scene_from(loaded: Config, wanted: Wanted) -> Scene:
     """Return the assumptions of the map. Raises BadConfig naming the option that is wrong."""
     robot = loaded.settings.robot
-    first, x = _axis(robot, '--x', wanted.x, wanted.steps, (0.0, math.pi))
-    second, y = _axis(robot, '--y', wanted.y, wanted.steps, (0.0, 2.0 * math.pi))
+    check_stands_still(robot, 'map')
+    names = _axes(loaded, wanted)
+    first, x = _axis(robot, '--x', names[0], wanted.steps, (0.0, math.pi))
+    second, y = _axis(robot, '--y', names[1], wanted.steps, (0.0, 2.0 * math.pi))
     if first == second:
         raise BadConfig(
             f'--y: expected another joint than --x, got {robot.joint_names[first]} twice'
@@ -59,20 +62,43 @@ def scene_from(loaded: Config, wanted: Wanted) -> Scene:
     )
 
 
+def _axes(loaded: Config, wanted: Wanted) -> tuple[str, str]:
+    """Return both axes as typed; those left out are the arm's two joints that lift."""
+    robot = loaded.settings.robot
+    usual = map_axes(robot, loaded.settings.limits.torque)
+    typed = (wanted.x.partition('=')[0], wanted.y.partition('=')[0])
+    left = [name for name in usual if name not in typed]
+    if len(left) < typed.count(''):
+        raise BadConfig(
+            f'map: expected two joints of an arm to map, {robot.name} has '
+            f'{", ".join(usual) or "none"}: without an arm, plan and risk say where it tips'
+        )
+    x = wanted.x or (usual[0] if usual[0] in left else left[0])
+    y = wanted.y or next(name for name in reversed(left) if name != x)
+    return x, y
+
+
+def _span(joint: Joint, default: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of an axis whose range was not typed: the joint's, of at most one turn."""
+    if joint.slides or math.isfinite(joint.lower) or math.isfinite(joint.upper):
+        low, high = joint.travel()
+        if joint.slides or high - low <= 2.0 * math.pi:
+            return low, high
+        middle = min(max(0.0, low + math.pi), high - math.pi)
+        return middle - math.pi, middle + math.pi
+    return default
+
+
 def _axis(
     robot: Robot, option: str, text: str, steps: int, default: tuple[float, float]
 ) -> tuple[int, Floats]:
     name, _, span = text.partition('=')
     if name not in robot.joint_names:
-        known = ', '.join(robot.joint_names)
+        known = ', '.join(robot.joint_names) or 'none'
         raise BadConfig(f'{option}: expected a measured joint ({known}), got {name}')
     joint = robot.joint(name)
     slides = joint.slides
-    low, high = default
-    if slides or not span:
-        low, high = max(joint.lower, low), min(joint.upper, high)
-    if slides and not span:
-        low, high = joint.lower, joint.upper
+    low, high = _span(joint, default)
     if span:
         start, colon, end = span.partition(':')
         if not colon:

@@ -242,7 +242,8 @@ def model(
     posture: Annotated[
         str,
         typer.Option(
-            help='POSE or joint=30deg,... or POSE,joint=30deg,...; left out: at 0.',
+            help='POSE or joint=30deg,... or POSE,joint=30deg,...; left out: at 0, or amid a range '
+            'without it.',
             autocompletion=poses_like,
         ),
     ] = '',

@@ -123,7 +123,7 @@ def table_of(monitor: 'Monitor') -> Table:
         if math.isfinite(limit):
             left = f'{limit - abs(torque):.1f}'
             table.add_row(escape(name), f'{torque:.1f}', f'{limit:.1f}', left)
-    if settings.hears_imu:
+    if settings.judges_tilt:
         table.add_row('ground', ground_words(settings.ground.kind), '', '')
     most = '<= ' if settings.ground.rough else ''
     for side, angle in zip(

@@ -137,6 +137,12 @@ _MAPS = {
 }
 
 
+_PICTURES = (
+    _starts(rb'\x89PNG\r\n.{0,200}?tEXtTitle\x00robot picture'),
+    _starts(rb'<!DOCTYPE html>.*?<title>Robot picture: '),
+)
+
+
 def _is_campaign(path: Path) -> bool:
     """Whether a folder holds our statement or, if ended early, only results of runs."""
     if (path / 'campaign.json').is_file():
@@ -179,6 +185,15 @@ CRITERIA = Kind(
 ANNOTATED = Kind('MCAP', ('.mcap',), lambda _: False, 'and may be a recording')
 PLAN = Kind('YAML', _YAML, _unedited('# A test plan made by'), 'and is not a plan, or was edited')
 CARD = Kind('HTML', _HTML, _starts(_PAGE % b'Operator card'), 'and is not an operator card')
+CONFIGURATION = Kind('YAML', _YAML, lambda _: False, 'and may be a configuration')
+DESCRIPTION = Kind('URDF', ('.urdf',), lambda _: False, 'and may be a description')
+PICTURE = Kind(
+    'pictures',
+    ('.png', *_HTML),
+    lambda path: any(test(path) for test in _PICTURES),
+    'and is not a picture of a robot',
+    by_ending=True,
+)
 MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is not a map', by_ending=True)
 
 CAMPAIGN = FolderKind('campaign', ('campaign.json', 'campaign.html', 'runs/*.json'), _is_campaign)

@@ -42,11 +42,13 @@ def paper(
 
     from ugv_acceptance.cli.output_kinds import PAPER
     from ugv_acceptance.config import load
+    from ugv_acceptance.report.paper.joints import check_parts
     from ugv_acceptance.report.paper.numbers import as_json, summary
     from ugv_acceptance.report.paper.page import draw, render
     from ugv_acceptance.report.paper.sections import SECTIONS
 
     loaded = load(config)
+    check_parts(loaded.settings.robot)
     check_folder('--out', out, PAPER, inputs_of(loaded), overwrite=overwrite)
     console = Console(stderr=True)
     subject = _subject(loaded, simulate, truth, console)
@@ -87,7 +89,6 @@ def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
 def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -> 'Subject':
     import numpy as np
 
-    from ugv_acceptance.report.paper.joints import check_parts
     from ugv_acceptance.report.paper.sections import Subject
 
     robot, limits = loaded.settings.robot, np.array(loaded.settings.limits.torque)
@@ -95,7 +96,6 @@ def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -
         return Subject(robot, limits)
     from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_joints, simulated_truth
 
-    check_parts(robot)
     torques, f_values = simulated_arm()
     joints = [simulated_joints(robot, free=False)]
     if truth:

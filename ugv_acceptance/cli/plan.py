@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 # Columns of the table where the output is no terminal.
 _WIDE = 160
+# Letters of a step's id in one line of the table.
+_ID = 72
 
 
 def plan(
@@ -41,8 +43,8 @@ def plan(
 ) -> None:
     """Derive what to test: worst postures, both sides of every limit, loads, speeds, endurance.
 
-    Steps that would exceed a limit are marked for simulation only. Without --out the steps are
-    just listed.
+    Of a robot without an arm: ramps in every direction and driving. Steps that would exceed a
+    limit are marked for simulation only. Without --out the steps are just listed.
 
     \b
     Examples:
@@ -52,18 +54,22 @@ def plan(
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.cli import output_kinds as kinds
+    from ugv_acceptance.cli.robot_description import warn
     from ugv_acceptance.config import load
-    from ugv_acceptance.plan.derive import Wanted, derive
+    from ugv_acceptance.plan.derive import Wanted, derive, notes_of
     from ugv_acceptance.plan.plan import plan_text, read_plan
+    from ugv_acceptance.studies.axes import check_drives
 
     loaded = load(config)
     outputs = [Output('--out', out, kinds.PLAN), Output('--card', card, kinds.CARD)]
     check_outputs(outputs, inputs_of(loaded, plan=existing), overwrite=overwrite)
+    check_drives(loaded.settings.robot, 'plan')
     if existing is not None:
         made = read_plan(existing, loaded.settings.robot)
     else:
         wanted = Wanted(_ramp(tilt), points=points, endurance=hours * 3600.0, short=short)
         made = derive(loaded, wanted)
+        warn(f'{loaded.name}: {note}' for note in notes_of(loaded))
     _print(made)
     if out is not None:
         write_text(out, plan_text(made))
@@ -95,8 +101,11 @@ def _print(made: 'Plan') -> None:
     from ugv_acceptance.report.format import time_text
 
     table = Table(box=None, pad_edge=False, padding=(0, 2))
-    for heading in ('step', 'where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
-        table.add_column(heading, no_wrap=heading == 'step')
+    # Longer ids, of joints with long names, are folded before they push the rest off the table.
+    long = max(len(step.id) for step in made.steps) > _ID
+    table.add_column('step', no_wrap=not long, overflow='fold', max_width=_ID if long else None)
+    for heading in ('where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
+        table.add_column(heading)
     for step in made.steps:
         use, tilt = step.expected.get('use'), step.expected.get('tilt_left_deg')
         table.add_row(

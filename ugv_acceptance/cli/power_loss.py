@@ -47,8 +47,10 @@ def describe_power_loss(
     held, gravity = braked_from(robot, braked), tilted_gravity(robot, tilt)
     if not robot.contacts:
         raise BadConfig('--power-loss: expected contacts in the configuration, got none')
+    from ugv_acceptance.cli.simulate import say_balanced
     from ugv_acceptance.simulation.power_loss import Released, power_loss
 
+    say_balanced(robot)
     with Console(file=sys.stderr).status('Letting the joints go in the simulation'):
         found = power_loss(Released(robot, tuple(q), load, gravity, held))
     return {

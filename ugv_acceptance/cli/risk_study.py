@@ -13,14 +13,15 @@ from ugv_acceptance.cli.robot_description import payload_doubts, posture_from
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import quantity
 from ugv_acceptance.model.mechanics import mechanics_of
-from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.robot import Joint, Robot
+from ugv_acceptance.studies.axes import check_drives
 from ugv_acceptance.studies.risk import EVENTS, Risk, Study, estimate
 from ugv_acceptance.studies.risk_kernel import known_names
 from ugv_acceptance.studies.spread import NORMAL, Spread, normal, together, uniform
 
 STEEPEST = math.radians(30.0)
-# The paper's typical operating speed.
-RATE = math.radians(7.2)
+# The paper's typical operating speed; of a joint that slides (m/s), at most half its fastest.
+RATE, SLIDE_RATE = math.radians(7.2), 0.05
 _CONFIGURED = re.compile(r'(?:cog_)?([xyz])_m|(mass)_kg')
 
 
@@ -92,6 +93,7 @@ def _entries(mission: Path) -> list[dict[str, Any]]:
 
 def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: int) -> Phase:
     robot = config.settings.robot
+    check_drives(robot, 'risk')
     spreads, left = _uncertain(config)
     spreads |= {'slope': uniform(0.0, STEEPEST), 'heading': uniform(-math.pi, math.pi)}
     if robot.payload_link is not None and robot.payload.mass > 0.0:
@@ -99,7 +101,7 @@ def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: 
     limits = config.settings.limits.torque
     for joint, limit in zip(robot.joint_names, limits, strict=True):
         if math.isfinite(limit):
-            spreads[f'{joint}.rate'] = normal(0.0, RATE)
+            spreads[f'{joint}.rate'] = normal(0.0, _rate(robot.joint(joint)))
         if not posture and not _moves_contact(robot, joint):
             spreads[f'{joint}.position'] = uniform(*robot.joint(joint).travel())
     for text in vary:
@@ -109,6 +111,11 @@ def _phase(config: Config, name: str, posture: str, vary: Sequence[str], times: 
     return Phase(
         name, Study(robot, dict(sorted(spreads.items())), fixed, limits), times, tuple(left)
     )
+
+
+def _rate(joint: Joint) -> float:
+    """Return the standard deviation of a joint's rate (rad/s; m/s)."""
+    return min(SLIDE_RATE, joint.velocity / 2.0) if joint.slides else RATE
 
 
 def _uncertain(config: Config) -> tuple[dict[str, Spread], list[str]]:
@@ -186,28 +193,40 @@ def phase_lines(phase: Phase, risk: Risk) -> list[str]:
     lines = [f'{phase.name}: {first.samples:,} samples, seed {risk.seed}, 95 % intervals']
     lines += [
         f'  {event:12}{found.probability:12.6f}   [{found.low:.6f}, {found.high:.6f}]'
+        if event not in not_judged(phase)
+        else f'  {event:12} not judged: no joint has a torque limit'
         for event, found in risk.estimates.items()
     ]
     lines.append('  convergence of "either"')
     for e in risk.history['either']:
         lines.append(f'  {e.samples:>14,}{e.probability:12.6f}   +/- {(e.high - e.low) / 2:.6f}')
     lines += ['  what matters most (share of the variance explained alone)']
-    lines.append(f'    {"input":28}{"saturation":>12}{"rollover":>12}   drawn')
     ranked = sorted(risk.sensitivity, key=lambda name: -max(risk.sensitivity[name].values()))
+    wide = max(28, *(len(name) + 1 for name in ranked[:SHOWN]))
+    lines.append(f'    {"input":{wide}}{"saturation":>12}{"rollover":>12}   drawn')
     for name in ranked[:SHOWN]:
         share, spread = risk.sensitivity[name], phase.study.spreads[name]
         numbers = f'{100 * share["saturation"]:11.1f}%{100 * share["rollover"]:11.1f}%'
-        lines.append(f'    {name:28}{numbers}   {words(name, spread)}')
+        lines.append(f'    {name:{wide}}{numbers}   {words(name, spread, phase.study.robot)}')
     if phase.not_varied:
         lines.append(f'  not varied: {", ".join(phase.not_varied)}')
     return lines
 
 
-def words(name: str, spread: Spread) -> str:
-    """Return a distribution as text; angles in degrees."""
-    turn = any(name == part or name.endswith(part) for part in _ANGLES)
+def not_judged(phase: Phase) -> tuple[str, ...]:
+    """Return the events of which a phase says nothing: no torque has a limit."""
+    return () if any(map(math.isfinite, phase.study.limits)) else (EVENTS[0],)
+
+
+def words(name: str, spread: Spread, robot: Robot) -> str:
+    """Return a distribution as text; angles in degrees, positions of joints that slide in m."""
+    owner = name.rpartition('.')[0]
+    slides = owner in robot.joint_names and robot.joint(owner).slides
+    angle = any(name == part or name.endswith(part) for part in _ANGLES)
+    turn = angle and not slides
     low, high = ((math.degrees(x) if turn else x) for x in (spread.low, spread.high))
-    unit = ' deg' if turn and not name.endswith('.rate') else ' deg/s' if turn else ''
+    unit = ('deg' if turn else 'm') + ('/s' if name.endswith('.rate') else '')
+    unit = f' {unit}' if angle else ''
     if spread.kind == NORMAL:
         return f'normal, {low:.4g} +- {high:.4g}{unit}'
     return f'uniform, {low:.4g} to {high:.4g}{unit}'
@@ -256,6 +275,7 @@ def as_document(phases: Sequence[Phase], risks: Sequence[Risk]) -> dict[str, Any
                 'sensitivity': risk.sensitivity,
                 'spreads': {k: asdict(v) for k, v in phase.study.spreads.items()},
                 'not_varied': list(phase.not_varied),
+                'not_judged': list(not_judged(phase)),
             }
             for phase, risk in zip(phases, risks, strict=True)
         ],

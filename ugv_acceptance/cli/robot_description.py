@@ -32,6 +32,7 @@ from ugv_acceptance.model.stability import (
 )
 from ugv_acceptance.model.statics import payload_capacity
 from ugv_acceptance.report.format import number_text
+from ugv_acceptance.studies.postures import rest_posture
 
 VERSION = 1
 
@@ -97,12 +98,13 @@ def _imu(config: Config) -> str | None:
 
 
 def posture_from(robot: Robot, text: str) -> list[float]:
-    """Return joint positions (rad, m) from 'POSE,joint=30deg,...'; those left out are at 0.
+    """Return joint positions (rad, m) from 'POSE,joint=30deg,...'; those left out are at rest.
 
-    The pose, one of the robot's, may be left out; positions given beside it replace the pose's.
-    Raises BadConfig for a pose or joint that the robot has not, or a value that is no position.
+    At rest is 0, or the middle of a range without it. The pose, one of the robot's, may be left
+    out; positions given beside it replace the pose's. Raises BadConfig for a pose or joint that the
+    robot has not, or a value that is no position.
     """
-    q = dict.fromkeys(robot.joint_names, 0.0)
+    q = dict(zip(robot.joint_names, rest_posture(robot).tolist(), strict=True))
     first, _, rest = text.partition(',')
     if first.strip() and '=' not in first and robot.poses:
         q |= pose_named(robot, first.strip(), '--posture')

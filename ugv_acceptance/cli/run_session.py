@@ -137,9 +137,9 @@ def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Consol
 
     verdict, covered = result['verdict'], result['coverage']
     console.print(f'[bold {COLOURS[verdict]}]{verdict}[/]: {counts_of(result)}', soft_wrap=True)
-    console.print(
-        '{cells_visited} of {cells_reachable} cells of the failure map visited'.format(**covered)
-    )
+    if covered['joints']:
+        text = '{cells_visited} of {cells_reachable} cells of the failure map visited'
+        console.print(text.format(**covered))
     for line in approaches(covered):
         console.print(line, soft_wrap=True)
     console.print(

@@ -1,4 +1,4 @@
-"""`ugv-acceptance simulate`: records a PackBot simulated in MuJoCo, faster than real time."""
+"""`ugv-acceptance simulate`: records a robot simulated in MuJoCo, faster than real time."""
 
 import sys
 import time
@@ -11,8 +11,12 @@ from ugv_acceptance.cli.options import ConfigFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
 
 if TYPE_CHECKING:
+    from ugv_acceptance.model.robot import Robot
     from ugv_acceptance.run.catalogue import Case
     from ugv_acceptance.run.record import Outcome
+
+# Links that a warning names.
+SHOWN = 8
 
 
 def simulate(
@@ -43,7 +47,8 @@ def simulate(
 ) -> None:
     """Simulate a run and record it as its robot would: joint_states, imu/data, payload.
 
-    The exit code is 0 once a run is recorded, tipped over or not; `evaluate` judges the recording.
+    Any robot on wheels or tracks; overreach, fetch, swing, reach, grasp and snatch need an arm. The
+    exit code is 0 once a run is recorded, tipped over or not; `evaluate` judges the recording.
 
     \b
     Scenarios: gentle, overreach, fetch (fixed); work, tilt, swing, reach, grasp, snatch, dash,
@@ -56,6 +61,7 @@ def simulate(
     Examples:
       ugv-acceptance simulate --list
       ugv-acceptance simulate overreach --seed 2 --bag out/overreach
+      ugv-acceptance simulate tilt --config husky.yaml --bag out/tilt
       ugv-acceptance simulate work -s 600 --bag out/work --fault frozen-encoder:elbow_joint@60-90
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     if listed:
@@ -74,10 +80,25 @@ def simulate(
     robot = loaded.settings.robot
     faults = tuple(fault_from(text, robot) for text in fault or ())
     case = case_of(scenario, robot, seed, seconds, faults)
+    say_balanced(robot)
     began = time.monotonic()
     with _bar(case) as progress:
         outcome = record(loaded, case, seed, bag, progress)
     _print_outcome(outcome, bag, outcome.seconds / (time.monotonic() - began))
+
+
+def say_balanced(robot: 'Robot') -> None:
+    """Warn of links whose inertia MuJoCo would refuse."""
+    from ugv_acceptance.simulation.inertia import balanced_links
+
+    names = balanced_links(robot)
+    if names:
+        listed = ', '.join(names[:SHOWN]) + (', ...' if len(names) > SHOWN else '')
+        typer.echo(
+            f'warning: the inertia of {listed} is not that of a rigid body: the simulation takes '
+            'the mean of its three moments; static margins do not use it',
+            err=True,
+        )
 
 
 def _bar(case: 'Case') -> 'Bar':

@@ -52,10 +52,17 @@ def speed(
         warn,
     )
     from ugv_acceptance.config import load
+    from ugv_acceptance.studies.axes import check_stands_still
     from ugv_acceptance.studies.postures import random_postures, sweeps
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
+    check_stands_still(robot, 'speed')
+    if not robot.joint_names:
+        raise BadConfig(
+            f'speed: expected measured joints, {robot.name} has none: without joints that move, '
+            'no speed of them bounds the static model'
+        )
     if reference <= 0.0:
         raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
     load_carried, doubts = payload_from(robot, payload), payload_doubts(robot, payload)
@@ -80,8 +87,9 @@ def speed(
         f'{robot.name}, {load_carried.mass:g} kg, '
         f'error of the static model {reference:g} N m, F < {bound:.4f}'
     )
+    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
     for name, limit in zip(robot.joint_names, limits, strict=True):
-        typer.echo(f'  {name:24}{_speed(robot, name, limit)}')
+        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
 
 
 def _speed(robot: 'Robot', name: str, limit: float) -> str:

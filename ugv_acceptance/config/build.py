@@ -21,6 +21,7 @@ from ugv_acceptance.config.mimics import followed
 from ugv_acceptance.config.poses import poses_from
 from ugv_acceptance.config.schema import JointSection
 from ugv_acceptance.config.units import shown
+from ugv_acceptance.config.unknown import known_of
 from ugv_acceptance.config.untold import untold_of
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
@@ -71,6 +72,8 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
 
 def settings_from(build: Build) -> Settings:
     """Return the settings of an evaluation; BadConfig if file and URDF do not fit each other."""
+    file, unknown = known_of(build.file, build.refuse)
+    build = replace(build, file=file)
     measured = _measured(build)
     stands = on_axles(robot := _robot(build, measured), build.refuse)
     robot = replace(robot, contacts=stands.contacts)
@@ -86,6 +89,7 @@ def settings_from(build: Build) -> Settings:
         Ground(build.file.ground.kind, build.file.ground.pitch),
         tuple(name for name, section in measured.items() if section.passive),
         stands.moved,
+        unknown=unknown,
         base_frame=base_frame_from(build.file, robot, build.refuse, build.warn),
         frame_prefix=build.file.robot.frame_prefix,
     )

@@ -205,7 +205,7 @@ def _check_contacts(build: Build, settings: Settings) -> tuple[str, ...]:
 
 def _check_setup(build: Build, settings: Settings) -> None:
     """Warn of what is doubtful of how the robot stands; with few points build.py has warned."""
-    contacts = build.file.contacts
+    contacts = build.file.contacts or {}
     if len(contacts) < STANDS:
         return
     given = [Contact(name, c.link, c.position) for name, c in contacts.items()]

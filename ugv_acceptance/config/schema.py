@@ -3,6 +3,7 @@
 Values are converted to SI and radians. Defaults not given here are those of evaluation/settings.py.
 """
 
+import math
 import re
 from difflib import get_close_matches
 from typing import Annotated, Literal
@@ -16,6 +17,8 @@ from ugv_acceptance.evaluation.permitted_limits import checked_reason
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits
 from ugv_acceptance.model.robot import Robot
 
+# What a file says of a value that nobody knows: what hangs on it is not checked, nothing passes.
+UNKNOWN = 'unknown'
 _IMU = ImuInput()
 _LIMITS = Limits(())
 _DELAYS = Delays()
@@ -39,6 +42,29 @@ def _vector(kind: str) -> BeforeValidator:
         return tuple(parse(Measure(x, unit) if unit else x, (kind,)).value for x in items)
 
     return BeforeValidator(three)
+
+
+def _is_unknown(value: object) -> bool:
+    """Return whether a value, with or without a unit in its key, is the word `unknown`."""
+    return (value.value if isinstance(value, Measure) else value) == UNKNOWN
+
+
+def _limit(value: object) -> Given | None:
+    """Return a limit, None for null, and one of the kind UNKNOWN for that word."""
+    if value is None or _is_unknown(value):
+        return None if value is None else Given(math.nan, UNKNOWN)
+    return parse(value, ('torque', 'force'))
+
+
+def _points(value: object) -> object:
+    """Return contact points by name, None for the word `unknown`."""
+    if _is_unknown(value):
+        return None
+    if not isinstance(value, dict):
+        raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
+            f'expected points by name, or unknown, got {shown(value)}'
+        )
+    return value
 
 
 def _sign(value: object) -> float:
@@ -74,7 +100,7 @@ Angles = Annotated[tuple[float, float, float], _vector('angle')]
 Sign = Annotated[float, BeforeValidator(_sign)]
 # Quantities of a joint: build.py checks the unit, since only the URDF says if it is prismatic.
 Place = Annotated[Given, _given('angle', 'length')]
-Effort = Annotated[Given | None, _given('torque', 'force')]
+Effort = Annotated[Given | None, BeforeValidator(_limit)]
 Rate = Annotated[Given | None, _given('angular rate', 'rate')]
 Name = Annotated[str, Field(min_length=1, strict=True)]
 TopicName = Annotated[
@@ -296,7 +322,7 @@ class File(Section):
     # Joint, with the unit or without -> position: read by poses.py, which knows the joints.
     poses: dict[PoseName, PoseSection] = {}
     imu: ImuSection = ImuSection()
-    contacts: dict[str, ContactSection] = {}
+    contacts: Annotated[dict[str, ContactSection] | None, BeforeValidator(_points)] = {}
     ground: GroundSection = GroundSection()
     payload: PayloadSection | None = None
     limits: LimitsSection = LimitsSection()

@@ -196,8 +196,8 @@ def _under_wheels(
     """
     above = {joint.child: joint for joint in robot.joints if joint.kind == 'continuous'}
     found = []
-    for shape in shapes:
-        if shape.kind != 'cylinder' or shape.size is None or shape.link not in above:
+    for shape in _tyres(shapes):
+        if shape.link not in above or shape.size is None:
             continue
         body, (x, y, z) = point_of(tree, pose, shape.link, shape.xyz)
         centre = np.array([x, y, z], dtype=np.float64)
@@ -214,6 +214,17 @@ def _under_wheels(
                 words = f'expected the lowest point of {shape.link}, below its axle, got one {off}'
                 found.append(SetupDoubt(('contacts', contact.name, 'position'), words, DOUBT))
     return found
+
+
+def _tyres(shapes: Sequence[Shape]) -> list[Shape]:
+    """Return the largest cylinder of each link: others are rims and hubs."""
+    found: dict[str, tuple[float, Shape]] = {}
+    for shape in shapes:
+        if shape.kind == 'cylinder' and shape.size is not None:
+            radius = shape.size[0]
+            if radius > found.get(shape.link, (0.0, shape))[0]:
+                found[shape.link] = radius, shape
+    return [shape for _, shape in found.values()]
 
 
 def _off_lowest(arm: Any, axle: Any, size: Vector) -> str | None:  # noqa: ANN401 - arrays (3,)

@@ -24,6 +24,8 @@ from ugv_acceptance.type_aliases import Floats
 UP: Floats = np.array([0.0, 0.0, 1.0])
 # A geometry that reaches less (m) is a marker, no part.
 MARKER = 0.002
+# So near (m) the plane a part of the body carries.
+NEAR = 0.003
 # Names of corners by front and left.
 _CORNERS = {
     (True, True): 'front_left',
@@ -64,6 +66,34 @@ def stem_of(link: str) -> str:
     return link.removesuffix('_link') or link
 
 
+def caster_of(solid: Solid) -> Part:
+    """Return a small thing fixed to the body as what carries: its lowest points, or the middle."""
+    on, source, grade = f'caster {solid.link}', f'lowest of {solid.link}: {solid.words}', CERTAIN
+    if solid.drawn:
+        source, grade = f'{source}, as it is drawn: it has no collision geometry', CHECK
+
+    patch = solid.patch(UP, NEAR)
+    if solid.kind == 'sphere' or len(patch) <= 2:
+        stem = stem_of(solid.link)
+        return Part(on, solid.link, stem, grade, source, lambda up: solid.patch(up, NEAR))
+    # Of an edge or a face the middle: what is drawn as a box is a ball or a wheel somewhere in it.
+    middle: Floats = patch.mean(axis=0)[None]
+    source = f'{source}, the middle of its underside'
+    return Part(on, solid.link, stem_of(solid.link), CHECK, source, lambda _: middle)
+
+
+def names_of(stem: str, points: Sequence[Floats]) -> list[str]:
+    """Return the names of a wheel's points: outer and inner, or left and right in the middle."""
+    if len(points) != 2:
+        return corner_names(points, stem)
+    a, b = (float(p[1]) for p in points)
+    if a * b < 0.0:
+        return [f'{stem}_{"left" if y > 0.0 else "right"}' for y in (a, b)]
+    if abs(abs(a) - abs(b)) < 1e-6:
+        return [f'{stem}_1', f'{stem}_2']
+    return [f'{stem}_{"outer" if abs(y) == max(abs(a), abs(b)) else "inner"}' for y in (a, b)]
+
+
 @dataclass
 class Notes:
     """What is to be said of contact points that are being derived: questions and remarks."""
@@ -83,17 +113,17 @@ def listed(names: Sequence[str]) -> str:
     return ', '.join(some[:6]) + (f' and {len(some) - 6} more' if len(some) > 6 else '')
 
 
-def face_of(parts: Sequence[Part], posture: Posture, up: Floats = UP) -> Face | None:
-    """Return the face below the centre of gravity of what may carry; None if there is none.
+def face_of(parts: Sequence[Part], at: Floats, up: Floats = UP) -> Face | None:
+    """Return the face of what may carry below a place, the centre of gravity; None if none is.
 
     A wheel carries below its axle only, seen along `up`: it would roll from under any other point.
     """
     points = [_vector(point) for part in parts for point in part.points(up)]
-    return resting_face(lowest_of(points), posture.cog.tolist()) if points else None
+    return resting_face(lowest_of(points), at.tolist()) if points else None
 
 
-def face_of_solids(solids: Sequence[Solid], posture: Posture) -> Face | None:
-    """Return the face below the centre of gravity of geometry; None if there is none."""
+def face_of_solids(solids: Sequence[Solid], at: Floats) -> Face | None:
+    """Return the face of geometry below a place, the centre of gravity; None if there is none."""
 
     def lowest(up: Vector) -> Vector:
         direction = np.array(up)
@@ -101,7 +131,7 @@ def face_of_solids(solids: Sequence[Solid], posture: Posture) -> Face | None:
             min((s.lowest(direction) for s in solids), key=lambda p: float(p @ direction))
         )
 
-    return resting_face(lowest, posture.cog.tolist()) if solids else None
+    return resting_face(lowest, at.tolist()) if solids else None
 
 
 def outline(points: Sequence[Floats]) -> tuple[int, ...]:
@@ -162,7 +192,7 @@ def _doubted(one: DerivedContact) -> DerivedContact:
 
 def _ground(posture: Posture, points: Sequence[DerivedContact]) -> Derived[float]:
     if not points:
-        return Derived(None, ASK, 'no contact point tells it')
+        return Derived(None, ASK, 'no contact point is known')
     heights = []
     for one in points:
         rotation, origin = posture.frames[one.contact.link]

@@ -5,7 +5,7 @@ Where a link has no collision geometry, what it is drawn with stands in its plac
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance import pip_install
+from ugv_acceptance.config.units import LARGEST as FURTHEST
 from ugv_acceptance.config.units import shown
 from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.model.robot import Shape
@@ -26,6 +27,8 @@ LARGEST = 200_000_000
 FORMATS = ('.stl', '.obj', '.dae')
 # Points (m) so close are one; a rim that is not round is told by so many points.
 SAME, RIM = 1e-7, 16
+# Odd numbers of 64 bits, by which three whole numbers are mixed into one.
+_MIXED = (1, 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,52 +172,6 @@ def geometry_of(urdf: Urdf, meshes: Meshes) -> Geometry:
     return Geometry(tuple(solids), tuple(unread))
 
 
-def mesh_finder(
-    folders: Sequence[Path], share_of: Callable[[str], Path | None] = lambda _: None
-) -> Meshes:
-    """Return what finds the file of a mesh by its name in a URDF.
-
-    package://NAME/PATH (model:// too): PATH in the share folder that `share_of` tells for NAME, or
-    in a folder NAME in, at or above one of `folders`. file:// and other names: as a path, else
-    beside one of `folders`.
-    """
-
-    def find(name: str) -> Path | None:
-        return next((path for path in _places(name, folders, share_of) if _is_file(path)), None)
-
-    return find
-
-
-def _places(
-    name: str, folders: Sequence[Path], share_of: Callable[[str], Path | None]
-) -> Iterator[Path]:
-    scheme, found, rest = name.partition('://')
-    if not found:
-        scheme, rest = 'file', name
-    if scheme == 'file':
-        yield Path(rest)
-        yield from (folder / rest.lstrip('/') for folder in folders)
-        return
-    if scheme not in ('package', 'model'):
-        return
-    package, _, inside = rest.partition('/')
-    share = share_of(package)
-    if share is not None:
-        yield share / inside
-    for folder in folders:
-        for base in (folder, *folder.resolve().parents):
-            yield base / package / inside
-            if base.name == package:
-                yield base / inside
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
 def _solid(
     shape: Shape, meshes: Meshes, read: dict[str, Floats | str], *, drawn: bool
 ) -> Solid | Unread:
@@ -283,8 +240,20 @@ def _merged(parts: Sequence[Floats]) -> Floats | str:
     corners = np.concatenate(parts) if parts else np.empty((0, 3))
     if not len(corners):
         return 'expected a mesh with faces, got none'
-    if not np.isfinite(corners).all():
-        return 'expected finite corners'
-    _, first = np.unique(np.round(corners / SAME), axis=0, return_index=True)
-    merged: Floats = corners[first]
-    return merged
+    if not np.abs(corners).max() <= FURTHEST:
+        return f'expected finite corners up to {FURTHEST:g}'
+    return _once(corners)
+
+
+def _once(corners: Floats) -> Floats:
+    """Return corners (n, 3) without repetition: triangles of an STL file repeat each six times.
+
+    One number a corner is sorted, as rows take ten times as long; if two corners share one, rows.
+    """
+    whole = np.round(corners / SAME).astype(np.int64)
+    keys = whole.astype(np.uint64) @ np.array(_MIXED, dtype=np.uint64)
+    _, first, back = np.unique(keys, return_index=True, return_inverse=True)
+    if (whole[first[back]] != whole).any():
+        _, first = np.unique(whole, axis=0, return_index=True)
+    found: Floats = corners[first]
+    return found

@@ -8,21 +8,25 @@ Nothing doubtful is passed on in silence: it becomes a question.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
 from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.configure.carrying import (
     MARKER,
+    NEAR,
     UP,
     Notes,
     Part,
+    caster_of,
     contacts_of,
     corner_names,
     face_of,
     face_of_solids,
     listed,
     mm,
+    names_of,
     outline,
     outside,
     stem_of,
@@ -32,7 +36,6 @@ from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Contacts, Derive
 from ugv_acceptance.configure.posture import Posture, posture_of
 from ugv_acceptance.configure.rolling import Wheel, endless, wheels_of
 from ugv_acceptance.configure.standing import (
-    NEAR,
     TILT,
     fewer,
     stands_on_geometry,
@@ -45,6 +48,8 @@ from ugv_acceptance.type_aliases import Floats
 # A wheel so far (m) above the lowest is none that the robot stands on; one so far above the plane
 # of the others is still one.
 HIGH, SPRUNG = 0.1, 0.02
+# From here (m) that is asked about; so much (m) two wheels may overlap.
+UNEVEN, OVERLAP = 0.0055, 0.005
 # How far (m) the body may reach below the wheels' plane, as collision geometry is rough, and below
 # a robot's lowest wheels before these carry nothing.
 ROUGH, BELOW = 0.010, 0.030
@@ -77,7 +82,7 @@ def _standing(posture: Posture, notes: Notes) -> list[Wheel]:
     unsized = [wheel for wheel in wheels_of(posture) if not wheel.radius]
     if unsized:
         notes.questions.append(
-            f'Nothing tells the radius of {listed([w.joint.child for w in unsized])} '
+            f'The radius of {listed([w.joint.child for w in unsized])} is not known '
             f'({unsized[0].source}): where does it touch the ground?'
         )
     if not wheels:
@@ -87,7 +92,7 @@ def _standing(posture: Posture, notes: Notes) -> list[Wheel]:
     on_wheels = {link for wheel in wheels for link in _carried(posture, wheel)}
     body = [s for s in posture.solids if s.link not in on_wheels and s.reach > MARKER]
     bottom = min((float(s.lowest(UP) @ UP) for s in body), default=math.inf)
-    if bottom > low - BELOW or face_of([w.part for w in kept], posture) is not None:
+    if bottom > low - BELOW or face_of([w.part for w in kept], posture.cog) is not None:
         return kept
     names = listed([wheel.joint.child for wheel in wheels])
     said = f'{names} is {mm(low - bottom)} above the lowest geometry of the rest'
@@ -112,6 +117,7 @@ class _Rolling:
 
     def __init__(self, posture: Posture, wheels: Sequence[Wheel], notes: Notes) -> None:
         self._posture, self._wheels, self._notes = posture, wheels, notes
+        self._at = posture.cog
         self._turning = {link for wheel in wheels for link in _carried(posture, wheel)}
         self._base = set(posture.rigid(posture.root))
         self._casters = self._find_casters()
@@ -126,13 +132,18 @@ class _Rolling:
         """Return the contact points, with questions where something is doubtful."""
         parts = [wheel.part for wheel in self._wheels]
         casters = [part for _, part in self._casters]
-        face, up = self._face(parts, UP) or self._face([*parts, *casters], UP), UP
+        face, up = self._faced(parts, casters, UP), UP
         self._ask_of_wheels()
         if face is not None and face.tilt > LEANING:
             up = np.array(face.normal)
-            face = self._face(parts, up) or self._face([*parts, *casters], up)
+            face = self._faced(parts, casters, up)
         if face is None:
             return self._unsupported([*parts, *casters])
+        if self._faced(parts, casters, up, of_all=True) is None:
+            off = outside([p for part in (*parts, *casters) for p in part.points(up)], self._at)
+            self._notes.remarks.append(
+                f'in this posture the arm has the centre of gravity {mm(off)} outside of the wheels'
+            )
         found = []
         for part in parts:
             found += self._taken(part, face, up, SPRUNG)
@@ -144,13 +155,25 @@ class _Rolling:
         self._say_of_the_rest(face)
         return contacts_of(self._posture, found, face, self._notes)
 
-    def _face(self, parts: Sequence[Part], up: Floats) -> Face | None:
+    def _faced(
+        self, wheels: Sequence[Part], casters: Sequence[Part], up: Floats, *, of_all: bool = False
+    ) -> Face | None:
+        """Return the face of wheels, else of wheels and casters; `of_all`: below all of the robot.
+
+        Else where an arm has the centre of gravity beyond them, the face below the rest.
+        """
+        places = [self._at] if of_all else [self._at, self._posture.body_cog()]
+        groups = [(part, at) for at in places for part in (wheels, [*wheels, *casters])]
+        faces = (self._face(parts, at, up) for parts, at in groups)
+        return next((face for face in faces if face is not None), None)
+
+    def _face(self, parts: Sequence[Part], at: Floats, up: Floats) -> Face | None:
         """Return the face that parts carry on; two wheels that are not parallel carry on none."""
         if len(parts) < 3:
             points = [point for part in parts for point in part.points(up)]
-            if not outline(points) or outside(points, self._posture.cog) > -SLIVER:
+            if not outline(points) or outside(points, at) > -SLIVER:
                 return None
-        return face_of(parts, self._posture, up)
+        return face_of(parts, at, up)
 
     def _find_casters(self) -> list[tuple[Solid, Part]]:
         """Return small things fixed to the body as low as the wheels, with what carries there."""
@@ -161,7 +184,7 @@ class _Rolling:
         of_base = [s for s in self._posture.solids if s.link in self._base]
         large = {s.link for s in of_base if s.reach > SMALL * span}
         return [
-            (solid, _caster(solid))
+            (solid, caster_of(solid))
             for solid in of_base
             if MARKER < solid.reach <= SMALL * span
             and (solid.kind in ('sphere', 'cylinder') or solid.link not in large)
@@ -172,12 +195,14 @@ class _Rolling:
         """Return the contact points of what is within `slack` (m) of the plane."""
         points = list(part.points(up))
         height = min(face.height(p.tolist()) for p in points)
-        if height > slack:
+        rolls = slack == SPRUNG
+        if height > (UNEVEN if rolls else slack):
             said = f'{part.on} is {mm(height)} above the plane of the others'
-            if slack == SPRUNG:
+            if rolls:
                 self._notes.questions.append(f'{said}: does it touch the ground?')
             else:
                 self._notes.remarks.append(f'{said}: it was not taken')
+        if height > slack:
             return []
         source, grade = part.source, part.grade
         if abs(height) > 1e-4:
@@ -190,7 +215,7 @@ class _Rolling:
                 source,
                 part.on,
             )
-            for name, point in zip(_names(part.stem, points), points, strict=True)
+            for name, point in zip(names_of(part.stem, points), points, strict=True)
         ]
 
     def _unsupported(self, parts: Sequence[Part]) -> Contacts:
@@ -229,7 +254,7 @@ class _Rolling:
         """Return where the body would touch beside the wheels, as a guess, and say so."""
         posture = self._posture
         everything = [*self._rest, *(s for s in posture.solids if s.link in self._turning)]
-        face = face_of_solids(everything, posture)
+        face = face_of_solids(everything, posture.cog)
         if face is None:
             return [], ''
         up = np.array(face.normal)
@@ -257,12 +282,19 @@ class _Rolling:
             radii = dict.fromkeys(mm(wheel.radius) for wheel in guessed)
             notes.questions.append(
                 f'The geometry of {listed([w.joint.child for w in guessed])} was not read '
-                f'({guessed[0].source.split("; ")[-1]}); as even discs their inertia tells a '
-                f'radius of {", ".join(radii)}: is it that?'
+                f'({guessed[0].source.split("; ")[-1]}); taken as uniform discs, their inertia '
+                f'gives a radius of {", ".join(radii)}: is it that?'
             )
         for wheel in self._wheels:
             self._say_of_carrier(wheel)
         self._ask_of_unround()
+        for a, b in combinations(self._wheels, 2):
+            if a.overlaps(b, OVERLAP):
+                notes.questions.append(
+                    f'{a.joint.child} (radius {mm(a.radius)}) and {b.joint.child} (radius '
+                    f'{mm(b.radius)}) overlap: which number is wrong?'
+                )
+                break
 
     def _say_of_carrier(self, wheel: Wheel) -> None:
         """Say what moves the link that carries a wheel: its contact point goes with it."""
@@ -337,34 +369,6 @@ class _Rolling:
                 f'geometry of {listed([u.link for u in unread])} was not read '
                 f'({unread[0].what}: {unread[0].why}); wheels carry without it'
             )
-
-
-def _caster(solid: Solid) -> Part:
-    """Return a small thing fixed to the body as what carries: its lowest points, or the middle."""
-    on, source, grade = f'caster {solid.link}', f'lowest of {solid.link}: {solid.words}', CERTAIN
-    if solid.drawn:
-        source, grade = f'{source}, as it is drawn: it has no collision geometry', CHECK
-
-    patch = solid.patch(UP, NEAR)
-    if solid.kind == 'sphere' or len(patch) <= 2:
-        stem = stem_of(solid.link)
-        return Part(on, solid.link, stem, grade, source, lambda up: solid.patch(up, NEAR))
-    # Of an edge or a face the middle: what is drawn as a box is a ball or a wheel somewhere in it.
-    middle: Floats = patch.mean(axis=0)[None]
-    source = f'{source}, the middle of its underside'
-    return Part(on, solid.link, stem_of(solid.link), CHECK, source, lambda _: middle)
-
-
-def _names(stem: str, points: Sequence[Floats]) -> list[str]:
-    """Return the names of a wheel's points: outer and inner, or left and right in the middle."""
-    if len(points) != 2:
-        return corner_names(points, stem)
-    a, b = (float(p[1]) for p in points)
-    if a * b < 0.0:
-        return [f'{stem}_{"left" if y > 0.0 else "right"}' for y in (a, b)]
-    if abs(abs(a) - abs(b)) < 1e-6:
-        return [f'{stem}_1', f'{stem}_2']
-    return [f'{stem}_{"outer" if abs(y) == max(abs(a), abs(b)) else "inner"}' for y in (a, b)]
 
 
 def _at_least_check(one: DerivedContact) -> DerivedContact:

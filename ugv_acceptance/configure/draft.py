@@ -52,12 +52,17 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True)
 class DerivedJoint:
-    """A joint that messages tell: its name there and its limit (N m, N; None: not known)."""
+    """A joint that messages tell: its name there and its limit (N m, N; None: not known).
+
+    `effort_sign` and `effort_scale` make a torque of its effort, where that is known to need them.
+    """
 
     name: str
     topic_name: str
     limit: Derived[float]
     passive: bool = False
+    effort_sign: Derived[float] | None = None
+    effort_scale: Derived[float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +98,11 @@ class Mounting:
 
 @dataclass(frozen=True, slots=True)
 class Draft:
-    """All that was derived for one robot, before and after questions were answered."""
+    """All that was derived for one robot, before and after questions were answered.
+
+    `scales` (kg) is what the robot weighs on scales; None: nobody weighed it. `open` are the
+    questions (keys of questions.py) that nobody answered: what hangs on them is written `unknown`.
+    """
 
     name: str
     urdf: Urdf
@@ -105,3 +114,5 @@ class Draft:
     mounting: Mounting
     payload_link: Derived[str]
     mass: Derived[float]
+    scales: float | None = None
+    open: frozenset[str] = frozenset()

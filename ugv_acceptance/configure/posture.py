@@ -62,6 +62,19 @@ class Posture:
                     found.append(joint)
         return tuple(found)
 
+    def body_cog(self) -> Floats:
+        """Return the centre of gravity (3,), m, of what only wheels and casters move: no arm.
+
+        That of all where nothing else has a mass.
+        """
+        mass, total = 0.0, np.zeros(3)
+        for link in self.urdf.links:
+            if all(joint.kind == 'continuous' for joint in self.chain(link.name)):
+                rotation, origin = self.frames[link.name]
+                mass += link.mass
+                total += link.mass * (origin + rotation @ np.array(link.cog))
+        return total / mass if mass > 0.0 else self.cog
+
     def axis(self, joint: Joint) -> Floats:
         """Return the unit vector (3,) of a joint's axis in the root link's axes."""
         found: Floats = self.frames[joint.child][0] @ np.array(joint.axis)

@@ -59,6 +59,16 @@ class Wheel:
         down = -self.radius / float(np.linalg.norm(across)) * across
         return self.centre + np.outer(np.array(self.ends), self.axis) + down
 
+    def overlaps(self, other: 'Wheel', slack: float) -> bool:
+        """Return whether two wheels are in one place by more than `slack` (m)."""
+        way = other.centre - self.centre
+        along = float(way @ self.axis)
+        turned = math.copysign(1.0, float(self.axis @ other.axis))
+        own, others = self.ends, [along + turned * end for end in other.ends]
+        beside = max(min(own), min(others)) > min(max(own), max(others)) - slack
+        away = float(np.linalg.norm(_across(way, self.axis)))
+        return not beside and away < self.radius + other.radius - slack
+
 
 def wheels_of(posture: Posture) -> tuple[Wheel, ...]:
     """Return the wheels, the outermost where one carries others, as its rollers."""
@@ -103,7 +113,7 @@ def _wheel(posture: Posture, joint: Joint) -> Wheel | None:
     if solid.kind == 'mesh':
         source += f', radius {1e3 * radius:.4g} mm, tread {1e3 * (span[-1] - span[0]):.4g} mm wide'
     if solid.kind == 'sphere':
-        source, grade = f'{source}; it tells no width: one point in its middle', CHECK
+        source, grade = f'{source}; a sphere has no width: one point, in its middle', CHECK
     if solid.drawn:
         source, grade = f'{source}, as it is drawn: it has no collision geometry', CHECK
     if unread:
@@ -184,5 +194,5 @@ def _guessed(posture: Posture, joint: Joint, links: Sequence[str]) -> Wheel | No
     what = next(one for one in posture.unread if one.link in links)
     source = f'{what.what} of {joint.child} is not read: {what.why}'
     if radius:
-        source = f'radius {1e3 * radius:.4g} mm from its inertia, as an even disc; {source}'
+        source = f'radius {1e3 * radius:.4g} mm from its inertia, taken as a uniform disc; {source}'
     return Wheel(joint, centre, axis, radius, (middle,), source, ASK, guess=True)

@@ -22,6 +22,8 @@ _EVERY, _ROWS, _FRAMES = 10_000_000, 8000, 8
 # Whether the sensor turns is judged over this time (ns). The first rest that lasts LEAST is taken,
 # up to MOST of it: robots start upright.
 _WINDOW, _LEAST, _MOST = 500_000_000, 2_000_000_000, 10_000_000_000
+# Larger numbers are no measurements.
+ABSURD = 1e9
 _QUATERNION, _RATE, _FORCE = slice(0, 4), slice(4, 7), slice(7, 10)
 
 
@@ -68,7 +70,8 @@ class ImusSeen:
         late = not frame.times or now - frame.times[-1] >= _EVERY
         if late and len(frame.rows) < _ROWS:
             frame.times.append(now)
-            frame.rows.append((*turned, *rate, *force))
+            row = (*turned, *rate, *force)
+            frame.rows.append(tuple(v if -ABSURD < v < ABSURD else math.nan for v in row))
 
     def seen(self, topic: str) -> tuple[tuple[SeenImu, ...], list[str]]:
         """Return an IMU for each frame, the one with most messages first, and what is doubtful."""

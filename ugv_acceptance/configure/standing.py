@@ -8,6 +8,7 @@ import numpy as np
 
 from ugv_acceptance.configure.carrying import (
     MARKER,
+    NEAR,
     Notes,
     contacts_of,
     corner_names,
@@ -15,19 +16,21 @@ from ugv_acceptance.configure.carrying import (
     listed,
     mm,
     outline,
+    outside,
     stem_of,
 )
 from ugv_acceptance.configure.collision import Solid
 from ugv_acceptance.configure.draft import ASK, CERTAIN, CHECK, Contacts, DerivedContact
+from ugv_acceptance.configure.flippers import say_flippers
 from ugv_acceptance.configure.posture import Posture
 from ugv_acceptance.configure.rolling import endless
 from ugv_acceptance.model.resting import Face
 from ugv_acceptance.model.robot import Contact
 from ugv_acceptance.type_aliases import Floats
 
-# So near (m) the plane a part of the body carries; a foot, whose joints yield; and a foot of the
-# same build in the air is still one.
-NEAR, NEAR_FOOT, LIFTED = 0.003, 0.010, 0.15
+# So near (m) the plane a foot carries, as its joints yield; and a foot of the same build in the air
+# is still one.
+NEAR_FOOT, LIFTED = 0.010, 0.15
 # Parts of one leg carry within this (m) of its lowest; an underside has so many corners at most.
 SAME, MOST = 0.001, 8
 # A tilt (rad) of the feet's plane that is asked about, as it follows the joints.
@@ -42,11 +45,15 @@ def stands_on_geometry(posture: Posture, notes: Notes) -> Contacts:
     base = set(posture.rigid(posture.root))
     if _is_arm(posture, solids, base):
         notes.questions.append(
-            f'No wheels, feet or tracks were found under {posture.root}: an arm alone stands on '
-            'nothing that its URDF tells. What is it mounted on?'
+            f'No wheels, feet or tracks were found under {posture.root}, only an arm: '
+            'what is it mounted on?'
         )
         return contacts_of(posture, (), None, notes)
-    face = face_of_solids(solids, posture)
+    face, tracks = face_of_solids(solids, posture.cog), _tracks(solids, base)
+    if tracks is not None and len(_touching(posture, solids, base, face)) < 2:
+        _ask_unread(posture, base, notes)
+        _say_of_arm(posture, solids, base, tracks[0], notes)
+        return _on_body(posture, tracks[1], tracks[0], notes)
     if face is None:
         if solids:
             notes.questions.append(
@@ -69,6 +76,61 @@ def stands_on_geometry(posture: Posture, notes: Notes) -> Contacts:
             'in which the robot stands.'
         )
     return _on_feet(posture, solids, above, face, notes)
+
+
+def _tracks(solids: Sequence[Solid], base: set[str]) -> tuple[Face, list[Solid]] | None:
+    """Return what of the body lies apart on both sides and carries it without its arm, if so."""
+    own = [solid for solid in solids if solid.link in base]
+    if not own:
+        return None
+    face = face_of_solids(own, _centre(own))
+    if face is None:
+        return None
+    up = np.array(face.normal)
+    near = [solid for solid in own if face.height(solid.lowest(up).tolist()) <= NEAR]
+    return (face, near) if _sides(near) else None
+
+
+def _centre(solids: Sequence[Solid]) -> Floats:
+    """Return the middle (3,), m, of the extent of geometry along the axes."""
+    ends = [[s.lowest(sign * axis) for s in solids] for axis in np.eye(3) for sign in (1.0, -1.0)]
+    points = np.concatenate(ends)
+    middle: Floats = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    return middle
+
+
+def _touching(
+    posture: Posture, solids: Sequence[Solid], base: set[str], face: Face | None
+) -> set[str]:
+    """Return the joints at the body of the limbs that touch the plane of a face."""
+    if face is None:
+        return set()
+    up, found = np.array(face.normal), set()
+    for solid in solids:
+        if solid.link not in base and face.height(solid.lowest(up).tolist()) <= NEAR_FOOT:
+            found.add(posture.chain(solid.link)[0].name)
+    return found
+
+
+def _say_of_arm(
+    posture: Posture, solids: Sequence[Solid], base: set[str], face: Face, notes: Notes
+) -> None:
+    """Ask about what reaches below the plane of the tracks; say if the arm would tip the robot."""
+    up = np.array(face.normal)
+    for solid in solids:
+        low = face.height(solid.lowest(up).tolist())
+        if solid.link not in base and low < -NEAR:
+            notes.questions.append(
+                f'In this posture {solid.link} is {mm(-low)} below the ground on which the tracks '
+                'stand: does the robot stand on it, or is the posture another?'
+            )
+    corners = [p for s in solids if s.link in base for p in s.patch(up, NEAR)]
+    corners = [p for p in corners if face.height(p.tolist()) <= NEAR]
+    off = outside(corners, posture.cog)
+    if off > 0.0:
+        notes.remarks.append(
+            f'in this posture the centre of gravity is {mm(off)} outside of what the tracks carry'
+        )
 
 
 def _is_arm(posture: Posture, solids: Sequence[Solid], base: set[str]) -> bool:
@@ -112,7 +174,7 @@ def _on_body(posture: Posture, solids: Sequence[Solid], face: Face, notes: Notes
                 owners.append(solid)
                 points.append(point)
     cycle = fewer(points, outline(points))
-    sides = _sides(solids, posture)
+    sides = _sides(solids)
     what, grade = ('track', CHECK) if sides else ('body', ASK)
     if not sides:
         notes.questions.append(
@@ -130,13 +192,13 @@ def _on_body(posture: Posture, solids: Sequence[Solid], face: Face, notes: Notes
         source = f'lowest of {solid.link}: {solid.words}{drawn}'
         contact = Contact(name, solid.link, posture.in_link(solid.link, points[k]))
         found.append(DerivedContact(contact, grade, source, f'{what} {solid.link}'))
-    _say_flippers(posture, face, notes)
+    say_flippers(posture, face, notes)
     return contacts_of(posture, found, face, notes)
 
 
-def _sides(solids: Sequence[Solid], posture: Posture) -> bool:
-    """Return whether what carries lies apart on both sides of the centre of gravity."""
-    middle = posture.cog[1]
+def _sides(solids: Sequence[Solid]) -> bool:
+    """Return whether geometry lies apart on both sides of its middle, as tracks do."""
+    middle = float(_centre(solids)[1])
     extents = [_extent(solid) for solid in solids]
     return (
         any(low > middle for low, _ in extents)
@@ -166,24 +228,6 @@ def fewer(points: Sequence[Floats], cycle: Sequence[int], most: int = MOST) -> l
 def _area(a: Floats, b: Floats, c: Floats) -> float:
     u, v = b - a, c - a
     return float(u[0] * v[1] - u[1] * v[0])
-
-
-def _say_flippers(posture: Posture, face: Face, notes: Notes) -> None:
-    """Name what hangs on the body on one joint and can reach the ground as that turns."""
-    up, base = np.array(face.normal), set(posture.rigid(posture.root))
-    for link, joint in posture.above.items():
-        if joint.kind in ('fixed', 'prismatic') or joint.parent not in base:
-            continue
-        own = [s for s in posture.solids if s.link in posture.rigid(link)]
-        if posture.inner(link) or not own or abs(posture.axis(joint) @ up) > 0.5:
-            continue
-        axle = posture.frames[link][1]
-        reach = max(float(np.linalg.norm(s.middle - axle)) + s.reach for s in own)
-        if reach >= face.height(axle.tolist()):
-            notes.remarks.append(
-                f'{link} can reach the ground as {joint.name} turns: if the robot ever stands on '
-                'it, add its lowest point there to the contacts'
-            )
 
 
 def _on_feet(

@@ -13,14 +13,10 @@ from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
-from ugv_acceptance.evaluation.criteria.not_judged import kept_words
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_words
 from ugv_acceptance.evaluation.ground import CARRIED, bound_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import (
-    TILT_NOT_CHECKED,
-    least_tilt,
-    with_most_used,
-)
+from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
@@ -29,6 +25,7 @@ from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skelet
 
 # What the page says where nothing is known.
 UNKNOWN = 'margins are not known'
+ANSWER = 'enter it in the configuration, then start the monitor again'
 WAIT = 'do not move the robot on these numbers; check the inputs'
 
 Plain = dict[str, Any]
@@ -60,7 +57,11 @@ def describe_robot(settings: Settings) -> Plain:
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
+    unanswered = bool(settings.unknown) and snapshot.known and level != ERROR
+    level = STALE if unanswered else level
     cause, advice = _cause(snapshot, level)
+    if unanswered and cause == UNKNOWN:
+        cause, advice = unknown_words(settings), ANSWER
     cause = cause or kept_words(settings, rough=snapshot.rough)
     return {
         'time_s': snapshot.time / 1e9,
@@ -69,7 +70,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'word': level_words(level),
         'cause': cause,
         'advice': advice,
-        'left': '' if level == STALE else _left(snapshot, settings),
+        'left': '' if level == STALE and not unanswered else _left(snapshot, settings),
         'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
         'q': numbers(snapshot.q),
         'posture': _posture(snapshot, figure),
@@ -116,8 +117,8 @@ def _left(snapshot: Snapshot, settings: Settings) -> str:
             tilt = bound_words(side, angle, snapshot.cautious)
         elif snapshot.carried:
             tilt = f'{tilt}; {CARRIED}'
-    elif not settings.hears_imu:
-        tilt = TILT_NOT_CHECKED
+    elif not settings.judges_tilt:
+        tilt = tilt_not_checked(settings)
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
     return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])

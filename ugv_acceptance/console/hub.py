@@ -11,7 +11,7 @@ from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.console.frame import describe_robot, frame_of
-from ugv_acceptance.console.safe_map import MapKey, axes_of, key_of, probe, safe_map
+from ugv_acceptance.console.safe_map import Axes, MapKey, axes_of, key_of, probe, safe_map
 from ugv_acceptance.console.snapshot import Feed, Snapshot
 from ugv_acceptance.monitoring.drawing import Figure, figure_of
 
@@ -44,7 +44,7 @@ class Client:
     `sending` is the time (s) since when a message is on its way to it, infinite if none is.
     """
 
-    axes: tuple[str, str]
+    axes: Axes | None
     frame: str | None = None
     map: str | None = None
     answers: deque[str] = field(default_factory=lambda: deque(maxlen=_ANSWERS))
@@ -112,7 +112,7 @@ class Hub:
         snapshot, settings = self._snapshot, self.feed.settings
         for client in tuple(self.clients):
             key = key_of(snapshot, settings, client.axes)
-            if key is None or key == client.shown:
+            if client.axes is None or key is None or key == client.shown:
                 continue
             if key not in self._maps:
                 made = await asyncio.to_thread(safe_map, snapshot, settings, client.axes)
@@ -128,7 +128,7 @@ class Hub:
             raise BadSample(f'expected at most {MOST_CLIENTS} clients')
         client = Client(axes_of(self.feed.settings))
         hello = {**describe_robot(self.feed.settings), **self.feed.describe()}
-        client.answers.append(as_json({'kind': 'hello', 'axes': list(client.axes), **hello}))
+        client.answers.append(as_json({'kind': 'hello', 'axes': client.axes, **hello}))
         client.ready.set()
         self.clients.add(client)
         return client
@@ -162,7 +162,7 @@ class Hub:
         if do == 'axes':
             client.axes = axes_of(settings, (str(values.get('x')), str(values.get('y'))))
             client.shown = None
-            return {'axes': list(client.axes)}
+            return {'axes': client.axes}
         if do == 'probe':
             at = (number_in(values, 'x'), number_in(values, 'y'))
             return {'probe': probe(self._snapshot, settings, client.axes, at)}

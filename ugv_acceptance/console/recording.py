@@ -131,14 +131,14 @@ class ShownRecording:
         seconds = np.array([(when - self.bag.start_ns) / 1e9])
         kind = KINDS[int(ground.numbers_at(seconds)[0])]
         entered = ground.kind or any(w.start <= seconds[0] < w.end for w in ground.windows)
-        rough = kind != FLAT and settings.hears_imu
+        rough = kind != FLAT and settings.judges_tilt
         cautious = math.nan
         if rough and known:
             q, gravity = _numbers(track.q[k]), _numbers(track.gravity[k])
             short = cautious_mechanics(settings.robot, ground.pitch)
             cautious = min(cautious_angles(short, q, gravity, payload))  # type: ignore[arg-type]
         return {
-            'ground': ground_words(kind if entered else None) if settings.hears_imu else '',
+            'ground': ground_words(kind if entered else None) if settings.judges_tilt else '',
             'rough': rough,
             'cautious': cautious,
             'carried': not rough and int(track.state[k]) == RAISED and has_tracks(settings.robot),

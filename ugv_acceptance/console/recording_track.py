@@ -129,6 +129,6 @@ class TrackMaker:
         share = (rows.time[known] - self.start) / max(self.end - self.start, 1)
         place = np.clip((share * STRETCHES).astype(np.int64), 0, STRETCHES - 1)
         limits = np.array(self.settings.limits.torque)
-        use = (np.abs(rows.torque[known]) / limits).max(axis=1)
         np.fmin.at(self.tilt, place, rows.angle[known].min(axis=1))
-        np.fmax.at(self.use, place, use)
+        if len(limits):
+            np.fmax.at(self.use, place, (np.abs(rows.torque[known]) / limits).max(axis=1))

@@ -14,7 +14,8 @@ from ugv_acceptance.evaluation.least_margins import least_tilt, most_used
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import stability
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.studies.bilinear import Grid, grid_of
+from ugv_acceptance.studies.axes import map_axes
+from ugv_acceptance.studies.bilinear import Grid, grid_of, why_not_alone
 from ugv_acceptance.studies.maps import (
     CAUTION,
     FAILURE,
@@ -33,31 +34,40 @@ _STEP = 0.01
 _SLIDE = 1.0
 
 
+Axes = tuple[str, str]
+
+
 @dataclass(frozen=True, slots=True)
 class MapKey:
     """All that a map depends on, rounded so that noise does not cause a new map."""
 
-    axes: tuple[str, str]
+    axes: Axes
     numbers: tuple[float, ...]
 
 
-def axes_of(settings: Settings, wanted: tuple[str, str] | None = None) -> tuple[str, str]:
-    """Return the two joints of a map: those wanted, else the first two with a torque limit.
+def axes_of(settings: Settings, wanted: tuple[str, str] | None = None) -> Axes | None:
+    """Return the two joints of a map: those wanted, else the two of the arm.
 
+    None where a robot has no two joints whose map would say where it may go: a rover, legs.
     Raises BadSample where a wanted joint is not one of the robot's, or both are the same.
     """
-    names = settings.robot.joint_names
+    robot = settings.robot
+    names = robot.joint_names
     if wanted is not None:
         if len(set(wanted)) != 2 or not set(wanted) <= set(names):
             raise BadSample(f'map: expected two of {", ".join(names)}, got {" and ".join(wanted)}')
+        for name in wanted:
+            if why := why_not_alone(robot, name):
+                raise BadSample(f'map: expected a joint that moves alone, got {name}: {why}')
         return wanted
-    limited = [n for n, limit in zip(names, settings.limits.torque, strict=True) if limit < np.inf]
-    first, second, *_ = [*limited, *(n for n in names if n not in limited), *names[:1]]
-    return first, second
+    found = map_axes(robot, settings.limits.torque)
+    return (found[0], found[1]) if len(found) == 2 else None
 
 
-def key_of(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> MapKey | None:
-    """Return the key of a snapshot's map; None where posture or attitude is not known."""
+def key_of(snapshot: Snapshot, settings: Settings, axes: Axes | None) -> MapKey | None:
+    """Return the key of a snapshot's map; None: no map, or posture or attitude is not known."""
+    if axes is None:
+        return None
     others = [
         q
         for name, q in zip(settings.robot.joint_names, snapshot.q, strict=False)
@@ -72,7 +82,7 @@ def key_of(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Map
     return MapKey(axes, tuple(rounded))
 
 
-def safe_map(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Plain:
+def safe_map(snapshot: Snapshot, settings: Settings, axes: Axes) -> Plain:
     """Return the map as JSON: ranges (rad; m) and one digit a cell, rows of the first joint."""
     grid = _grid(snapshot, settings, axes)
     cells = _cells(snapshot, settings, grid)
@@ -88,12 +98,14 @@ def safe_map(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> P
 
 
 def probe(
-    snapshot: Snapshot, settings: Settings, axes: tuple[str, str], at: tuple[float, float]
+    snapshot: Snapshot, settings: Settings, axes: Axes | None, at: tuple[float, float]
 ) -> Plain:
     """Return the margins of a posture in which the two joints stand `at` (rad; m), as JSON.
 
     Raises BadSample where the rest of the posture is not known or `at` is not two numbers.
     """
+    if axes is None:
+        raise BadSample('map: expected a robot with two joints to map, this one has none')
     if key_of(snapshot, settings, axes) is None or not all(map(math.isfinite, at)):
         raise BadSample('map: expected a known posture and two numbers')
     robot, load = settings.robot, snapshot.payload
@@ -113,7 +125,7 @@ def probe(
     }
 
 
-def _grid(snapshot: Snapshot, settings: Settings, axes: tuple[str, str]) -> Grid:
+def _grid(snapshot: Snapshot, settings: Settings, axes: Axes) -> Grid:
     ranges = [settings.robot.joint(name).travel(_SLIDE) for name in axes]
     q = np.nan_to_num(np.array(snapshot.q))
     return grid_of(settings.robot, axes, ranges, (CELLS, CELLS), q)

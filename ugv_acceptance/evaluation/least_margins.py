@@ -11,8 +11,15 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.type_aliases import Floats, Json, Times
 
-# What stands in place of the tilt left where nobody measures it.
-TILT_NOT_CHECKED = 'tip-over not checked (no IMU: the base was declared level)'
+# What stands in place of the tilt left where nobody measures it, or where the robot's feet are not
+# known.
+_LEVEL = 'tip-over not checked (no IMU: the base was declared level)'
+_NO_FEET = 'tip-over not checked (the configuration says contacts: unknown)'
+
+
+def tilt_not_checked(settings: Settings) -> str:
+    """Return why no tilt is judged, for settings whose `judges_tilt` is false."""
+    return _NO_FEET if settings.hears_imu else _LEVEL
 
 
 @dataclass(slots=True)

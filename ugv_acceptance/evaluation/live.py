@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ugv_acceptance.evaluation.alerts.rules import InputSignals, RuleSet
-from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Signal
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Signal
 from ugv_acceptance.evaluation.alerts.tipping_watch import NOT_KNOWN as NO_TREND
 from ugv_acceptance.evaluation.chassis.motion import (
     NO_RATE,
@@ -102,7 +102,7 @@ class LiveEvaluator:
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisMotion(placed, self.watch.chassis)
-        self.mount.settle = (self._imu.adopt, self._chassis.place)
+        self.mount.serve(self._imu, self._chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
@@ -199,10 +199,10 @@ class LiveEvaluator:
         mount = self.mount
         if mount.busy:
             felt = orientation, covariance_0, omega, acceleration
-            felt = mount.one(now, frame, felt, self.joints.q, self.joints.qd)
+            felt = mount.one(now, frame, felt, self.joints)
             orientation, covariance_0, omega, acceleration = felt
         gravity, unusable = self._imu.step(
-            now, stamp, orientation, covariance_0, omega, acceleration, frame
+            now, stamp, orientation, covariance_0, omega, acceleration, frame, mount.raw
         )
         if not mount.told:
             gravity, unusable = NOWHERE, False
@@ -289,11 +289,12 @@ class LiveEvaluator:
     def level(self) -> int:
         """The most severe level of the active alerts; at least STALE while margins are unknown.
 
-        On ground that is not flat also while it is not known whether the robot begins to tip.
+        Also while a trend to tip is not known yet, and where a value is said to be unknown.
         """
         active = [alert.rule.level for alert in self.watch.active]
         known = self.margins is not None and not self.waits_for_trend
-        return max([*active, OK if known else STALE])
+        worst = max([*active, OK if known else STALE])
+        return worst if worst >= ERROR or not self.settings.unknown else STALE
 
     @property
     def carried(self) -> bool:
@@ -304,7 +305,7 @@ class LiveEvaluator:
     @property
     def waits_for_trend(self) -> bool:
         """Whether the ground is not flat, and it is not known yet if the robot begins to tip."""
-        judged = self.settings.ground.rough and not self._level
+        judged = self.settings.ground.rough and self.settings.judges_tilt
         return judged and self.watch.trend.level == NO_TREND
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
@@ -386,7 +387,7 @@ class LiveEvaluator:
                 value = -math.inf if math.isnan(value) else value  # not known is not too much
                 warn.step(now, value)
                 error.step(now, value)
-        if self._level:
+        if not self.settings.judges_tilt:
             return
         for (warn, error), angle in zip(watch.tip, angles, strict=True):
             if -angle >= warn.on or not (warn.quiet and error.quiet):

@@ -109,7 +109,7 @@ class RecordedEvaluator:
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
         self._chassis = ChassisColumns(ChassisMotion(placed, self.watch.chassis))
-        self.mount.settle = (self._imu.adopt, self._chassis.place)
+        self.mount.serve(self._imu, self._chassis.place)
         self.fresh = (InputTimeout(self.settings.delays), InputTimeout(self.settings.delays))
         self._ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         self._payload = PayloadHistory(robot.payload)
@@ -373,7 +373,7 @@ class RecordedEvaluator:
             worse = with_lost(worse, lost)
             feed(warn, time, worse)
             feed(error, time, worse)
-        if self.settings.hears_imu:
+        if self.settings.judges_tilt:
             self._watch_stand(rows, time, lost)
         self.watch.predict_rows(rows)
 

@@ -12,6 +12,8 @@ from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 
 # The attitude of an IMU that is not there: the base was declared to stand level.
 LEVEL = 'level'
+# Keys in `Settings.unknown`; that of a joint's limit is joints.NAME.limit.
+CONTACTS, PAYLOAD_LINK = 'contacts', 'payload.link'
 # Where the mounting of an IMU comes from: a number in the configuration, the frame its messages
 # name, or nobody knows it.
 GIVEN, AUTO, UNKNOWN = 'given', 'auto', 'unknown'
@@ -133,7 +135,9 @@ class Settings:
     file puts on a wheel what they are taken for. `hand_may_touch` are the times (from, to in s
     since the start) in which the arm may touch the ground, to pick something up: torques are not
     known while it does. `untold` says for each joint what is taken if no message ever tells it
-    (None: margins are not known then; empty: so it is for all).
+    (None: margins are not known then; empty: so it is for all). `unknown` are keys of values that
+    the configuration does not know (contacts, payload.link, joints.NAME.limit): what hangs on them
+    is not checked, nothing passes.
     """
 
     robot: Robot
@@ -148,6 +152,7 @@ class Settings:
     moved_contacts: tuple[str, ...] = ()
     hand_may_touch: tuple[tuple[float, float], ...] = ()
     untold: tuple[Untold | None, ...] = ()
+    unknown: tuple[str, ...] = ()
     base_frame: str = ''
     frame_prefix: str = ''
 
@@ -165,3 +170,8 @@ class Settings:
     def hears_imu(self) -> bool:
         """Whether margins need an IMU: not where the base was declared level."""
         return self.imu.attitude != LEVEL
+
+    @property
+    def judges_tilt(self) -> bool:
+        """Whether tip-over is judged: with an IMU, where it is known on what the robot stands."""
+        return self.hears_imu and CONTACTS not in self.unknown

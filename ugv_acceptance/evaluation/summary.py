@@ -247,7 +247,7 @@ def alert_result(
         'end_s': None if alert.end is None else (alert.end - start) / 1e9,
         'peak': _peak(alert),
         'message': describe(alert, settings),
-        'advice': told or advice(rule.code),
+        'advice': told or advice(rule.code, settings.robot),
         'advice_computed': told is not None,
     }
 

@@ -38,8 +38,8 @@ def carried_kernel(robot: Robot, link: str, mounting: Matrix, position: Vector) 
     `mounting` turns sensor axes into the link's, `position` is the sensor in it (m). It takes
     joint positions (j) and rates (j), then a quaternion x y z w from sensor axes to the world's,
     rate (rad/s) and specific force (m/s2) in sensor axes. It returns the same three for a sensor
-    at the base's origin with the base's axes. Left out: angular accelerations, and what the joints'
-    own motion adds to the force.
+    at the base's origin with the base's axes, and the base's z in sensor axes. Left out: angular
+    accelerations, and what the joints' own motion adds to the force.
     """
     tree = tree_of(robot)
     drives, n = drives_of(robot, tree), len(robot.joint_names)
@@ -66,7 +66,7 @@ def carried_kernel(robot: Robot, link: str, mounting: Matrix, position: Vector) 
         a, b, c, d = product(turned, quaternion_of(fixed))
         arm = add(pose.origin[body], rotate(pose.rotation[body], place))
         felt = subtract(rotate(turn, force), cross(spin, cross(spin, arm)))
-        return [product((x, y, z, w), (-a, -b, -c, d)), spin, felt]
+        return [product((x, y, z, w), (-a, -b, -c, d)), spin, felt, turn[2]]
 
     names = [f'{what}{j}' for what in ('q', 'v') for j in range(n)]
     return compile_kernel(formula, [*names, *'xyzw', *(f'{v}{k}' for v in 'wa' for k in range(3))])

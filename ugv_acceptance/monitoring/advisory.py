@@ -118,7 +118,7 @@ class Advisory:
         rule = alert.rule
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
-        return advice(rule.code)
+        return advice(rule.code, self.evaluator.settings.robot)
 
     def ahead(self, now: int) -> tuple[Ahead, ...]:
         """Return the margins that will be used up soon, the soonest first."""

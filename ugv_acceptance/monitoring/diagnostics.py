@@ -12,10 +12,10 @@ from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
 from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
-from ugv_acceptance.evaluation.criteria.not_judged import kept_words
+from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_words
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
-from ugv_acceptance.evaluation.least_margins import TILT_NOT_CHECKED, least_tilt, with_most_used
+from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
@@ -65,6 +65,9 @@ def verdict_of(session: Session) -> Status:
         return Status(STALE, '', text, values | known)
     if alarm_tracker.waiting:
         return _over(session, alarm_tracker.waiting[-1], left, values | known)
+    if session.settings.unknown:
+        text = '; '.join(words for words in (unknown_words(session.settings), left) if words)
+        return Status(STALE, '', text, values | known)
     kept = kept_words(session.settings, rough=session.settings.ground.rough)
     return Status(OK, '', f'{kept}: {left}', values | known)
 
@@ -73,8 +76,10 @@ def _left(margins: Margins, session: Session) -> str:
     settings = session.settings
     if any(map(math.isnan, margins.torque)):
         tilt = tilt_words(margins, session.evaluator) or 'no tilt margin'
-        return f'{tilt if settings.hears_imu else TILT_NOT_CHECKED}, {TORQUE_NOT_JUDGED}'
-    if not settings.hears_imu:
+        return (
+            f'{tilt if settings.judges_tilt else tilt_not_checked(settings)}, {TORQUE_NOT_JUDGED}'
+        )
+    if not settings.judges_tilt:
         return with_most_used('', margins.torque, settings)
     return with_most_used(tilt_words(margins, session.evaluator), margins.torque, settings)
 
@@ -212,10 +217,10 @@ def margin_statuses(
                 'utilisation': use,
             }
             yield Status(level, f'Torque {name}', text, numbers)
-    if settings.hears_imu:
+    if settings.judges_tilt:
         yield _tip_status(evaluator, active, moving)
     else:
-        yield Status(STALE, 'Tip-over', TILT_NOT_CHECKED)
+        yield Status(STALE, 'Tip-over', tilt_not_checked(settings))
 
 
 def _tip_status(

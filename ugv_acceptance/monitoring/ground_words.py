@@ -29,7 +29,7 @@ def ground_values(evaluator: LiveEvaluator) -> dict[str, object]:
     Empty for a robot whose tip-over is not judged.
     """
     ground, trend = evaluator.settings.ground, evaluator.watch.trend
-    if not evaluator.settings.hears_imu:
+    if not evaluator.settings.judges_tilt:
         return {}
     found: dict[str, object] = {'ground': ground_words(ground.kind)}
     if ground.rough:

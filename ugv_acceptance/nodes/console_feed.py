@@ -199,7 +199,10 @@ class ConsoleNode(Node):
         self.session.tick()
         active = self.session.active
         say = self.session.faults.sentence
-        rows = [row_of(a, say(a, self.settings), advice(a.rule.code)) for a in active]
+        rows = [
+            row_of(a, say(a, self.settings), advice(a.rule.code, self.settings.robot))
+            for a in active
+        ]
         self._own = {row.key: row for row in rows}
         self._rows = tuple(self._input(name, active) for name in self.session.counts)
 

@@ -1,5 +1,6 @@
 """Node `packbot_simulator`: a simulated robot with the topics of a real one.
 
+Parameter `config` says which: PackBot, or any robot on wheels or tracks, with an arm or without.
 It publishes joint_states, imu/data and robot_description (and /clock when asked) and obeys
 cmd_vel and arm_controller/joint_trajectory. What a person does on a test ground has topics of its
 own: ~/ground tilts the ground, ~/load puts a load into the gripper, ~/pull pulls it backwards (x:
@@ -49,6 +50,7 @@ class Simulator(Node):
         # Without MuJoCo these imports raise AcceptanceError, which run() reports.
         from ugv_acceptance.run.fault_text import fault_from  # noqa: PLC0415
         from ugv_acceptance.run.simulated_robot import VirtualRobot  # noqa: PLC0415
+        from ugv_acceptance.simulation.inertia import balanced_links  # noqa: PLC0415
 
         super().__init__(NAME, **node)
         self.slipped = 0.0
@@ -67,15 +69,16 @@ class Simulator(Node):
             epoch=0,
         )
         self._hold_declared()
+        if names := balanced_links(robot):
+            self.get_logger().warning(f'inertia of no rigid body, balanced: {", ".join(names)}')
         self._clocked = bool(self._value('clock'))
-        topics = config.topics
+        kinds = {'joint_states': JointState, 'imu': Imu}
         self._outputs: dict[str, Publisher] = {
-            'joint_states': self.create_publisher(
-                JointState, topics.joint_states.name, qos_of(topics.joint_states, 100)
-            ),
-            'imu': self.create_publisher(Imu, topics.imu.name, qos_of(topics.imu, 100)),
+            name: self.create_publisher(kinds[name], topic.name, qos_of(topic, 100))
+            for name, topic in config.topics.used.items()
+            if name in kinds
         }
-        self._description = self.create_publisher(String, topics.robot_description, LATCHED)
+        self._description = self.create_publisher(String, config.topics.robot_description, LATCHED)
         self._description.publish(description_message(config.urdf_text))
         self._clock_publisher = (
             self.create_publisher(ClockMessage, '/clock', 10) if self._clocked else None
@@ -190,7 +193,8 @@ class Simulator(Node):
         while virtual.elapsed + virtual.tick <= now:
             virtual.step()
             for source, data in virtual.due(now):
-                self._outputs[source].publish(data)
+                if source in self._outputs:
+                    self._outputs[source].publish(data)
         self._tell_time()
 
     def _tell_time(self) -> None:

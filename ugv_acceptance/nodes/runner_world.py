@@ -37,7 +37,7 @@ from ugv_acceptance.nodes.monitor.own_description import MOST
 from ugv_acceptance.nodes.monitor.own_description import QOS as OWN
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
-from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.plan.motions import hitch_of
 from ugv_acceptance.run.actuation import OPERATOR, SIM
 from ugv_acceptance.run.own_description import tell_robot
 from ugv_acceptance.run.world import Brake, Commands, Positions
@@ -70,7 +70,7 @@ class RosCommands:
         A command sent before a subscriber is matched is lost without notice.
         """
         needed = [self._payload, self._operator]
-        if mode != OPERATOR:
+        if mode != OPERATOR and self._config.settings.robot.joint_names:
             needed.append(self._trajectory)
         if mode == SIM:
             needed += [self._velocity, self._ground, self._pull, self._load]
@@ -80,7 +80,9 @@ class RosCommands:
         return alone[0] if alone else ''
 
     def move(self, posture: Mapping[str, float], seconds: float) -> None:
-        """Start a motion to `posture` (rad) that takes `seconds`."""
+        """Start a motion to `posture` (rad) that takes `seconds`; of no joint, none."""
+        if not posture:
+            return
         settings = self._config.settings
         joints = dict(zip(settings.robot.joint_names, settings.joints, strict=True))
         message = JointTrajectory(joint_names=[joints[n].topic_name for n in posture])
@@ -135,7 +137,7 @@ class RosCommands:
 
     def pull(self, force: float) -> None:
         """Pull the simulated robot backwards at its hitch (N)."""
-        self._pull.publish(Vector3(x=force, z=HITCH))
+        self._pull.publish(Vector3(x=force, z=hitch_of(self._config.settings.robot)))
 
     def stand_up(self) -> None:
         """Reset the simulated robot to its start, and wait until that is done."""
@@ -204,11 +206,12 @@ class Guard(Node):
     def _subscribe(self) -> None:
         topics = self.config.topics
         sensor = Qos(reliability='best_effort')
+        joints, imu = topics.joint_states, topics.imu
         rows: list[tuple[Any, str, str, Any, Qos, Callable[[bytes], None]]] = [
-            (JointState, topics.joint_states.name, 'sensor_msgs/msg/JointState',
-             qos_of(topics.joint_states, 1000), sensor, self._on_joints()),
-            (Imu, topics.imu.name, 'sensor_msgs/msg/Imu',
-             qos_of(topics.imu, 1000), sensor, _nothing),
+            *([(JointState, joints.name, 'sensor_msgs/msg/JointState',
+                qos_of(joints, 1000), sensor, self._on_joints())] if joints.used else []),
+            *([(Imu, imu.name, 'sensor_msgs/msg/Imu', qos_of(imu, 1000), sensor,
+                _nothing if joints.used else self._on_imu)] if imu.used else []),
             (InertiaStamped, topics.payload.name, 'geometry_msgs/msg/InertiaStamped',
              qos_of(topics.payload, 10), Qos(), _nothing),
             (DiagnosticArray, f'{MONITOR}/alerts', 'diagnostic_msgs/msg/DiagnosticArray',
@@ -268,16 +271,23 @@ class Guard(Node):
             except BadSample:
                 return  # the monitor counts and reports it
             self.positions.take(names, position)
-            now = time.monotonic()
-            if self._fed_at >= 0.0:
-                self._fed += min(now - self._fed_at, GAP)
-            self._fed_at = now
+            self._feed()
 
         return take
 
     def _on_description(self, data: bytes) -> None:
         if len(self._described) < MOST:
             self._described[data] = None
+
+    def _on_imu(self, _: bytes) -> None:
+        """Count an IMU message of a robot that tells no joints."""
+        self._feed()
+
+    def _feed(self) -> None:
+        now = time.monotonic()
+        if self._fed_at >= 0.0:
+            self._fed += min(now - self._fed_at, GAP)
+        self._fed_at = now
 
     def _on_word(self, _: bytes) -> None:
         self._silent, self._heard = 0, True
@@ -308,8 +318,10 @@ class Guard(Node):
 
     def missing(self) -> str:
         """Return what has not been heard, or does not listen, yet; empty when all is there."""
-        if not self.positions.now:
+        if self.config.settings.hears_joints and not self.positions.now:
             return 'joint states of the robot'
+        if self._fed_at < 0.0:
+            return 'the IMU of the robot'
         if not self._heard:
             return 'the monitor'
         unheard = self._sent.unheard(self._mode)
@@ -324,7 +336,10 @@ class Guard(Node):
         return time.monotonic()
 
     def fed(self) -> float:
-        """Return for how long (s) joint states kept coming; stands still while they do not."""
+        """Return for how long (s) joint states kept coming; stands still while they do not.
+
+        Of a robot without joint states: its IMU.
+        """
         return self._fed
 
     def stamp(self) -> int:

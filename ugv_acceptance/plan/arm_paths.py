@@ -35,9 +35,11 @@ class ArmPaths:
     def _tree(self) -> NDArray[np.intp]:
         """Return the row before each posture on the shortest safe path from home (n,)."""
         good = safe(self.arm, look(self.arm, self.q, self.ground, self.load))
-        names = [self.arm.robot.joint_names.index(n) for n in self.arm.roles.axes]
-        cell = np.round(np.degrees(self.q[:, names]) / STEP_DEG).astype(int)
-        cell -= cell.min(axis=0) - 1
+        names = self.arm.columns
+        if not names or not len(self.q):  # one posture, or none
+            return np.where(good, 0, _NOWHERE)
+        degrees = np.degrees(self.q[:, names])
+        cell = np.round((degrees - degrees.min(axis=0)) / STEP_DEG).astype(int) + 1
         number = np.full(cell.max(axis=0) + 2, -1)
         number[tuple(cell[good].T)] = np.flatnonzero(good)
         edges = []
@@ -61,6 +63,8 @@ class ArmPaths:
 
     def to(self, end: Floats) -> list[Floats]:
         """Return the few postures (j,) between home and `end`; empty if there is no safe path."""
+        if not len(self.q) or not self.arm.varied:
+            return []
         k = int(np.abs(self.q - end).max(axis=1).argmin())
         if np.abs(self.q[k] - end).max() > 1e-6 or not self.reachable[k]:
             return []
@@ -99,8 +103,7 @@ def detours(arm: Arm, start: Floats, home: Floats, end: Floats) -> Iterator[list
     """Yield postures to try between two: none; home; the start with one joint as at the end."""
     yield []
     yield [home]
-    for name in (*arm.roles.axes, *([arm.roles.turret] if arm.roles.turret else [])):
-        k = arm.robot.joint_names.index(name)
+    for k in arm.moved:
         for before in (start, home):
             between = before.copy()
             between[k] = end[k]
@@ -115,8 +118,14 @@ class Routes:
     home: Floats
     _known: dict[tuple[tuple[str, float], float, float], ArmPaths] = field(default_factory=dict)
 
-    def paths(self, ground: tuple[str, float], load: float, turret: float = 0.0) -> ArmPaths:
-        """Return the safe paths on a ground with a load (kg), the turret at an angle (rad)."""
+    def paths(
+        self, ground: tuple[str, float], load: float, turret: float | None = None
+    ) -> ArmPaths:
+        """Return the safe paths on a ground with a load (kg), the turret at an angle (rad).
+
+        Without an angle the arm is ahead.
+        """
+        turret = self.arm.turret(self.arm.folded) if turret is None else turret
         key = (ground, load, turret)
         if key not in self._known:
             q, home = (self.arm.turned(x, turret) for x in (self.arm.grid, self.home))

@@ -45,7 +45,7 @@ def torque_boundary(routes: Routes, points: int, loads: Sequence[float]) -> Iter
     for load in loads:
         found = look(arm, arm.grid, level, load)
         steady = found.tilt > math.radians(STEADY)
-        for joint in arm.roles.axes:
+        for joint in arm.judged:
             share = found.share[:, arm.robot.joint_names.index(joint)]
             limit = arm.settings.limits.torque[arm.robot.joint_names.index(joint)]
             for sign, word in ((1.0, 'plus'), (-1.0, 'minus')):
@@ -68,7 +68,7 @@ def tip_boundary(
     low, high = tilts
     gentle = (low, (low + high) / 2.0, high)
     for name in SIDES:
-        turret = ORIENTATIONS[name].heading or 0.0
+        turret = routes.arm.turret_at(ORIENTATIONS[name].heading or 0.0)
         for title, band, where, action in TILT:
             ramps = (gentle,) if where == ROBOT else (gentle, *((s,) for s in STEEPER))
             best = _richest(routes, (name, turret), ramps, loads, band, reached=where == ROBOT)
@@ -118,7 +118,6 @@ def _spread(
     arm: Arm, found: Found, rows: Mask, count: int, setup: Setup, title: str, purpose: str
 ) -> Iterator[Step]:
     places = np.flatnonzero(rows)
-    names = [arm.robot.joint_names.index(n) for n in arm.roles.axes]
-    for number, k in enumerate(spread_out(found.q[places], count, names), 1):
+    for number, k in enumerate(spread_out(found.q[places], count, arm.columns), 1):
         text = f'{title} {number}' if count > 1 else title
         yield hold_step(arm, setup, found, int(places[k]), text, purpose)

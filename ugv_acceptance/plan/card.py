@@ -9,13 +9,16 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.messages import ALERTS, level_words, pattern_words
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, advice, level_words, pattern_words
+from ugv_acceptance.evaluation.alerts.robot_words import of_robot
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
-from ugv_acceptance.plan.maps import safe_maps
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.plan.derive import notes_of
+from ugv_acceptance.plan.maps import safe_maps, standing_words
 from ugv_acceptance.plan.order import duration
 from ugv_acceptance.plan.plan import Plan, Posture, Step, vector_of
-from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.search import Arm
 from ugv_acceptance.plan.sketch import sketch
 from ugv_acceptance.report.format import time_text
 from ugv_acceptance.studies.orientations import ORIENTATIONS
@@ -112,7 +115,7 @@ def card_of(plan: Plan, config: Config) -> str:
     )
     environment.filters['pattern'] = pattern_words
     template = environment.get_template('card.html')
-    arm = Arm(config.settings, roles_of(config.settings))
+    arm = Arm(config.settings)
     order = sorted(plan.steps, key=lambda s: (s.where, _first(plan, s.group)))
     groups = [
         group_of(arm, plan, list(steps))
@@ -124,11 +127,17 @@ def card_of(plan: Plan, config: Config) -> str:
         version=__version__,
         groups=groups,
         levels=[(level_words(level), text, do) for level, text, do in LEVELS],
-        meanings=[(code, ALERTS[code].meaning, ALERTS[code].to_do) for code in SHOWN],
+        meanings=[
+            (code, of_robot(ALERTS[code].meaning, arm.robot), advice(code, arm.robot))
+            for code in SHOWN
+        ],
         maps=safe_maps(arm, plan),
         ground=ground_words(config.settings.ground.kind),
         length=time_text(duration(plan), digits=2),
-        home=_text(plan.home_deg),
+        home=_text(arm.robot, plan.home_deg),
+        arm=bool(arm.varied),
+        standing=standing_words(arm),
+        notes=notes_of(config),
     )
 
 
@@ -153,7 +162,7 @@ def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Seque
     return Row(
         step,
         step.id.partition('-')[0],
-        _text(moved) or 'home',
+        _text(arm.robot, moved) or 'home',
         ', '.join(expected),
         _ground(step),
         f'{step.payload_kg:g} kg' if step.payload_kg else 'none',
@@ -174,5 +183,9 @@ def _ground(step: Step) -> str:
     return f'{ground.kind}; {text} (tilt left is an upper bound; tip-over {judged})'
 
 
-def _text(posture: Posture) -> str:
-    return ', '.join(f'{n.removesuffix("_joint")} {a:g}°' for n, a in posture.items())
+def _text(robot: Robot, posture: Posture) -> str:
+    slides = {joint.name for joint in robot.joints if joint.slides}
+    return ', '.join(
+        f'{n.removesuffix("_joint")} {a:g}{" m" if n in slides else "°"}'
+        for n, a in posture.items()
+    )

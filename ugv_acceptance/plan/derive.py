@@ -5,19 +5,22 @@ for the real robot are reached by paths on which no limit is passed either.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.arm_paths import Routes
 from ugv_acceptance.plan.boundaries import tip_boundary, torque_boundary
 from ugv_acceptance.plan.motions import capacity_steps, drive_steps, endurance_steps, speed_steps
 from ugv_acceptance.plan.order import ordered, seconds_of
-from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step
-from ugv_acceptance.plan.search import Arm, look, roles_of, safe
+from ugv_acceptance.plan.plan import ROBOT, SIMULATION, Plan, Posture, Step, radians_of
+from ugv_acceptance.plan.rover import ramp_steps
+from ugv_acceptance.plan.search import Arm, look, safe
 from ugv_acceptance.plan.writing import Setup, hold_step, posture_deg
+from ugv_acceptance.studies.axes import check_drives
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
 
@@ -31,6 +34,13 @@ SHORT: dict[tuple[str, str, str], dict[str, float]] = {
     ('rollover boundary', ROBOT, 'hold'): QUICK,
     ('speed', ROBOT, 'sweep'): {},
     ('rollover boundary', SIMULATION, 'tip'): {**QUICK, 'speed_degps': 57.0},
+}
+# The same where there is no arm to move.
+SHORT_ROVER: dict[tuple[str, str, str], dict[str, float]] = {
+    ('orientations', ROBOT, 'hold'): QUICK,
+    ('rollover boundary', ROBOT, 'hold'): QUICK,
+    ('driving', ROBOT, 'drive'): {},
+    ('rollover boundary', SIMULATION, 'tip'): QUICK,
 }
 
 
@@ -50,24 +60,23 @@ class Wanted:
 
 
 def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
-    """Return the plan for a robot. Raises BadConfig unless two arm joints have a torque limit."""
-    arm = Arm(config.settings, roles_of(config.settings))
+    """Return the plan for a robot on wheels or tracks; without an arm, of ramps and driving.
+
+    Raises BadConfig for a robot that stands on legs or on nothing.
+    """
+    check_drives(config.settings.robot, 'plan')
+    arm = Arm(config.settings)
+    if not len(arm.grid):
+        raise BadConfig(
+            f'{config.name}: expected a posture of {" and ".join(arm.varied)} in which the arm '
+            'touches neither ground nor deck, with the other joints at rest, found none'
+        )
     full = config.settings.robot.payload.mass
     loads = (0.0, full / 2.0, full) if full else (0.0,)
     home = home_of(arm, wanted, loads[-1])
     place = posture_deg(arm, home)
     routes = Routes(arm, home)
-    steps: list[Step] = [
-        *_worst_postures(routes, loads),
-        *torque_boundary(routes, wanted.points, loads),
-        *_orientations(routes, wanted.tilt, loads),
-        *tip_boundary(routes, wanted.points, loads, (wanted.tilt, wanted.steep)),
-        *capacity_steps(arm, home),
-        *speed_steps(arm, home),
-        *drive_steps(arm, home),
-        *endurance_steps(arm, home, wanted.endurance),
-    ]
-    steps = [_refused(arm, step) for step in steps]
+    steps = [_refused(arm, step) for step in _steps(routes, wanted, loads)]
     if wanted.short:
         steps = _few(routes, steps)
     routed = _routed(routes, ordered(steps, place))
@@ -79,6 +88,51 @@ def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
         home_deg=place,
         steps=tuple(_numbered(_routed(routes, final))),
     )
+
+
+def _steps(routes: Routes, wanted: Wanted, loads: Sequence[float]) -> Iterator[Step]:
+    """Yield all steps, not yet in order; of a robot without an arm those of its chassis."""
+    arm, home = routes.arm, routes.home
+    ramps = (wanted.tilt, wanted.steep)
+    if arm.varied:
+        yield from _worst_postures(routes, loads)
+        yield from torque_boundary(routes, wanted.points, loads)
+        yield from _orientations(routes, wanted.tilt, loads)
+        yield from tip_boundary(routes, wanted.points, loads, ramps)
+    else:
+        yield from ramp_steps(arm, home, loads, ramps)
+    yield from capacity_steps(arm, home)
+    if arm.varied:
+        yield from speed_steps(arm, home)
+    yield from drive_steps(arm, home)
+    if arm.varied:
+        yield from endurance_steps(arm, home, wanted.endurance)
+
+
+def notes_of(config: Config) -> list[str]:
+    """Return what a robot's plan leaves out for want of an entry, each with what to set."""
+    arm = Arm(config.settings)
+    robot = config.settings.robot
+    if arm.roles.arm and not arm.varied:
+        joints = ', '.join(arm.roles.arm)
+        return [f'the arm ({joints}) has fewer than two joints that turn: the plan moves none']
+    found = []
+    untold = [name for name in arm.roles.axes if name not in arm.judged]
+    if untold:
+        found.append(
+            f'no torque steps for {", ".join(untold)}: no limit is known; set '
+            f'joints.{untold[0]}.limit_nm (of each) in the configuration'
+        )
+    if arm.varied and arm.on_column:
+        found.append(
+            f'the body below {arm.varied[0]} is not known to the plan: look where the arm goes '
+            'before each posture'
+        )
+    if arm.varied and robot.payload_link is None:
+        found.append(
+            'no steps with a load: payload.link is missing; set it to the link that carries it'
+        )
+    return found
 
 
 def home_of(arm: Arm, wanted: Wanted, load: float) -> Floats:
@@ -95,7 +149,7 @@ def _worst_postures(routes: Routes, loads: Sequence[float]) -> Iterator[Step]:
     """Yield the steps of the paper's Table 1 for this robot: each joint at its largest torque."""
     arm, load, level = routes.arm, loads[-1], ('level', 0.0)
     found = look(arm, arm.grid, level, load)
-    for joint in arm.roles.axes:
+    for joint in arm.judged:
         use = np.abs(found.share[:, arm.robot.joint_names.index(joint)])
         within = safe(arm, found, SPARE) & routes.paths(level, load).reachable
         for title, rows in (
@@ -167,16 +221,25 @@ def _with_way(routes: Routes, step: Step, start: Floats) -> Step:
 
 def _vector(arm: Arm, home: Floats, posture: Posture) -> Floats:
     q = home.copy()
-    for name, angle in posture.items():
-        q[arm.robot.joint_names.index(name)] = math.radians(angle)
+    for name, angle in radians_of(arm.robot, posture).items():
+        q[arm.robot.joint_names.index(name)] = angle
     return q
 
 
 def _few(routes: Routes, steps: Sequence[Step]) -> list[Step]:
     """Return one step of each kind, the quickest from home: enough for a demonstration."""
+    found = _of_kinds(routes, steps, SHORT) if routes.arm.varied else []
+    return found or _of_kinds(routes, steps, SHORT_ROVER)
+
+
+def _of_kinds(
+    routes: Routes,
+    steps: Sequence[Step],
+    kinds: Mapping[tuple[str, str, str], Mapping[str, float]],
+) -> list[Step]:
     home = posture_deg(routes.arm, routes.home)
     found = []
-    for kind, change in SHORT.items():
+    for kind, change in kinds.items():
         of = [s for s in steps if (s.group, s.where, s.action) == kind]
         with_ways = [_with_way(routes, s.model_copy(update=change), routes.home) for s in of]
         same = [s for s in with_ways if s.where == kind[1]]

@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ugv_acceptance.model.robot import Joint
 from ugv_acceptance.plan.plan import Plan
 from ugv_acceptance.plan.search import STEP_DEG, Arm, look
+from ugv_acceptance.report.format import short_name
 from ugv_acceptance.report.regions import degree_axes, draw_regions, figure, legend, svg_of
 from ugv_acceptance.studies.maps import Levels
+from ugv_acceptance.type_aliases import Floats
 
 # Steps (deg) of the map; a joint's range in it.
 MAP_STEP, MAP_RANGE = 3.0, (-180.0, 181.0)
@@ -23,29 +26,48 @@ def safe_maps(
     The numbers on them are the plan's steps on level ground with that load; H is home. `visited`
     are the cells of a run's coverage: first joint (deg) -> second joint (deg).
     """
+    if not arm.varied:
+        return []
     cells = [(float(a), b) for a, row in (visited or {}).items() for b in row]
     limits, full = arm.settings.limits, arm.robot.payload.mass
-    axis = np.radians(np.arange(*MAP_RANGE, MAP_STEP))
-    q = np.broadcast_to(arm.folded, (len(axis), len(axis), len(arm.folded))).copy()
-    names = arm.robot.joint_names
-    q[..., names.index(arm.roles.axes[0])] = axis[:, None]
-    q[..., names.index(arm.roles.axes[1])] = axis
+    x, y = (_axis(arm.robot.joint(name)) for name in arm.varied)
+    q = np.broadcast_to(arm.folded, (len(x), len(y), len(arm.folded))).copy()
+    first, second = arm.columns
+    q[..., first], q[..., second] = x[:, None], y
     maps = []
     for load in dict.fromkeys((0.0, full / 2.0, full)):
         found = look(arm, q.reshape(-1, q.shape[-1]), ('level', 0.0), load)
-        tilt = np.degrees(found.tilt).reshape(len(axis), -1)
-        use = found.most.reshape(len(axis), -1)
+        tilt = np.degrees(found.tilt).reshape(len(x), -1)
+        use = found.most.reshape(len(x), -1)
         bounds = Levels(math.degrees(limits.tip_warn), math.degrees(limits.tip_error))
         torque = Levels(1.0 - limits.torque_warn, 1.0 - limits.torque_error)
         marks = _marks(arm, plan, load)
         fields = ((tilt, bounds), (1.0 - use, torque))
-        maps.append(_drawn(arm, axis, fields, load, (marks, cells)))
+        maps.append(_drawn(arm, (x, y), fields, load, (marks, cells)))
     return maps
+
+
+def standing_words(arm: Arm) -> str:
+    """Return how the joints stand that the safe map does not vary."""
+    turret = 'turret ahead' if arm.turret_joint is not None else ''
+    others = sorted({*arm.robot.joint_names} - {*arm.varied, *arm.roles.flippers})
+    rest = 'the other joints at rest' if len(others) > bool(turret) else ''
+    flippers = 'flippers folded' if arm.roles.flippers else ''
+    words = ', '.join(word for word in (turret, flippers, rest, 'level ground') if word)
+    return words[0].upper() + words[1:]
+
+
+def _axis(joint: Joint) -> Floats:
+    """Return the positions (n,) in rad of a joint along a map: its range, one turn at most."""
+    low, high = (math.degrees(end) for end in (joint.lower, joint.upper))
+    start, end = max(low, MAP_RANGE[0]), min(high + MAP_STEP / 2.0, MAP_RANGE[1])
+    axis: Floats = np.radians(np.arange(start, end, MAP_STEP))
+    return axis
 
 
 def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
     """Return positions (deg) of both joints and a label, for home and each step on level ground."""
-    first, second = arm.roles.axes
+    first, second = arm.varied
     held = [
         s
         for s in plan.steps
@@ -60,21 +82,21 @@ def _marks(arm: Arm, plan: Plan, load: float) -> list[tuple[float, float, str]]:
 
 def _drawn(
     arm: Arm,
-    axis: Any,  # noqa: ANN401 - arrays
+    axis: tuple[Floats, Floats],
     fields: Any,  # noqa: ANN401 - arrays
     load: float,
     on_it: tuple[Sequence[tuple[float, float, str]], Sequence[tuple[float, float]]],
 ) -> dict[str, str]:
     marks, cells = on_it
     made = figure(7.4, 3.1)
-    shoulder, elbow = (name.removesuffix('_joint') for name in arm.roles.axes)
+    first, second = (short_name(name.removesuffix('_joint'), 40) for name in arm.varied)
     for k, (title, (margin, levels)) in enumerate(
         zip(('tip-over', 'motor torque'), fields, strict=True), 1
     ):
         axes = made.add_subplot(1, 2, k)
-        degrees = np.degrees(axis)
-        draw_regions(axes, degrees, degrees, margin, levels)
-        degree_axes(axes, shoulder, elbow)
+        x_deg, y_deg = (np.degrees(values) for values in axis)
+        draw_regions(axes, x_deg, y_deg, margin, levels)
+        degree_axes(axes, first, second)
         axes.set_title(title)
         if cells:
             x, y = (np.array(cells) + STEP_DEG / 2.0).T

@@ -1,6 +1,7 @@
 """A test plan as data: steps that people read and edit in YAML, and its hash.
 
-Angles are in degrees here, as in the file; `radians_of` converts them to radians.
+Angles are in degrees here, as in the file, and positions of joints that slide in m; `radians_of`
+converts the angles to radians.
 """
 
 import hashlib
@@ -162,14 +163,15 @@ class Plan(_Part):
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def radians_of(posture: Posture) -> dict[str, float]:
-    """Return a posture in radians."""
-    return {name: math.radians(angle) for name, angle in posture.items()}
+def radians_of(robot: Robot, posture: Posture) -> dict[str, float]:
+    """Return a posture in radians; of joints that slide in m, as the plan has them."""
+    slides = {joint.name for joint in robot.joints if joint.slides}
+    return {n: angle if n in slides else math.radians(angle) for n, angle in posture.items()}
 
 
 def vector_of(robot: Robot, home: Posture, posture: Posture) -> list[float]:
-    """Return the positions (j,) in rad of a posture; joints it does not name are at home."""
-    known = radians_of({**home, **posture})
+    """Return the positions (j,) in rad (m) of a posture; joints it does not name are at home."""
+    known = radians_of(robot, {**home, **posture})
     return [known.get(name, 0.0) for name in robot.joint_names]
 
 

@@ -10,6 +10,8 @@ from ugv_acceptance.plan.search import Arm, Found
 from ugv_acceptance.studies.orientations import ORIENTATIONS
 from ugv_acceptance.type_aliases import Floats
 
+# The stop rule of a step that a robot survives; of a robot without an arm.
+ROVER_STOP = 'stop at any DANGER or NO DATA alert that is not expected, or when anybody says stop'
 SAFE_STOP = (
     'stop and freeze the arm at any DANGER or NO DATA alert that is not expected, when the posture'
     ' is not reached, or when anybody says stop'
@@ -30,9 +32,12 @@ class Setup:
 
 
 def posture_deg(arm: Arm, q: Floats) -> Posture:
-    """Return a posture (j,) in degrees by joint name."""
+    """Return a posture (j,) in degrees by joint name; of joints that slide in m."""
     pairs = zip(arm.robot.joint_names, q.tolist(), strict=True)
-    return {name: round(math.degrees(angle), 2) for name, angle in pairs}
+    return {
+        name: round(at, 4) if arm.robot.joint(name).slides else round(math.degrees(at), 2)
+        for name, at in pairs
+    }
 
 
 def hold_step(arm: Arm, setup: Setup, found: Found, k: int, title: str, purpose: str) -> Step:
@@ -47,7 +52,7 @@ def hold_step(arm: Arm, setup: Setup, found: Found, k: int, title: str, purpose:
         purpose=purpose,
         where=setup.where,  # type: ignore[arg-type]  # one of the two
         action=setup.action,  # type: ignore[arg-type]  # one of them
-        preparation=preparation(setup),
+        preparation=preparation(arm, setup),
         ground=Ground(
             orientation=setup.ground[0], tilt_deg=round(math.degrees(setup.ground[1]), 2)
         ),
@@ -57,16 +62,25 @@ def hold_step(arm: Arm, setup: Setup, found: Found, k: int, title: str, purpose:
         limits=limits_of(arm.settings),
         expected={'tilt_left_deg': round(tilt, 2), 'use': round(use, 3)},
         alerts=alerts_of(arm.settings, use, tilt, tips=tips),
-        stop=SAFE_STOP if not tips else 'the robot tips over: let it, then stand it up again',
+        stop=stop_of(arm) if not tips else 'the robot tips over: let it, then stand it up again',
     )
 
 
 def _slug(title: str, setup: Setup) -> str:
-    text = f'{title} {setup.load:g}kg'.lower()
-    return '-'.join(''.join(c if c.isalnum() else ' ' for c in text).split())
+    return slug(f'{title} {setup.load:g}kg'.lower())
 
 
-def preparation(setup: Setup) -> tuple[str, ...]:
+def slug(text: str) -> str:
+    """Return a text as part of a step's id: letters and digits of ASCII, joined by hyphens."""
+    return '-'.join(''.join(c if c.isascii() and c.isalnum() else ' ' for c in text).split())
+
+
+def stop_of(arm: Arm) -> str:
+    """Return the stop rule of a step that the robot survives."""
+    return SAFE_STOP if arm.varied else ROVER_STOP
+
+
+def preparation(arm: Arm, setup: Setup) -> tuple[str, ...]:
     """Return the operator's tasks before a step, one sentence each."""
     name, tilt = setup.ground
     words = ORIENTATIONS[name].words
@@ -75,7 +89,8 @@ def preparation(setup: Setup) -> tuple[str, ...]:
         if name == 'level'
         else f'robot on the ramp, {words}, {math.degrees(tilt):.0f} deg'
     )
-    load = f'{setup.load:g} kg in the gripper, declared' if setup.load else 'gripper empty'
+    place, empty = ('in the gripper', 'gripper empty') if arm.varied else ('on it', 'no load')
+    load = f'{setup.load:g} kg {place}, declared' if setup.load else empty
     guard = 'belay the robot against tipping; nobody within 2 m'
     return ground, load, guard
 
@@ -83,8 +98,13 @@ def preparation(setup: Setup) -> tuple[str, ...]:
 def limits_of(settings: Settings) -> dict[str, float]:
     """Return the limits a step is judged by, with names and units for the reader."""
     limits = settings.limits
-    pairs = zip(settings.robot.joint_names, limits.torque, strict=True)
-    found = {f'{name}_nm': limit for name, limit in pairs if math.isfinite(limit)}
+    robot = settings.robot
+    pairs = zip(robot.joint_names, limits.torque, strict=True)
+    found = {
+        f'{name}_{"n" if robot.joint(name).slides else "nm"}': limit
+        for name, limit in pairs
+        if math.isfinite(limit)
+    }
     return found | {'tilt_left_deg': round(math.degrees(limits.tip_error), 3)}
 
 

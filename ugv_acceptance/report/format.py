@@ -13,6 +13,17 @@ LONG = 1e6
 _MOST_CARRYING = 4
 
 
+def short_name(name: str, most: int = 32) -> str:
+    """Return a name of `most` characters at most: a longer one has dots for its middle.
+
+    Both ends stay, for names of one robot often begin alike.
+    """
+    if len(name) <= most:
+        return name
+    end = (most - 1) // 2
+    return f'{name[: most - 1 - end]}…{name[-end:]}'
+
+
 def number_text(value: float | None, digits: int = 1, unit: str = '') -> str:
     """Return a number with its unit, a long one with three digits; a dash where it is unknown."""
     if value is None:

@@ -4,6 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Callable
+from textwrap import wrap
 from typing import BinaryIO
 
 import numpy as np
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.report.format import short_name
 from ugv_acceptance.report.map_data import MapData, Scene
 from ugv_acceptance.report.regions import draw_regions, figure, legend, png_of, svg_of
 from ugv_acceptance.studies.maps import CLASSES, classes
@@ -23,6 +25,8 @@ WORDS = {
     'payload': ('carries the load', 'caution: little reserve', 'cannot carry it'),
     'drag': ('pulls over a fifth of its weight', 'over a tenth', 'less'),
 }
+# Most letters of a joint on its axis; most lines of the assumptions in the title.
+_LONGEST, _MOST_LINES = 48, 6
 # A larger step (degrees) between messages crossed the map's edge: no joint moves so far.
 _WRAPPED = 180.0
 # Lines of equal value beside the two boundaries.
@@ -89,9 +93,8 @@ def draw_map(scene: Scene, data: MapData, track: Floats | None = None) -> Figure
     if track is not None:
         _draw_track(axes, scene, track)
     _axis(axes, scene)
-    axes.set_title(
-        f'{robot.name}: {data.what}\n{_wrapped(assumptions(scene, data.kind))}', fontsize=9.5
-    )
+    words = _wrapped(assumptions(scene, data.kind))
+    axes.set_title(f'{short_name(robot.name, _LONGEST)}: {data.what}\n{words}', fontsize=9.5)
     more = axes.get_legend_handles_labels()[0]
     legend(made, WORDS[data.kind], more, loc='outside lower center', ncols=3)
     return made
@@ -101,7 +104,11 @@ def _wrapped(text: str, width: int = 90) -> str:
     if len(text) <= width:
         return text
     at = text.rfind('; ', 0, width) + 1
-    return text[:at] + '\n' + text[at:].strip()
+    lines = [text[:at], text[at:].strip()]
+    if at and len(lines[1]) <= width:
+        return '\n'.join(lines)
+    lines = wrap(text, width, max_lines=_MOST_LINES, placeholder=' …')
+    return '\n'.join(lines)
 
 
 def _label(data: MapData) -> Callable[[float], str]:
@@ -138,7 +145,7 @@ def _axis(axes: Axes, scene: Scene) -> None:
         span = float(shown(scene.robot, joint, values[-1:] - values[:1])[0])
         steps = [s for s in (5.0, 10.0, 15.0, 30.0, 60.0) if span / s <= 9]
         axis.set_major_locator(MultipleLocator(steps[0]) if turns and steps else MaxNLocator())
-        name = scene.robot.joint_names[joint]
+        name = short_name(scene.robot.joint_names[joint], _LONGEST)
         axis.set_label_text(f'{name}, degrees' if turns else f'{name}, m')
 
 

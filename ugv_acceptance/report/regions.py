@@ -54,8 +54,11 @@ def draw_regions(
     `label` writes a level on its line; without it the lines stay bare.
     """
     filled = np.nan_to_num(np.clip(margin, -1e6, 1e6), nan=-1e6).T
-    bounds = [-2e6, levels.failure, levels.caution, 2e6]
-    axes.contourf(x, y, filled, levels=bounds, colors=COLOURS[::-1], hatches=HATCHES[::-1])
+    # Where nothing lies between both levels, such as where nothing is carried: two areas.
+    every = 2 if levels.failure == levels.caution else 1
+    bounds = [-2e6, *(levels.failure, levels.caution)[::every], 2e6]
+    colours, hatches = COLOURS[::-every], HATCHES[::-every]
+    axes.contourf(x, y, filled, levels=bounds, colors=colours, hatches=hatches)
     looks = ((levels.caution, '#333333', 0.9, ':'), (levels.failure, 'black', 1.6, '-'))
     for level, colour, width, dash in looks:
         if filled.min() < level < filled.max():

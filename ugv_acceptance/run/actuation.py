@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from ugv_acceptance.model.roles import WHEELED, roles_of
 from ugv_acceptance.plan.plan import Step
 from ugv_acceptance.run.world import World
 from ugv_acceptance.studies.orientations import ORIENTATIONS
@@ -91,13 +92,20 @@ class Hands:
             self.world.wait(DRIVE_PERIOD)
         self.world.commands.pull(0.0)
 
+    def _upright(self) -> str:
+        """Return what a person is asked for before the first step and after a fall."""
+        roles = roles_of(self.world.positions.config.settings.robot)
+        under = 'wheels' if roles.kind == WHEELED else 'tracks'
+        arm = ', arm folded, hand empty' if roles.arm else ''
+        return f'stand the robot on its {under} on level ground{arm}'
+
     def stand_up(self) -> bool:
         """Return a robot that tipped over, or whose arm gave way, to its start; False: declined."""
         if self.mode == SIM:
             self.world.commands.stand_up()
             self.world.commands.load(0.0)
             self._tilt = 0.0
-        elif not self.told('stand the robot on its tracks on level ground, arm folded, hand empty'):
+        elif not self.told(self._upright()):
             return False
         self.world.commands.declare(0.0)
         self.world.wait(REST)

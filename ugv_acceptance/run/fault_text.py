@@ -14,7 +14,7 @@ from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.simulation.faults import INPUTS, KINDS, PHYSICAL, Fault, Kind
 
 _FORM = re.compile(
-    r'(?P<kind>[a-z-]+)(:(?P<subject>\w+))?(=(?P<amount>[^@]+))?'
+    r'(?P<kind>[a-z-]+)(:(?P<subject>[^=@]+))?(=(?P<amount>[^@]+))?'
     r'(@(?P<start>[.\d]+)(-(?P<end>[.\d]+))?)?'
 )
 

@@ -19,6 +19,20 @@ PAYLOAD_PERIOD = 1.0
 
 # Topic, time of receipt (ns) and content.
 Message = tuple[str, int, bytes]
+# The types of the inputs, in the order in which they are recorded.
+TYPES = {
+    'joint_states': 'sensor_msgs/msg/JointState',
+    'imu': 'sensor_msgs/msg/Imu',
+    'payload': 'geometry_msgs/msg/InertiaStamped',
+}
+
+
+def topics_of(config: Config) -> dict[str, str]:
+    """Return the topics of the inputs that the robot has, by the name of the input."""
+    used = config.topics.used
+    if config.settings.robot.payload_link is None:
+        used = {name: topic for name, topic in used.items() if name != 'payload'}
+    return {name: f'/{used[name].name.lstrip("/")}' for name in TYPES if name in used}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +48,8 @@ class Driver:
         """Yield time (s) and CDR bytes of a JointState for every row of a log."""
         log = self.corruption.joints(log)
         joints = self.config.settings.joints
+        if not joints:
+            return
         sign, offset = np.array([(j.sign, j.offset) for j in joints]).T
         scale = np.array([j.effort_sign * j.effort_scale for j in joints])
         position = ((log.position - offset) / sign).tolist()
@@ -92,13 +108,13 @@ def messages(
     driver = Driver(config, corruption, recording.scenario.noise)
     rng = np.random.default_rng(seed)
     found: list[Message] = []
-    sources = (
-        ('/joint_states', 'joint_states', driver.joint_states(recording.joints)),
-        ('/imu/data', 'imu', driver.imu(recording.imu)),
-        ('/payload', 'payload', payload_messages(driver, recording, factor)),
-    )
-    for topic, source, sent in sources:
-        for time, cdr in sent:
+    sources = {
+        'joint_states': driver.joint_states(recording.joints),
+        'imu': driver.imu(recording.imu),
+        'payload': payload_messages(driver, recording, factor),
+    }
+    for source, topic in topics_of(config).items():
+        for time, cdr in sources[source]:
             # A load is declared before anything is measured with it.
             arrivals = [time] if source == 'payload' else corruption.arrivals(source, time, rng)
             found += [(topic, driver.nanoseconds(due), cdr) for due in arrivals]

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.plan.plan import Posture, Step, radians_of
 from ugv_acceptance.run.actuation import OPERATOR, Hands
 from ugv_acceptance.run.world import World
@@ -38,12 +39,16 @@ class Moves:
         brake = self.world.brake
         return not (self.asked() or (brake.armed and brake.stopped))
 
+    @property
+    def _robot(self) -> Robot:
+        return self.world.positions.config.settings.robot
+
     def go(self, posture: Posture, speed: float, step: Step | None = None) -> str:
         """Move to a posture (deg) at a peak speed (rad/s); return what was wrong."""
         if not self.going:
             return self.world.brake.stopped
         self.trail.append(posture)
-        target = radians_of(posture)
+        target = radians_of(self._robot, posture)
         if self.hands.mode == OPERATOR:
             return self._told_to_go(target, step.id if step else 'way')
         seconds = self.hands.move(target, speed)
@@ -55,13 +60,13 @@ class Moves:
 
     def hold(self, step: Step) -> str:
         """Hold the posture for the step's time; return what was wrong."""
-        target, furthest = radians_of(step.posture_deg), (0.0, '')
+        target, furthest = radians_of(self._robot, step.posture_deg), (0.0, '')
         end = self.world.fed() + step.hold_s
         while self.world.fed() < end and self.going:
             self.world.wait(LOOK)
             furthest = max(furthest, self._off(target))
         kept = furthest[0] <= self.tolerance
-        return '' if kept else f'the posture was not held: {_told(furthest)}'
+        return '' if kept else f'the posture was not held: {self._told(furthest)}'
 
     def cycle(self, step: Step) -> str:
         """Repeat the postures of a step for its time; return what was wrong."""
@@ -76,8 +81,10 @@ class Moves:
 
     def _told_to_go(self, target: dict[str, float], what: str) -> str:
         """Ask a person to bring the arm to `target` (rad) until joint states show it is there."""
-        wanted = ', '.join(f'{n} {math.degrees(a):.0f} deg' for n, a in target.items())
+        wanted = ', '.join(f'{n} {self._shown(n, a)}' for n, a in target.items())
         wrong = ''
+        if not target:
+            return wrong
         while self.going:
             text = f'{what}: bring the arm to {wanted} and hold it'
             if not self.hands.told(f'{wrong}; {text}' if wrong else text):
@@ -97,14 +104,24 @@ class Moves:
             if off[0] < best - PROGRESS:
                 best, since = off[0], self.world.fed()
             if self.world.fed() - since > GRACE:
-                return f'the posture was not reached: {_told(off)}'
+                return f'the posture was not reached: {self._told(off)}'
             self.world.wait(LOOK)
         return self.world.brake.stopped
 
     def _off(self, target: dict[str, float]) -> tuple[float, str]:
         """Return the largest distance (rad) of a joint from `target` (rad), and that joint."""
         now = self.world.positions.now
-        return max((abs(now.get(n, math.inf) - a), n) for n, a in target.items())
+        away = ((abs(now.get(n, math.inf) - a), n) for n, a in target.items())
+        return max(away, default=(0.0, ''))
+
+    def _told(self, off: tuple[float, str]) -> str:
+        return f'{off[1]} is {self._shown(off[1], off[0], digits=1)} off'
+
+    def _shown(self, joint: str, at: float, digits: int = 0) -> str:
+        """Return a position (rad, m) of a joint in the unit that people read."""
+        if self._robot.joint(joint).slides:
+            return f'{at:.{digits + 2}f} m'
+        return f'{math.degrees(at):.{digits}f} deg'
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
         """Wait for a condition, for `seconds` at most; return whether it came true."""
@@ -120,10 +137,6 @@ class Moves:
         end = self.world.fed() + seconds
         while self.world.fed() < end and self.going:
             self.world.wait(LOOK)
-
-
-def _told(off: tuple[float, str]) -> str:
-    return f'{off[1]} is {math.degrees(off[0]):.1f} deg off'
 
 
 def holds(step: Step) -> bool:

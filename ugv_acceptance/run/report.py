@@ -9,9 +9,9 @@ import numpy as np
 
 from ugv_acceptance.config import Config
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.plan.maps import safe_maps
+from ugv_acceptance.plan.maps import safe_maps, standing_words
 from ugv_acceptance.plan.plan import Plan
-from ugv_acceptance.plan.search import STEP_DEG, Arm, roles_of
+from ugv_acceptance.plan.search import STEP_DEG, Arm
 from ugv_acceptance.run.step_verdict import Seen
 from ugv_acceptance.type_aliases import Floats
 
@@ -23,22 +23,25 @@ pre {{ white-space: pre-wrap; font-size: .9rem }}
 figure {{ margin: .5rem 0; break-inside: avoid }} svg {{ max-width: 100%; height: auto }}
 </style></head>
 <body><h1>{title}</h1><pre>{text}</pre>
-<h2>The failure map and where the run has been</h2>
-<p>Level ground, turret ahead. Blue: cells visited, with any load and on any ground. Numbers: steps
-held on level ground with that load; H: home.</p>
 {maps}</body></html>
 """
+MAPS = """<h2>The failure map and where the run has been</h2>
+<p>{standing}. Blue: cells visited, with any load and on any ground. Numbers: steps
+held on level ground with that load; H: home.</p>
+{figures}"""
 
 
 def html_of(text: str, plan: Plan, config: Config, coverage: Mapping[str, Any]) -> str:
     """Return a run's report as one HTML page: its text and the maps with the visited cells."""
-    arm = Arm(config.settings, roles_of(config.settings))
+    arm = Arm(config.settings)
     figures = [
         f'<figure>{m["svg"]}<figcaption>{escape(m["caption"])}</figcaption></figure>'
         for m in safe_maps(arm, plan, coverage['visited_deg'])
     ]
     title = f'Run of plan {plan.plan}'
-    return PAGE.format(title=escape(title), text=escape(text), maps=''.join(figures))
+    words = escape(standing_words(arm))
+    maps = MAPS.format(standing=words, figures=''.join(figures)) if figures else ''
+    return PAGE.format(title=escape(title), text=escape(text), maps=maps)
 
 
 def report_of(result: dict[str, Any]) -> str:
@@ -56,8 +59,7 @@ def report_of(result: dict[str, Any]) -> str:
         '',
         *(line for step in result['steps'] for line in _step_lines(step)),
         '',
-        'failure map: {cells_visited} of {cells_reachable} cells of {cell_deg:g} deg visited'
-        ' ({share:.1%})'.format(**coverage),
+        *visited_lines(coverage),
         *approaches(coverage),
     ]
     return '\n'.join(lines) + '\n'
@@ -71,6 +73,14 @@ def counts_of(result: Mapping[str, Any]) -> str:
     if spared:
         text += f'; {spared} would exceed a limit and are for simulation only: they do not count'
     return text
+
+
+def visited_lines(coverage: Mapping[str, Any]) -> list[str]:
+    """Return how much of the map of the arm's joints was visited; no line without an arm."""
+    if not coverage['joints']:
+        return []
+    text = 'failure map: {cells_visited} of {cells_reachable} cells of {cell_deg:g} deg visited'
+    return [f'{text} ({{share:.1%}})'.format(**coverage)]
 
 
 def approaches(coverage: Mapping[str, Any]) -> list[str]:
@@ -111,15 +121,15 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     are the closest approaches to the torque limit of each joint (a share of it) and to the tilt
     limit on each of SIDES (deg); None on a side the run was never on.
     """
-    arm = Arm(config.settings, roles_of(config.settings))
-    axes = [arm.robot.joint_names.index(name) for name in arm.roles.axes]
-    reachable = cells(arm.grid[:, axes])
+    arm = Arm(config.settings)
+    axes = arm.columns
+    reachable = cells(arm.grid[:, axes]) if axes else set()
     visited: set[tuple[int, int]] = set()
     names = arm.robot.joint_names
     use, tilt = [np.empty((0, len(names)))], [np.empty((0, len(SIDES)))]
     for one in seen:
         _, q, used, left = one.joined()
-        visited |= cells(q[:, axes])
+        visited |= cells(q[:, axes]) if axes else set()
         use.append(used)
         tilt.append(left)
     limits = config.settings.limits
@@ -131,7 +141,7 @@ def coverage_of(config: Config, seen: Iterable[Seen]) -> dict[str, Any]:
     limited = [(n, k) for k, n in enumerate(names) if math.isfinite(limits.torque[k])]
     return {
         'cell_deg': STEP_DEG,
-        'joints': list(arm.roles.axes),
+        'joints': list(arm.varied),
         'cells_reachable': len(reachable),
         'cells_visited': len(visited & reachable),
         'share': round(len(visited & reachable) / max(len(reachable), 1), 4),

@@ -15,7 +15,7 @@ from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config
 from ugv_acceptance.plan.arm_paths import safe_path
 from ugv_acceptance.plan.plan import SIMULATION, Step, vector_of
-from ugv_acceptance.plan.search import Arm, roles_of
+from ugv_acceptance.plan.search import Arm
 from ugv_acceptance.run.actuation import SIM, Hands
 from ugv_acceptance.run.folder import RunFolder
 from ugv_acceptance.run.motions import REFUSED, Moves, holds
@@ -167,7 +167,7 @@ class Runner:
         home, paths = self.folder.plan.home_deg, self.moves.trail[-2::-1]
         robot = self.config.settings.robot
         if self.moves.trail and self._setup:
-            arm = Arm(self.config.settings, roles_of(self.config.settings))
+            arm = Arm(self.config.settings)
             straight = [np.array(vector_of(robot, home, p)) for p in (self.moves.trail[-1], home)]
             ground, load = self._setup
             slope = ground.orientation, math.radians(ground.tilt_deg)

@@ -12,13 +12,14 @@ import numpy as np
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config import Config
+from ugv_acceptance.run.catalogue import check_drives
 from ugv_acceptance.run.messages import EPOCH, Driver
-from ugv_acceptance.run.record import build_of
-from ugv_acceptance.simulation.corruption import Corruption, overload, weakened
+from ugv_acceptance.run.record import build_of, real_robot
+from ugv_acceptance.simulation.corruption import Corruption, overload
 from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
 from ugv_acceptance.simulation.faults import Fault
-from ugv_acceptance.simulation.scenario import Noise, Scenario
-from ugv_acceptance.simulation.scenarios import STOWED
+from ugv_acceptance.simulation.poses import stowed_of
+from ugv_acceptance.simulation.scenario import Scenario, noise_of
 from ugv_acceptance.simulation.stretches import Rows, Sensors, stride_of
 
 # Source ('joint_states' or 'imu') and serialised content of a message.
@@ -51,18 +52,20 @@ class VirtualRobot:
 
     def __post_init__(self) -> None:
         robot, build = self.config.settings.robot, build_of(self.config)
+        check_drives(robot)
         rates = Scenario('live', 1.0, joint_rate=self.joint_rate, imu_rate=self.imu_rate)
         self._stride = stride_of(rates, build)
         self.tick = 1.0 / self.imu_rate
-        real = weakened(robot, self.faults)
+        real = real_robot(self.config, self.faults)
         self.remote = RemoteRobot(real, build, self._start(), overload(self.faults))
         corruption = Corruption(self.faults, robot.joint_names)
-        self._driver = Driver(self.config, corruption, Noise(), self.epoch)
+        self._driver = Driver(self.config, corruption, noise_of(robot), self.epoch)
         self._rng = np.random.default_rng(self.seed)
-        self._sensors = Sensors(Noise(), np.random.default_rng(self.seed))
+        self._sensors = Sensors(noise_of(robot), np.random.default_rng(self.seed))
 
     def _start(self) -> tuple[tuple[str, float], ...]:
-        names, stowed = self.config.settings.robot.joint_names, dict(STOWED)
+        robot = self.config.settings.robot
+        names, stowed = robot.joint_names, {} if self.home else dict(stowed_of(robot))
         home = self.home or tuple(stowed.get(name, 0.0) for name in names)
         if len(home) != len(names):
             raise BadConfig(f'home: expected {len(names)} positions, got {len(home)}')
@@ -89,7 +92,7 @@ class VirtualRobot:
         """Pull backwards with a force (N) at a hitch, `height` (m) above the middle of the base."""
         simulation, yaw = self.remote.simulation, self._yaw()
         back = (-force * math.cos(yaw), -force * math.sin(yaw), 0.0)
-        base = simulation.data.body(self.config.settings.robot.root)
+        base = simulation.data.body(simulation.vehicle.root)
         arm = base.xpos + np.array((0.0, 0.0, height)) - base.xipos
         base.xfrc_applied[:] = (*back, *np.cross(arm, back))
 

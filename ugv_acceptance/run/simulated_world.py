@@ -17,15 +17,17 @@ from ugv_acceptance.bag.cdr import (
     joint_state_decoder,
 )
 from ugv_acceptance.bag.encode import inertia_cdr
-from ugv_acceptance.bag.writer import BagWriter, Qos
+from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, Alert
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.plan.motions import HITCH
+from ugv_acceptance.plan.motions import hitch_of
+from ugv_acceptance.run.messages import TYPES, topics_of
 from ugv_acceptance.run.own_description import tell_robot
+from ugv_acceptance.run.record import QOS
 from ugv_acceptance.run.simulated_robot import VirtualRobot
 from ugv_acceptance.run.world import Brake, Commands, Positions
 
@@ -103,9 +105,8 @@ class Offline:
     def record(self, folder: Path) -> None:
         """Begin to record all messages into a new folder."""
         self.bag = BagWriter(folder, simulated=True)
-        sensor = Qos(reliability='best_effort')
-        for (topic, kind), qos in zip(self._topics(), (sensor, sensor, Qos()), strict=True):
-            self.bag.add_topic(topic, kind, qos)
+        for source, topic in self._topics().items():
+            self.bag.add_topic(topic, TYPES[source], QOS[source])
         tell_robot(self.bag, self.config, self.stamp())
         self.bag.flush()  # from now on it can be read, whatever happens
 
@@ -115,20 +116,15 @@ class Offline:
         if bag is not None:
             bag.close()
 
-    def _topics(self) -> tuple[tuple[str, str], ...]:
-        topics = self.config.topics
-        return (
-            (_absolute(topics.joint_states.name), 'sensor_msgs/msg/JointState'),
-            (_absolute(topics.imu.name), 'sensor_msgs/msg/Imu'),
-            (_absolute(topics.payload.name), 'geometry_msgs/msg/InertiaStamped'),
-        )
+    def _topics(self) -> dict[str, str]:
+        return topics_of(self.config)
 
     # The monitor
 
     def _receive(self, source: str, data: bytes) -> None:
         now, evaluator = self.stamp(), self.evaluator
-        topic = self._topics()[0 if source == 'joint_states' else 1][0]
-        if self.bag is not None:
+        topic = self._topics().get(source)
+        if self.bag is not None and topic is not None:
             self.bag.write(topic, now, data)
         try:
             if source == 'joint_states':
@@ -157,8 +153,8 @@ class Offline:
         """Declare a load (kg) to the evaluation, as to the monitor, and record it."""
         topics, cog = self.config.topics, self.config.settings.robot.payload.cog
         frame, now = topics.payload.frame_id or '', self.stamp()
-        if self.bag is not None:
-            self.bag.write(self._topics()[2][0], now, inertia_cdr(now, frame, mass, cog))
+        if self.bag is not None and (topic := self._topics().get('payload')) is not None:
+            self.bag.write(topic, now, inertia_cdr(now, frame, mass, cog))
         self.evaluator.carry(now, mass, cog, frame)
 
     def stand_on(self, kind: str | None) -> None:
@@ -213,15 +209,11 @@ class OfflineCommands:
 
     def pull(self, force: float) -> None:
         """Pull backwards at the hitch (N) until told otherwise."""
-        self.world.virtual.pull(force, HITCH)
+        self.world.virtual.pull(force, hitch_of(self.world.config.settings.robot))
 
     def stand_up(self) -> None:
         """Reset the robot to its start: on level ground, the gripper empty."""
         self.world.virtual.remote.reset()
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith('/') else f'/{name}'
 
 
 def _key(alert: Alert) -> tuple[str, str, str]:

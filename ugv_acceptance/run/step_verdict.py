@@ -185,8 +185,9 @@ def measured(seen: Seen, done: Done) -> dict[str, float]:
     if not rows.any():
         return {}
     tilt_left = round(float(np.degrees(np.median(tilt[rows].min(axis=1)))), 2)
-    most = use[rows].max(axis=1)
-    most = most[~np.isnan(most)]  # not known where the hand touches the ground
+    # Not known where the hand touches the ground, nor of a robot without joints.
+    most = use[rows].max(axis=1) if use.shape[1] else np.empty(0)
+    most = most[~np.isnan(most)]
     told = {'use': round(float(np.median(most)), 4)} if len(most) else {}
     return {'tilt_left_deg': tilt_left, **told}
 

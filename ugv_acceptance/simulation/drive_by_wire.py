@@ -109,6 +109,8 @@ class RemoteRobot:
         numbers = (payload.mass, *payload.cog)
         if not all(map(math.isfinite, numbers)) or payload.mass < 0.0:
             raise BadSample(f'load: expected a mass of at least 0 kg and its place, got {numbers}')
+        if self.robot.payload_link is None and payload.mass > 0.0:
+            raise BadSample(f'load: {self.robot.name} has no payload.link in its configuration')
         load = Payload(payload.mass * self.factor, payload.cog)
         self.simulation.apply(Command(self.simulation.time, payload=load))
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.model.robot import Payload, Robot, Vector
+from ugv_acceptance.model.roles import roles_of
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import OVER, TIPPED, attitude, settled, turn
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, vehicle_of
+from ugv_acceptance.simulation.vehicle import Build, Vehicle, body_name, vehicle_of
 from ugv_acceptance.type_aliases import Floats
 
 TIPS, MAY_TIP, NOT_SEEN_TO_TIP = 'TIPS', 'MAY TIP', 'NOT SEEN TO TIP'
@@ -95,6 +96,7 @@ def power_loss(released: Released) -> PowerLoss:
 
     Raises AcceptanceError where the simulation becomes unstable.
     """
+    released = without_wheels(released)
     vehicle, data, stood = standing(released)
     names = released.robot.joint_names
     falls = [_fall(released, vehicle, data, (d,) * len(names), stood=stood) for d in DAMPINGS]
@@ -102,6 +104,16 @@ def power_loss(released: Released) -> PowerLoss:
     if stood and all(fall.tips for fall in falls):
         falls += [_fall(released, vehicle, data, d, stood=stood) for d in mixed(len(names))]
     return PowerLoss(answer_of(falls), stood, tuple(falls), brakes_of(released))
+
+
+def without_wheels(released: Released) -> Released:
+    """Return the same with measured wheels held where they are, as they do not roll."""
+    robot, wheels = released.robot, roles_of(released.robot).wheels
+    at = dict(zip(robot.joint_names, released.q, strict=True))
+    names = tuple(name for name in robot.joint_names if name not in wheels)
+    held = (*robot.held, *((name, at[name]) for name in robot.joint_names if name in wheels))
+    still = replace(robot, joint_names=names, held=held)
+    return replace(released, robot=still, q=tuple(at[name] for name in names))
 
 
 def answer_of(falls: Sequence[Fall]) -> str:
@@ -260,7 +272,7 @@ def _brake(vehicle: Vehicle, data: mujoco.MjData, down: Floats, k: int, name: st
 
 def _is_below(model: mujoco.MjModel, link: str, body: int) -> bool:
     """Return whether a link is this body or hangs on it."""
-    k = int(model.body(link).id)
+    k = int(model.body(body_name(link)).id)
     while k and k != body:
         k = int(model.body_parentid[k])
     return k == body

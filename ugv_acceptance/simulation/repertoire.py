@@ -5,105 +5,42 @@ is found by simulating it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import atan, pi, radians
 
 import numpy as np
 
 from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.stability import margins
-from ugv_acceptance.model.statics import gripper_point
+from ugv_acceptance.simulation.ground import ground_of
+from ugv_acceptance.simulation.poses import LOWEST, Poses, Region, Rng, motion_time
 from ugv_acceptance.simulation.scenario import Command, Scenario
-from ugv_acceptance.simulation.scenarios import STOWED
-from ugv_acceptance.simulation.shape import Block, ramp, stairs, step, wheel_contacts
-from ugv_acceptance.simulation.vehicle import gravity_on_slope
-from ugv_acceptance.type_aliases import Floats
+from ugv_acceptance.simulation.shape import Block, ramp, stairs, step
 
-# Margins that a quiet shift keeps: tilt left (rad), share of the torque limit, grip height (m).
-CALM_TILT, CALM_TORQUE, LOWEST = radians(18.0), 0.62, 0.08
-# Postures of a motion that are looked at.
-_PATH = 49
 # Share of quiet shifts with a low obstacle ahead, and how high (m) it is at most.
 _UNEVEN, _TOP = 0.3, 0.1
+# Where the arm is: a load held up high, ready to swing, swung out, drawn in, stretched out ahead,
+# to a side, held up while driving, and while climbing.
+UP = Region((60.0, 95.0), (-60.0, 0.0), (0.0, 0.7), (0.75, 1.0))
+READY = Region((80.0, 80.0), (-60.0, -60.0), (0.0, 0.5), (0.6, 1.0))
+SWUNG = Region((20.0, 70.0), (-60.0, 0.0), (0.6, 1.0), (0.2, 0.8))
+DRAWN_IN = Region((75.0, 110.0), (-120.0, -120.0), (0.0, 0.4), (0.2, 0.8))
+STRETCHED = Region((15.0, 60.0), (-40.0, 10.0), (0.75, 1.0), (0.0, 0.9))
+ASIDE = Region((20.0, 60.0), (-50.0, 0.0), (0.7, 1.0), (0.0, 0.8))
+HELD_UP = Region((70.0, 90.0), (-40.0, 0.0), (0.0, 0.7), (0.75, 1.0))
+BACK = Region((40.0, 80.0), (-60.0, 0.0), (0.4, 0.9), (0.4, 1.0))
 
-Rng = np.random.Generator
 Kind = Callable[[Robot, Rng, float], Scenario]
 
 
-@dataclass(frozen=True, slots=True)
-class Poses:
-    """Draws random postures of the arm as (name, rad) pairs; the flippers stay folded back.
-
-    The gripper stays `lowest` (m) above the ground.
-    """
-
-    robot: Robot
-    rng: Rng
-    lowest: float = LOWEST
-
-    def anywhere(self) -> Floats:
-        """Return a random posture (j,) with the gripper above the ground and clear of the deck."""
-        while True:
-            q = self.vector(
-                turret_joint=self.rng.uniform(-pi, pi),
-                shoulder_joint=self.rng.uniform(radians(10), radians(150)),
-                elbow_joint=self.rng.uniform(radians(-150), radians(90)),
-            )
-            if gripper_point(self.robot, q)[2] > self.lowest:
-                return q
-
-    def vector(self, **angles: float) -> Floats:
-        """Return the stowed posture (j,) with the given joint angles (rad) put in."""
-        known = dict(STOWED) | angles
-        return np.array([known.get(name, 0.0) for name in self.robot.joint_names])
-
-    def named(self, q: Floats) -> tuple[tuple[str, float], ...]:
-        """Return a posture (j,) as the joint targets of a command."""
-        return tuple(zip(self.robot.joint_names, q.tolist(), strict=True))
-
-    def calm(self, start: Floats, load: Payload, tilt: float) -> Floats | None:
-        """Return a posture (j,) reached from `start` with large margins; None: none was found."""
-        for _ in range(40):
-            end = self.anywhere()
-            path = _way(start, end)
-            if (gripper_point(self.robot, path)[:, 2] < self.lowest).any():
-                continue
-            if self.keeps(path, load, tilt):
-                return end
-        return None
-
-    def keeps(self, path: Floats, load: Payload, tilt: float) -> bool:
-        """Return whether postures (n, j) keep large margins on a slope (rad) to any side."""
-        heads = np.array([gravity_on_slope(self.robot.gravity, tilt, h) for h in _headings()])
-        limit = np.array([self.robot.joint(n).effort for n in self.robot.joint_names])
-        found = margins(self.robot, path[:, None, :], heads, load)
-        share = (np.abs(found.torque) / limit).max()
-        return bool(found.angle.min() > CALM_TILT and share < CALM_TORQUE)
-
-
-def _way(start: Floats, end: Floats) -> Floats:
-    """Return postures (n, j) of a motion in which each joint takes its own time."""
-    change = end - start
-    took = np.maximum(np.abs(change), 1e-9)
-    phase = np.pi * np.minimum(np.linspace(0.0, took.max(), _PATH)[:, None] / took, 1.0)
-    path: Floats = start + change * (1.0 - np.cos(phase)) / 2.0
-    return path
-
-
-def _headings() -> Floats:
-    return np.linspace(-pi, pi, 8, endpoint=False)
-
-
 def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
-    """A quiet shift: arm, tracks, load and ground change, and every margin stays large."""
+    """A quiet shift: arm, drive, load and ground change, and every margin stays large."""
     blocks, lean = _obstacle(robot, rng, 0.03) if rng.random() < _UNEVEN else ((), 0.0)
     poses = Poses(robot, rng, LOWEST + (_TOP if blocks else 0.0))
-    full = Payload(float(rng.uniform(0.0, 1.5)), robot.payload.cog)
+    full = poses.load(0.0, 1.5)
     tilt = float(rng.uniform(0.0, radians(6.0)))
-    load, now, q = full, 2.0, poses.vector()
+    load, now, q = full, 2.0, poses.folded()
     commands: list[Command] = []
     while now < seconds - 12.0:
-        act = rng.integers(5)
+        act = rng.integers(5 if poses.has_arm else 2)
         if act == 0:
             drive = float(rng.uniform(-0.3, 0.3)), float(rng.uniform(-0.3, 0.3))
             commands += [Command(now, drive=drive), Command(now + 2.0, drive=(0.0, 0.0))]
@@ -122,30 +59,33 @@ def work(robot: Robot, rng: Rng, seconds: float) -> Scenario:
             speed = float(rng.uniform(0.15, 0.5))
             if end is not None:
                 commands.append(Command(now, joints=poses.named(end), speed=speed))
-                now += float(np.abs(end - q).max()) * pi / (2.0 * speed) + 0.5
+                now += motion_time(q, end, speed) + 0.5
                 q = end
     return Scenario(
-        'work', seconds, STOWED, (0.0, 0.0), full, tuple(commands), blocks=blocks, lean=lean
+        'work', seconds, poses.stowed, (0.0, 0.0), full, tuple(commands), blocks=blocks, lean=lean
     )
 
 
 def _obstacle(robot: Robot, rng: Rng, height: float) -> tuple[tuple[Block, ...], float]:
-    """Return a step, stairs or a ramp up to `height` (m) a stair, and the lean (rad) it causes."""
-    half = max(c.position[0] for c in wheel_contacts(robot))
-    rise, at = float(rng.uniform(0.5, 1.0)) * height, float(rng.uniform(0.5, 0.8))
-    lean = atan(rise / half) + radians(1.0)
-    made = ((step(at, rise),), stairs(at, rise, 0.35, 3), ramp(at, lean, 0.75))
-    return made[rng.integers(3)], lean
+    """Return a step, stairs or a ramp up to `height` (m) a stair, and the lean (rad) it causes.
+
+    They are as large against the robot as against PackBot; what has casters gets a ramp.
+    """
+    ground = ground_of(robot)
+    rise = float(rng.uniform(0.5, 1.0)) * height * ground.size
+    at = float(rng.uniform(0.5, 0.8)) * ground.away
+    rise = min(rise, ground.highest)
+    lean = atan(rise / ground.half) + radians(1.0)
+    run, long = 0.35 * ground.size, 0.75 * ground.size
+    made = ((step(at, rise),), stairs(at, rise, run, 3), ramp(at, lean, long))
+    return made[rng.integers(3) if ground.steps else 2], lean
 
 
 def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     """Holds a load up while the ground tilts until something fails or the robot nearly slides."""
-    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
-    q = poses.vector(
-        turret_joint=rng.uniform(-pi, pi),
-        shoulder_joint=radians(rng.uniform(60, 95)),
-        elbow_joint=radians(rng.uniform(-60, 0)),
-    )
+    poses = Poses(robot, rng)
+    load = poses.load(1.0, 5.0)
+    q = poses.at(UP, rng.uniform(-pi, pi))
     slope = radians(38.0), float(rng.uniform(-pi, pi))
     rate = float(rng.uniform(0.03, 0.12))
     ramp = Command(2.0, slope=slope, slope_rate=rate)
@@ -154,16 +94,11 @@ def tilt(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 def swing(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     """Swings a load downhill and outwards with the arm, on a slope."""
-    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 4.5)
+    poses = Poses(robot, rng)
+    load = poses.load(1.0, 4.5)
     heading = float(rng.uniform(-pi, pi))
-    q = poses.vector(
-        turret_joint=heading + pi, shoulder_joint=radians(80), elbow_joint=radians(-60)
-    )
-    end = poses.vector(
-        turret_joint=heading + rng.uniform(-0.4, 0.4),
-        shoulder_joint=radians(rng.uniform(20, 70)),
-        elbow_joint=radians(rng.uniform(-60, 0)),
-    )
+    q = poses.at(READY, heading + pi)
+    end = poses.at(SWUNG, heading + rng.uniform(-0.4, 0.4))
     go = Command(2.0, joints=poses.named(end), speed=float(rng.uniform(0.25, 0.8)))
     slope = radians(rng.uniform(8.0, 24.0)), heading
     return Scenario('swing', seconds, poses.named(q), slope, load, (go,))
@@ -171,11 +106,9 @@ def swing(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 def reach(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     """Stretches the arm forward with a load on level ground until a motor is saturated."""
-    poses, load = Poses(robot, rng), _load(robot, rng, 1.5, 5.0)
-    q = poses.vector(shoulder_joint=radians(rng.uniform(75, 110)), elbow_joint=radians(-120))
-    out = poses.vector(
-        shoulder_joint=radians(rng.uniform(15, 60)), elbow_joint=radians(rng.uniform(-40, 10))
-    )
+    poses = Poses(robot, rng)
+    load = poses.load(1.5, 5.0)
+    q, out = poses.at(DRAWN_IN), poses.at(STRETCHED)
     go = Command(2.0, joints=poses.named(out), speed=float(rng.uniform(0.15, 0.6)))
     return Scenario('reach', seconds, poses.named(q), (0.0, 0.0), load, (go,))
 
@@ -193,22 +126,17 @@ def snatch(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 def _grasp(robot: Robot, rng: Rng, seconds: float, lifting: float) -> Scenario:
     poses = Poses(robot, rng)
     side = float(rng.choice([-1.0, 1.0])) * rng.uniform(radians(60), radians(120))
-    q = poses.vector(
-        turret_joint=side,
-        shoulder_joint=radians(rng.uniform(20, 60)),
-        elbow_joint=radians(rng.uniform(-50, 0)),
-    )
-    take = Command(5.0, payload=_load(robot, rng, 1.0, 6.0), payload_time=lifting)
+    q = poses.at(ASIDE, side)
+    take = Command(5.0, payload=poses.load(1.0, 6.0), payload_time=lifting)
     empty, slope = Payload(0.0, robot.payload.cog), (radians(rng.uniform(0, 12)), side)
     return Scenario('grasp', seconds, poses.named(q), slope, empty, (take,))
 
 
 def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     """Drives fast and stops dead, again and again, on a slope with a load held up."""
-    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 5.0)
-    q = poses.vector(
-        shoulder_joint=radians(rng.uniform(70, 90)), elbow_joint=radians(rng.uniform(-40, 0))
-    )
+    poses = Poses(robot, rng)
+    load = poses.load(1.0, 5.0)
+    q = poses.at(HELD_UP)
     slope = radians(rng.uniform(5.0, 24.0)), float(rng.choice([0.0, pi]))
     commands: list[Command] = []
     for begin in np.arange(3.0, seconds - 2.0, 3.0).tolist():
@@ -220,21 +148,14 @@ def dash(robot: Robot, rng: Rng, seconds: float) -> Scenario:
 
 def climb(robot: Robot, rng: Rng, seconds: float) -> Scenario:
     """Climbs a step, stairs or a ramp with a load held back or to a side."""
-    poses, load = Poses(robot, rng), _load(robot, rng, 1.0, 6.0)
-    q = poses.vector(
-        turret_joint=rng.uniform(radians(90), radians(270)),
-        shoulder_joint=radians(rng.uniform(40, 80)),
-        elbow_joint=radians(rng.uniform(-60, 0)),
-    )
+    poses = Poses(robot, rng)
+    load = poses.load(1.0, 6.0)
+    q = poses.at(BACK, rng.uniform(radians(90), radians(270)))
     blocks, lean = _obstacle(robot, rng, 0.075)
     go = Command(2.0, drive=(float(rng.uniform(0.15, 0.35)), 0.0))
     return Scenario(
         'climb', seconds, poses.named(q), (0.0, 0.0), load, (go,), blocks=blocks, lean=lean
     )
-
-
-def _load(robot: Robot, rng: Rng, low: float, high: float) -> Payload:
-    return Payload(float(rng.uniform(low, high)), robot.payload.cog)
 
 
 KINDS: dict[str, Kind] = {

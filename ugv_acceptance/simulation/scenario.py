@@ -1,10 +1,12 @@
 """The input and output of a simulated run: commands at times, sensor noise, and the recording."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.roles import roles_of
 from ugv_acceptance.simulation.shape import Block
 from ugv_acceptance.type_aliases import Floats
 
@@ -12,6 +14,8 @@ NO_LOAD = Payload()
 # Lean (rad) from which a robot is off its stance (2 deg), and from which it counts as tipped
 # (15 deg), although its arm may then keep it from turning over.
 LIFTED, TIPPED = 0.035, 0.262
+# Noise of an effort as a share of the least limit of the robot's motors.
+EFFORT_NOISE = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,17 @@ class Noise:
     orientation_step: float = 2.0**-16
     gyro_step: float = 2.0**-12
     acceleration_step: float = 2.0**-9
+
+
+def noise_of(robot: Robot) -> Noise:
+    """Return the usual noise; efforts of a robot with weak motors are measured as much finer."""
+    wheels = roles_of(robot).wheels
+    limits = [robot.joint(name).effort for name in robot.joint_names if name not in wheels]
+    usual = Noise()
+    effort = EFFORT_NOISE * min(limits, default=math.inf)
+    if effort >= usual.effort:
+        return usual
+    return replace(usual, effort=effort, effort_step=2.0 ** math.floor(math.log2(effort / 4.0)))
 
 
 @dataclass(frozen=True, slots=True)

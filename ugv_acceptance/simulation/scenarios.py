@@ -1,14 +1,14 @@
-"""The fixed scenarios of the PackBot that ships."""
+"""The fixed scenarios: those of the PackBot that ships, and by roles those of any robot."""
 
 from collections.abc import Callable
 from math import pi, radians
 
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.simulation.fixed_runs import FIXED
+from ugv_acceptance.simulation.poses import STOWED, is_packbot
 from ugv_acceptance.simulation.scenario import Command, Scenario
 from ugv_acceptance.simulation.shape import ramp
 
-# Flippers folded back along the tracks, arm folded over the deck.
-STOWED = (('flipper_joint', pi), ('shoulder_joint', radians(115)), ('elbow_joint', radians(-140)))
 RIGHT = -pi / 2
 
 
@@ -87,3 +87,8 @@ SCENARIOS: dict[str, Callable[[], Scenario]] = {
     'overreach': overreach,
     'fetch': fetch,
 }
+
+
+def scenario_of(name: str, robot: Robot) -> Scenario:
+    """Return a fixed scenario by name: PackBot's own, or by the roles of the robot's joints."""
+    return SCENARIOS[name]() if is_packbot(robot) else FIXED[name](robot)

@@ -17,6 +17,7 @@ from ugv_acceptance.simulation.scenario import Command
 from ugv_acceptance.simulation.vehicle import (
     SERVO,
     Build,
+    drive,
     gravity_on_slope,
     set_brakes,
     set_payload,
@@ -94,6 +95,7 @@ class Simulation:
         self.data = mujoco.MjData(self.vehicle.model)
         first = dict(start)
         _check_joints(robot, first)
+        self._wheels = {roller.joint for _, roller in self.vehicle.wheels}
         self._moves = [_Move(first.get(name, 0.0)) for name in robot.joint_names]
         self._slope = [_Move(part) for part in _parts(*slope)]
         self._load, self._mass = load, _Move(load.mass)
@@ -123,13 +125,16 @@ class Simulation:
         return float(self.data.time)
 
     def apply(self, command: Command) -> None:
-        """Carry out a command now. Raises BadConfig for a joint that the robot does not move."""
+        """Carry out a command now; a wheel's target is left out, as `drive` turns it.
+
+        Raises BadConfig for a joint that the robot does not move.
+        """
         targets = dict(command.joints)
         _check_joints(self.robot, targets)
         now = self.time
         self._steered_until = now
         for k, name in enumerate(self.robot.joint_names):
-            if name in targets:
+            if name in targets and name not in self._wheels:
                 at = self._moves[k].at(now)[0]
                 self._moves[k] = _move(at, targets[name], command.speed, now)
         for k, speed in enumerate(command.drive or ()):
@@ -183,14 +188,17 @@ class Simulation:
         if self._braked != (forward == yaw == 0.0):
             self._braked = not self._braked
             set_brakes(vehicle, on=self._braked)
-        for wheel, y in vehicle.wheels:
-            control[wheel] = (forward - yaw * y) / vehicle.build.wheel_radius
-        mass = self._mass.at(time)[0]
-        borne = vehicle.model.body_mass[vehicle.payload]
-        if abs(mass - borne) > _NOTICED or (over and mass != borne):
-            set_payload(vehicle, replace(self._load, mass=mass))
+        drive(vehicle, control, forward, yaw)
+        if vehicle.payload >= 0:
+            self._bear(self._mass.at(time)[0], over=over)
         gravity = gravity_on_slope(self.robot.gravity, *self._slope_at(time))
         vehicle.model.opt.gravity[:] = gravity
+
+    def _bear(self, mass: float, *, over: bool) -> None:
+        """Put a mass (kg) into the gripper, if it differs enough or all changes are `over`."""
+        borne = self.vehicle.model.body_mass[self.vehicle.payload]
+        if abs(mass - borne) > _NOTICED or (over and mass != borne):
+            set_payload(self.vehicle, replace(self._load, mass=mass))
 
     def slope(self) -> tuple[float, float]:
         """Return tilt and heading (rad) of the ground."""

@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.simulation.engine import mujoco
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, tune, vehicle_of
+from ugv_acceptance.simulation.vehicle import (
+    Build,
+    Vehicle,
+    drive,
+    gravity_on_slope,
+    tune,
+    vehicle_of,
+)
 from ugv_acceptance.type_aliases import Floats
 
 FIXED = Build(base='fixed', motors=False)
@@ -85,14 +92,17 @@ def _follow(vehicle: Vehicle, start: Floats, rate: Floats, times: Floats) -> Swe
     model, data = vehicle.model, mujoco.MjData(vehicle.model)
     step = model.opt.timestep
     data.qpos[vehicle.position] = data.ctrl[vehicle.motor] = start - rate * LEAD / 2.0
+    drive(vehicle, data.ctrl, 0.0, 0.0)
     mujoco.mj_step(model, data, nstep=round(SETTLE / step))
     rows, count = [], -round(LEAD / step)
     for time in times:
         while count < round(time / step):
             data.ctrl[vehicle.motor] = start + rate * _target(count * step)
+            drive(vehicle, data.ctrl, 0.0, 0.0)
             mujoco.mj_step(model, data)
             count += 1
         data.ctrl[vehicle.motor] = start + rate * _target(count * step)
+        drive(vehicle, data.ctrl, 0.0, 0.0)
         mujoco.mj_forward(model, data)
         rows.append(_sample(vehicle, data))
     return _sweep(rows)

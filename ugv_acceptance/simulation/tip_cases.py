@@ -10,10 +10,17 @@ from numpy.typing import ArrayLike
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import stability, stances_of, standing
+from ugv_acceptance.model.tree import tree_of
 from ugv_acceptance.processes import Workers
 from ugv_acceptance.simulation.engine import mujoco
 from ugv_acceptance.simulation.oracle import LAST, Truth, tip_truth
-from ugv_acceptance.simulation.vehicle import Build, Vehicle, gravity_on_slope, vehicle_of
+from ugv_acceptance.simulation.vehicle import (
+    Build,
+    Vehicle,
+    body_name,
+    gravity_on_slope,
+    vehicle_of,
+)
 from ugv_acceptance.type_aliases import Floats
 
 # Step (rad) of the grid of tilts on which the model's tilt is looked for, then interpolated.
@@ -78,13 +85,14 @@ def random_cases(
 
 
 def clear_of_ground(vehicle: Vehicle, q: Floats) -> bool:
-    """Return whether all links but those with contacts are above the ground."""
+    """Return whether all links that joints move, but those with contacts, are above the ground."""
     model, robot = vehicle.model, vehicle.robot
     data = mujoco.MjData(model)
     data.qpos[vehicle.position] = q
     mujoco.mj_kinematics(model, data)
-    feet = {c.link for c in robot.contacts}
-    bodies = [model.body(link.name).id for link in robot.links if link.name not in feet]
+    feet, frames = {c.link for c in robot.contacts}, tree_of(robot).frames
+    names = [link.name for link in robot.links if frames[link.name][0] and link.name not in feet]
+    bodies = [model.body(body_name(name)).id for name in names]
     return bool((data.xpos[bodies, 2] > 0.0).all() and (data.xipos[bodies, 2] > 0.0).all())
 
 

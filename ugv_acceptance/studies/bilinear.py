@@ -82,12 +82,19 @@ def basis(robot: Robot, joint: int, values: Floats) -> Floats:
     return _basis(values, prismatic=_prismatic(robot, joint))
 
 
-def check_alone(robot: Robot, joint: str) -> None:
-    """Raise BadConfig for a joint of which torques are no sinusoid: with a spring or followers."""
+def why_not_alone(robot: Robot, joint: str) -> str:
+    """Return why torques are no sinusoid of a joint: a spring or followers; empty: they are."""
     follows = [mimic.joint for mimic in robot.mimics if mimic.follows == joint]
     sprung = any(law.joint == joint and law.stiffness for law in robot.laws)
-    if follows or sprung:
-        why = 'a spring acts on it' if sprung else f'{", ".join(follows)} moves with it'
+    if sprung:
+        return 'a spring acts on it'
+    return f'{", ".join(follows)} moves with it' if follows else ''
+
+
+def check_alone(robot: Robot, joint: str) -> None:
+    """Raise BadConfig for a joint of which torques are no sinusoid: with a spring or followers."""
+    why = why_not_alone(robot, joint)
+    if why:
         raise BadConfig(f'joint {joint}: expected one that moves alone and without a spring: {why}')
 
 

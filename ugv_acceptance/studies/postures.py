@@ -1,4 +1,4 @@
-"""Sets of postures: random over the joints' ranges, and sweeps of one joint."""
+"""Postures: at rest, random over the joints' ranges, and sweeps of one joint."""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +7,15 @@ import numpy as np
 
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.type_aliases import Floats
+
+
+def rest_posture(robot: Robot) -> Floats:
+    """Return the posture (j,) in rad (m) with each joint at 0, or amid a range without it."""
+    found = []
+    for name in robot.joint_names:
+        low, high = robot.joint(name).travel()
+        found.append(0.0 if low <= 0.0 <= high else (low + high) / 2.0)
+    return np.array(found)
 
 
 def random_postures(robot: Robot, count: int, seed: int) -> Floats:

@@ -82,8 +82,9 @@ def risk_kernel(
     """
     unknown = [name for name in names if name not in known_names(robot)]
     if unknown:
+        joint = robot.joint_names[0] if robot.joint_names else 'JOINT'
         raise BadConfig(
-            f'{unknown[0]}: expected slope, heading, payload.mass, a joint ({robot.joint_names[0]}'
+            f'{unknown[0]}: expected slope, heading, payload.mass, a joint ({joint}'
             f'.position, .rate, .limit, .x) or a link ({robot.links[0].name}.mass, .x)'
         )
     tree = _without(robot, names)

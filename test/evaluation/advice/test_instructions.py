@@ -94,3 +94,14 @@ def test_a_load_is_set_down_and_how_much_of_it_is_too_much() -> None:
     assert load_words(4.0, None) == load_words(4.0, 4.0) == 'set the load of 4.0 kg down'
     heavy = 'set the load down: 4.0 kg is 1.5 kg too heavy in this posture'
     assert load_words(4.0, 2.5) == heavy
+
+
+def test_the_axis_counts_as_it_stands_not_as_its_link_has_it() -> None:
+    """A lift about z of a frame that is rolled over lifts, as makers of arms write it."""
+    rolled = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+    joints = tuple(
+        replace(j, rotation=rolled, axis=(0.0, 0.0, -1.0)) if j.name == 'shoulder' else j
+        for j in TRACKED.joints
+    )
+    found = words(replace(TRACKED, joints=joints), 'shoulder', 0.5, (0.0,) * 4)
+    assert found.startswith(('raise the shoulder', 'lower the shoulder'))

@@ -1,12 +1,15 @@
 """Alerts in words: every number that a sentence holds, in its unit, with its limit."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation.streams import T0, settings
+from foreign_files import mobile_arm, rover
 
-from ugv_acceptance.evaluation.alerts.messages import advice, describe
+from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, advice, describe
 from ugv_acceptance.evaluation.alerts.robot_words import tilt_left
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
 from ugv_acceptance.evaluation.alerts.tipping_watch import trend_words
@@ -93,3 +96,16 @@ def test_a_trend_is_told_by_its_cause(slope: float, left: float, told: str) -> N
         np.array([WARN], np.int8), np.array([1], np.int8), np.radians([slope]), np.array([left])
     )
     assert trend_words(one, 0).startswith(told)
+
+
+def test_a_rover_is_told_of_its_wheels_and_of_no_arm(tmp_path: Path) -> None:
+    """What to do names what the robot has; a tracked one with an arm is told as ever."""
+    robot = load(rover(tmp_path)).settings.robot
+    told = [advice(code, robot) for code in ALERTS]
+    assert not [text for text in told if 'track' in text or 'lower the arm' in text]
+    assert advice('TIP_OVER', robot) == 'face the slope; if the robot stands well, check the IMU'
+    assert advice('NO_SUPPORT', robot) == 'stop; check that the robot stands on its wheels'
+    packbot = load().settings.robot
+    assert all(advice(code, packbot) == advice(code) for code in ALERTS)
+    armed = load(mobile_arm(tmp_path)).settings.robot
+    assert advice('TIP_OVER', armed).startswith('lower the arm over the wheels, face the slope')

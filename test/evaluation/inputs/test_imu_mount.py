@@ -9,6 +9,7 @@ import pytest
 from evaluation.streams import (
     MS,
     T0,
+    Carry,
     Imu,
     Joints,
     Message,
@@ -105,6 +106,29 @@ def test_a_prefix_before_every_frame_is_understood() -> None:
     run = run_of(1.0, imu=measured(LEANING, SIDEWAYS, 'r1_imu_link'))
     told = replace(with_imu(settings(AUTO)), frame_prefix='r1_')
     np.testing.assert_allclose(gravities(told, run)[0][-1], down(LEANING), atol=1e-9)
+
+
+def test_another_robots_imu_is_not_taken_for_ours() -> None:
+    """Where the prefix of our frames is known, another namespace is another robot."""
+    told = replace(with_imu(settings(AUTO)), frame_prefix='r1/')
+    for frame, ours in (('r1/imu_link', True), ('/r1/imu_link', True), ('r2/imu_link', False)):
+        found, _ = gravities(told, run_of(0.5, imu=measured(LEANING, SIDEWAYS, frame)))
+        assert (found[-1] is not None) == ours
+
+
+def test_a_payload_in_a_frame_with_the_prefix_is_carried() -> None:
+    """Live and recorded alike."""
+    told = replace(settings(), frame_prefix='r1_')
+    run: list[Message] = [Carry(T0, 3.0, frame='r1_hand'), *run_of(0.5)]
+    evaluator = LiveEvaluator(told)
+    evaluator.start(T0)
+    for message in run:
+        give(evaluator, message)
+    assert evaluator.load_known
+    assert evaluator.payload.mass == 3.0
+    _, other = recorded(told, [run], T0 + S)
+    assert other.first_payload is not None
+    assert not [a for a in other.watch.log if a.rule.code == 'PAYLOAD_INVALID']
 
 
 def test_static_transforms_tell_it_where_the_urdf_does_not() -> None:
@@ -224,6 +248,29 @@ def test_on_an_arm_the_attitude_of_the_base_follows_from_the_joints(
     assert len(known) > 790
     np.testing.assert_allclose(known, np.tile(down(LEANING), (len(known), 1)), atol=1e-9)
     assert not [a for a in alerts if a.rule.code.startswith('IMU_')]
+
+
+@pytest.mark.parametrize('velocities', [True, False])
+def test_old_joint_states_of_a_fast_arm_tell_no_attitude(
+    velocities: bool,  # noqa: FBT001 - a case
+) -> None:
+    """What the arm may have turned since would be a wrong tilt; nor is the IMU blamed for it."""
+    messages: list[Message] = []
+    for k in range(800):
+        now, phase = T0 + 10 * k * MS, k / 60.0
+        q, rate = 0.6 * math.sin(phase), math.cos(phase)
+        if k % 10 == 0:
+            given = (-rate, 0.0) if velocities else ()
+            messages.append(Joints(now, position=(0.1 - q, 0.0), velocity=given))
+        turn = Rotation.from_rotvec([0.0, -q, 0.0]) * SIDEWAYS
+        omega = tuple(turn.inv().apply([0.0, -rate, 0.0]))
+        messages.append(replace(on_the_arm(q, LEANING), time=now + MS, omega=omega))
+    found, alerts = gravities(with_imu(settings(AUTO), 'arm'), messages)
+    known = np.array([row for row in found if row is not None])
+    assert 0.3 < len(known) / len(found) < 0.9
+    cosine = known @ down(LEANING) / 9.81**2
+    assert np.degrees(np.arccos(np.minimum(cosine, 1.0))).max() < 5.0
+    assert not alerts
 
 
 def test_a_joint_that_is_not_known_makes_the_attitude_unknown() -> None:

@@ -20,6 +20,8 @@ export class SafeMap {
   describe(hello) {
     this.hello = hello;
     this.names = hello.joints.map((j) => j.name);
+    $('safe-map').hidden = !hello.axes; // a robot without two joints to move
+    if (!hello.axes) return;
     ['axis-x', 'axis-y'].forEach((id, k) => {
       $(id).replaceChildren(...this.names.map((name) => { const o = element('option', '', nice(name)); o.value = name; return o; }));
       $(id).value = hello.axes[k];

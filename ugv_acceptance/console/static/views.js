@@ -75,15 +75,18 @@ export class Views {
     // Turned so that gravity points down the screen.
     const cos = -gravity[1] / size, sin = -gravity[0] / size;
     const scale = Math.min(width / 2, height * 0.66) / this.reach;
+    const z = p.polygon.length ? p.polygon.reduce((s, q) => s + q[2], 0) / p.polygon.length : p.body[0][2];
+    // Base_link at 0.7 of the height, higher where the ground would not be seen.
+    const origin = Math.min(height * 0.7, height * 0.95 + z * scale);
     const at = (q) => {
       const [u, v] = flat(q);
-      return [width / 2 + (u * cos - v * sin) * scale, height * 0.7 - (u * sin + v * cos) * scale];
+      return [width / 2 + (u * cos - v * sin) * scale, origin - (u * sin + v * cos) * scale];
     };
     const line = (a, b) => { c.beginPath(); c.moveTo(...at(a)); c.lineTo(...at(b)); c.stroke(); };
     c.lineWidth = 1; c.setLineDash([4, 5]); c.strokeStyle = '#555';
-    c.beginPath(); c.moveTo(0, height * 0.7); c.lineTo(width, height * 0.7); c.stroke();
+    c.beginPath(); c.moveTo(0, origin); c.lineTo(width, origin); c.stroke();
     c.setLineDash([]);
-    const far = 3 * this.reach, z = p.polygon.length ? p.polygon.reduce((s, q) => s + q[2], 0) / p.polygon.length : p.body[0][2];
+    const far = 3 * this.reach;
     c.lineWidth = 4; c.strokeStyle = '#6b4a1f';
     if (id === 'from-side') line([-far, 0, z], [far, 0, z]); else line([0, -far, z], [0, far, z]);
     const [lo, hi] = p.body;

@@ -10,19 +10,24 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ugv_acceptance.evaluation.advice.paths import Path, joint_paths, turn_paths
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
 from ugv_acceptance.model.statics import centre_of_gravity, payload_capacity
+from ugv_acceptance.model.tree import body_positions, drives_of, pose_of
 from ugv_acceptance.type_aliases import Floats
 
 # A motion is called up or down if its height is at least this share of its length.
 STEEP = 0.35
+# A joint turns something to the left or right if the height of its axis is more than this of it.
+UPRIGHT = 0.9
 
 
 def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
@@ -32,10 +37,11 @@ def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
     if joint.slides:
         return f'{"extend" if amount > 0.0 else "retract"} the {name} by {abs(amount) * 100:.0f} cm'
     by = f'by {abs(math.degrees(amount)):.0f} deg'
-    if abs(joint.axis[2]) > 0.9:
-        left = amount * joint.axis[2] > 0.0
-        return f'turn the {name} {by} to the {"left" if left else "right"}'
     start = path.q[step] - (np.array(robot.joint_names) == path.subject) * amount
+    upright = _upright(robot, start.tolist(), path.subject)
+    if abs(upright) > UPRIGHT:
+        left = amount * upright > 0.0
+        return f'turn the {name} {by} to the {"left" if left else "right"}'
     before, after = centre_of_gravity(robot, np.stack((start, path.q[step])), payload)
     moved = after - before
     up = -path.gravity[step] / np.linalg.norm(path.gravity[step])
@@ -43,6 +49,15 @@ def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
     if abs(rise) >= STEEP * float(np.linalg.norm(moved)):
         return f'{"raise" if rise > 0.0 else "lower"} the {name} {by}'
     return f'swing the {name} {by} {"forward" if moved[0] > 0.0 else "back"}'
+
+
+def _upright(robot: Robot, q: Sequence[float], joint: str) -> float:
+    """Return the height of a joint's axis, a unit vector in `base_link`, in a posture (j,)."""
+    tree = mechanics_of(robot).tree
+    pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
+    number = next(k for k, body in enumerate(tree.bodies) if body.joint == joint)
+    upright: Any = pose.axis[number][2]
+    return float(upright)
 
 
 def turn_words(amount: float, gravity: Floats) -> str:

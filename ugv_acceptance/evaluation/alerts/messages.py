@@ -6,10 +6,16 @@ from ugv_acceptance.evaluation.alerts.alert_text import AlertText
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_alerts import IMU_ALERTS
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
-from ugv_acceptance.evaluation.alerts.robot_words import height, moving, relaxed_limit, tilt_left
+from ugv_acceptance.evaluation.alerts.robot_words import (
+    height,
+    moving,
+    of_robot,
+    relaxed_limit,
+    tilt_left,
+)
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import TURNING
+from ugv_acceptance.model.robot import TURNING, Robot
 
 # A level as people read it; machines (ROS, JSON, CSV, files of criteria and plans) read LEVELS.
 LEVELS_FOR_PEOPLE = dict(zip(LEVELS, ('OK', 'CAUTION', 'DANGER', 'NO DATA'), strict=True))
@@ -260,7 +266,7 @@ def describe(alert: Alert, settings: Settings) -> str:
         limit = _torque(rule.subject, settings)
     if rule.code == 'TIP_OVER':
         peak, limit = math.degrees(-peak), math.degrees(-rule.on)
-    text = ALERTS[rule.code].happened
+    text = of_robot(ALERTS[rule.code].happened, robot)
     if alert.detail and '{detail}' not in text:
         text += ': {detail}'
     return text.format(
@@ -291,9 +297,9 @@ def _torque(subject: str, settings: Settings) -> float:
     return settings.limits.torque[names.index(subject)] if subject in names else math.inf
 
 
-def advice(code: str) -> str:
-    """Return what to do about an alert."""
-    return ALERTS[code].to_do
+def advice(code: str, robot: Robot | None = None) -> str:
+    """Return what to do about an alert, of `robot` or of a tracked one with an arm."""
+    return of_robot(ALERTS[code].to_do, robot) if robot else ALERTS[code].to_do
 
 
 def suspect_of(code: str) -> str:

@@ -1,7 +1,31 @@
-"""What the numbers of alerts about the robot mean in words: tilt left, motion, clearance."""
+"""Words of alerts for the robot at hand: its tilt left, motion, clearance, and what it has."""
 
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Robot
+from ugv_acceptance.model.roles import LEGGED, WHEELED, roles_of
+
+# The sentences are those of a tracked robot with an arm; what stands in place of its words.
+_UNDER = {
+    WHEELED: (('an end of the tracks', 'a wheel'), ('tracks', 'wheels')),
+    LEGGED: (('an end of the tracks', 'a foot'), ('tracks', 'feet')),
+}
+_WITHOUT_ARM = (
+    ('lower the arm over the tracks, face', 'face'),
+    ('; lower the arm over the tracks before', ' before'),
+    ('; lower the arm over the tracks, bring the load closer', ''),
+    ('bring the load closer, lower the arm, face', 'face'),
+    ('; bring the arm low and to the high side', ''),
+)
+
+
+def of_robot(text: str, robot: Robot) -> str:
+    """Return a sentence about a tracked robot with an arm as it is for another robot."""
+    roles = roles_of(robot)
+    without = () if roles.arm else _WITHOUT_ARM
+    for words, instead in (*without, *_UNDER.get(roles.kind, ())):
+        text = text.replace(words, instead)
+    return text
 
 
 def tilt_left(degrees: float) -> str:

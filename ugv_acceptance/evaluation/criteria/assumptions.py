@@ -11,7 +11,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement
-from ugv_acceptance.evaluation.criteria.not_judged import not_judged
+from ugv_acceptance.evaluation.criteria.not_judged import left_open, not_judged
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.ground import FLAT
@@ -43,7 +43,8 @@ def assumptions(
     if not sources:
         why = 'the configuration states no uncertainty (+/-) of its numbers'
         found.append(NotChecked('margins without a bound', why))
-    return Statement(not_checked=tuple(found))
+    open_ = left_open(settings)
+    return Statement(objections=open_.objections, not_checked=(*open_.not_checked, *found))
 
 
 def _ground(settings: Settings) -> Iterator[NotChecked]:
@@ -87,7 +88,7 @@ def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
             yield NotChecked(f'criterion {criterion.name}', why)
     values = [c.demand for c in criteria.criteria if isinstance(c.demand, Value)]
     sides = {v.of for v in values if v.signal == 'tip_angle'}
-    if not sides and settings.hears_imu:
+    if not sides and settings.judges_tilt:
         yield NotChecked('degrees of tilt left', 'no criterion demands any')
     elif ANY not in sides and len(sides) < 4:
         yield NotChecked('degrees of tilt left', f'criteria demand them only to the {_of(sides)}')

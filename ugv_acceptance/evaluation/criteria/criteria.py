@@ -170,7 +170,7 @@ def default_criteria(settings: Settings) -> CriteriaSet:
     ]
     criteria = (
         *torque,
-        *(_standing(limits.tip_error) if settings.hears_imu else ()),
+        *(_standing(limits.tip_error) if settings.judges_tilt else ()),
         Criterion(
             'coverage',
             DataDemand('coverage', least=LEAST_COVERAGE),

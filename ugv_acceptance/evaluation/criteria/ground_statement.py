@@ -91,7 +91,7 @@ class GroundExamination:
     @property
     def _rough(self) -> float:
         """Seconds with margins on ground that is not flat; 0 where tip-over is not judged."""
-        return float(self._held[1:].sum()) / 1e9 if self.settings.hears_imu else 0.0
+        return float(self._held[1:].sum()) / 1e9 if self.settings.judges_tilt else 0.0
 
     def statement(self, start: int, end: int) -> Statement:
         """Return what was found in the recording from `start` to `end` (ns)."""

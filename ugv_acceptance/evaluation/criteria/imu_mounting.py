@@ -8,6 +8,7 @@ from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 from ugv_acceptance.evaluation.inputs.imu_mount import NOBODY, ImuMount, Mounted, source_words
+from ugv_acceptance.evaluation.inputs.imu_turn import LATE
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Matrix
@@ -53,8 +54,9 @@ def _unchecked(settings: Settings, found: Mounted) -> Iterator[NotChecked]:
         names = ', '.join(robot.joint_names[j] for j in found.joints)
         yield NotChecked(
             f'tilt while {names} moves',
-            'the IMU is on that link: the tilt follows from the newest joint states, and is off by '
-            'what the joint turned since then',
+            'the IMU is on that link: the tilt follows from the newest joint states, and may be '
+            f'off by what the joints turned since, about {math.degrees(LATE):.0f} degrees at most: '
+            'where it could be more, no margin is known',
         )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
-from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.evaluation.settings import CONTACTS, PAYLOAD_LINK, Settings
 from ugv_acceptance.model.clearance import unread_links
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Robot
@@ -43,13 +43,47 @@ def kept_words(settings: Settings, *, rough: bool = False) -> str:
 
     Where the ground is not flat (`rough`) no margin tells that the robot is far from tipping.
     """
-    if not settings.hears_imu:
+    if not settings.judges_tilt:
         return 'all torque margins kept, tip-over not checked'
     if rough:
         return 'the robot has not begun to tip; how far it is from that is not known on this ground'
     if not settings.hears_joints:
         return 'all tip-over margins kept, no torque checked'
     return 'all margins kept'
+
+
+def unknown_words(settings: Settings) -> str:
+    """Return of what the configuration says `unknown`, as one sentence; '' if of nothing."""
+    if not settings.unknown:
+        return ''
+    return f'the configuration does not know {", ".join(settings.unknown)}: no OK without it'
+
+
+def left_open(settings: Settings) -> Statement:
+    """Return what hangs on values the configuration does not know: not checked, and no PASS."""
+    found = [(_safeguard_of(key), _hangs_on(key)) for key in settings.unknown]
+    objections = (
+        Objection(safeguard, INCONCLUSIVE, f'{one.what} not checked: {one.why}')
+        for safeguard, one in found
+    )
+    return Statement(objections=tuple(objections), not_checked=tuple(one for _, one in found))
+
+
+def _safeguard_of(key: str) -> str:
+    return {CONTACTS: 'tipping', PAYLOAD_LINK: 'payload'}.get(key, 'torque_limit')
+
+
+def _hangs_on(key: str) -> NotChecked:
+    """Return what is not checked without the value of a key of `Settings.unknown`."""
+    if key == CONTACTS:
+        why = 'on which points the robot stands is unknown: say contacts in its configuration'
+        return NotChecked('tip-over', why)
+    if key == PAYLOAD_LINK:
+        why = 'the link that carries it is unknown: say payload.link in the configuration'
+        return NotChecked('load', why)
+    joint = key.removeprefix('joints.').removesuffix('.limit')
+    why = f'its limit is unknown: say {key} in the configuration (null: it is not to be judged)'
+    return NotChecked(f'torque of {joint}', why)
 
 
 def not_judged(settings: Settings) -> Iterator[NotChecked]:
@@ -82,7 +116,9 @@ def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
     names = [
         name
         for name, limit in zip(robot.joint_names, limits, strict=True)
-        if math.isinf(limit) and name not in settings.passive
+        if math.isinf(limit)
+        and name not in settings.passive
+        and f'joints.{name}.limit' not in settings.unknown
     ]
     if not names:
         return

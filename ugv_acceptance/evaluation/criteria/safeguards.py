@@ -55,8 +55,8 @@ _SAID_BY = {
     'torque': 'torque_limit',
     'torque_margin': 'torque_limit',
 }
-# Safeguards that need an IMU.
-_OF_TILT = ('tipping', 'ground', 'chassis_acceleration', 'imu')
+# Safeguards that need an IMU, and contact points.
+_OF_TILT = ('tipping', 'ground', 'chassis_acceleration')
 # Stretches named in the reason.
 _MOST_NAMED = 3
 
@@ -149,7 +149,8 @@ def reasons_of(found: Safeguarded, verdict: str, failed: Sequence[Value]) -> lis
 def safeguards_result(found: Safeguarded, criteria: CriteriaSet, settings: Settings) -> list[Json]:
     """Return the outcome of every safeguard for JSON: the worst of its objections."""
     judged = any(isfinite(limit) for limit in settings.limits.torque)
-    checked = {'torque_limit': judged, **dict.fromkeys(_OF_TILT, settings.hears_imu)}
+    checked = {'torque_limit': judged, 'imu': settings.hears_imu}
+    checked |= dict.fromkeys(_OF_TILT, settings.judges_tilt)
     reasons = dict(criteria.waive)
     every = [*found.objections, *(objection for objection, _ in found.waived)]
     result: list[Json] = []

@@ -19,6 +19,7 @@ from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
 from ugv_acceptance.evaluation.inputs.imu_rest import RestChecks
 from ugv_acceptance.evaluation.inputs.imu_seen import ImuSeen, rested_messages
+from ugv_acceptance.evaluation.inputs.imu_turn import Raw
 from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPass
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
@@ -117,7 +118,7 @@ class ImuTracker:
         self.settings = settings
         self.motion.adopt(settings)
 
-    def step(
+    def step(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
         now: int,
         stamp: int,
@@ -126,8 +127,13 @@ class ImuTracker:
         omega: Sequence[float],
         acceleration: Sequence[float],
         frame: str = '',
+        raw: Raw | None = None,
     ) -> tuple[Vector, bool]:
-        """Take one message in sensor axes; return `gravity` and `unusable` as in ImuRows."""
+        """Take one message in sensor axes; return `gravity` and `unusable` as in ImuRows.
+
+        `raw` is the message before it was turned into base axes, if it was: what holds the IMU's
+        numbers against each other needs no joints.
+        """
         smooth = self.low_pass.step(stamp, acceleration)
         size = _norm(smooth)
         imu, g = self.settings.imu, self.settings.robot.gravity
@@ -157,7 +163,7 @@ class ImuTracker:
         seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
         lost = seen and self._judge(now, empty, strange, doubted)
         motion = self.motion
-        motion.step(now, stamp, orientation, omega, acceleration, told)
+        motion.step(now, stamp, *(raw or (orientation, omega, acceleration)), told)
         if imu.specific_force:
             known = believable and size >= FALL * g
             down = _force(smooth, omega, imu) if known else NOWHERE
@@ -182,8 +188,11 @@ class ImuTracker:
         self._busy = not all(signal.quiet for signal in signals)
         return lost
 
-    def columns(self, segments: Sequence[ImuColumns]) -> ImuRows:
-        """Take many messages: the same rows as `step` one at a time, in order of receipt."""
+    def columns(self, segments: Sequence[ImuColumns], raw: Floats | None = None) -> ImuRows:
+        """Take many messages: the same rows as `step` one at a time, in order of receipt.
+
+        `raw` (n, 10) are orientation, rate and force as of `step`, in order of receipt.
+        """
         columns = [s for s in segments if len(s.log_time)]
         if not columns:
             none = np.empty(0, np.int64)
@@ -203,7 +212,7 @@ class ImuTracker:
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
             told_by = q, covariance_0, omega, acceleration
-            return self._rows(time, stamp, told_by, smooth, foreign)
+            return self._rows(time, stamp, told_by, (smooth, raw), foreign)
 
     def _take_frames(self, time: Times, names: NDArray[np.str_]) -> None:
         """Take the frame that each message names, in order of receipt."""
@@ -219,17 +228,17 @@ class ImuTracker:
         time: Times,
         stamp: Times,
         told_by: tuple[Floats, Floats, Floats, Floats],
-        smooth: Floats,
+        made: tuple[Floats, Floats | None],
         foreign: Floats,
     ) -> ImuRows:
-        """Return the rows from `told_by` and `smooth`.
+        """Return the rows from `told_by` and what was `made` of it: `smooth`, and `raw` if turned.
 
         Orientation, covariance, rate and acceleration have shapes (4, n), (n,), (3, n) and (3, n);
         `smooth` (3, n) is the filtered acceleration, `foreign` (n,) is 1 for messages of another
         frame.
         """
         imu, g = self.settings.imu, self.settings.robot.gravity
-        q, covariance_0, omega, acceleration = told_by
+        (q, covariance_0, omega, acceleration), (smooth, raw) = told_by, made
         size, spin = _norms(smooth), _norms(omega)
         off, still = np.abs(size - g), spin <= imu.rest_rate
         given = covariance_0 != -1.0
@@ -261,7 +270,8 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        samples = np.column_stack((q.T, omega.T, acceleration.T, told))
+        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw,)
+        samples = np.column_stack((*felt, told))
         trusted = self._judge_motion(time, stamp, samples, gravity)
         self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable, trusted)

@@ -269,7 +269,8 @@ class MotionChecks:
         self._tell(of.rotation, now, 0.0 if self._calm >= CALM else turn)
         self._tell(of.sources, now, source)
         if row >= PLACING and (self.mounting.kind != 0.0 or not of.mounting.quiet):
-            self._tell(of.mounting, now, self.mounting.judge(grid, row), now - self._began)
+            found = self.mounting.judge(grid, row, now)
+            self._tell(of.mounting, now, found, now - self._began)
 
     def _gravity(self, row: int, now: int) -> float:
         """Tell where orientation and mean acceleration differ; return the unit of the latter.

@@ -7,6 +7,7 @@ measured, by the newest positions and rates of these joints; all checks then wor
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import reduce
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,15 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.inputs.frames import Place, place_of, without_prefix
 from ugv_acceptance.evaluation.inputs.imu import ImuRows, ImuTracker
-from ugv_acceptance.evaluation.inputs.imu_turn import Felt, Turn, in_order, rows_of, runs_of
+from ugv_acceptance.evaluation.inputs.imu_turn import (
+    Felt,
+    Raw,
+    Turn,
+    in_order,
+    raw_of,
+    rows_of,
+    runs_of,
+)
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.row_ends import preceded
@@ -22,6 +31,7 @@ from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import AUTO, GIVEN, UNKNOWN, Settings
 from ugv_acceptance.model.carried import carriers
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
+from ugv_acceptance.type_aliases import Floats
 
 Mask = NDArray[np.bool_]
 
@@ -54,25 +64,52 @@ class Mounted:
     held: tuple[tuple[str, float], ...] = ()
 
 
+class Joints(Protocol):
+    """The newest joint states, as JointMerger holds them."""
+
+    @property
+    def q(self) -> Sequence[float]:
+        """Positions (j,), rad or m."""
+
+    @property
+    def qd(self) -> Sequence[float]:
+        """Rates (j,), rad/s or m/s."""
+
+    @property
+    def seen(self) -> Sequence[int]:
+        """When each joint was last received (ns)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Messages of an IMU in order; which are `told` (n,), None: all; `raw` (n, 10) if turned."""
+
+    columns: Sequence[ImuColumns]
+    told: Mask | None = None
+    raw: Floats | None = None
+
+
 @dataclass(slots=True)
 class ImuMount:
     """Decides how the IMU is mounted, and turns its messages into base axes where joints move it.
 
-    Each of `settle` is called when that is decided, with the settings to work by from then on.
     `signal` is bad while it is not known; `doubt`, which says that gravity denies the mounting, is
     told where that comes from. While not `busy` messages can be taken as they come;
-    else `told` says whether the newest message's attitude is known.
+    else `told` says whether the newest message's attitude is known, and `raw` is the message as it
+    came if it was turned into base axes.
     """
 
     settings: Settings
     signal: Signal
     doubt: Signal
-    settle: Sequence[Callable[[Settings], None]] = ()
     found: Mounted | None = None
     frame: str = ''
     told: bool = True
     busy: bool = field(init=False)
+    raw: Raw | None = None
     _turn: Turn | None = None
+    _tracker: ImuTracker | None = None
+    _place: Callable[[Settings], None] = lambda _: None
 
     def __post_init__(self) -> None:
         imu = self.settings.imu
@@ -84,18 +121,23 @@ class ImuMount:
         elif self.busy and imu.placed == AUTO and imu.frame:
             self._decide(imu.frame)
 
+    def serve(self, tracker: ImuTracker, place: Callable[[Settings], None]) -> None:
+        """Tell `tracker` how the IMU is mounted when that is decided, and call `place`."""
+        self._tracker, self._place = tracker, place
+        if self._turn is not None:
+            tracker.motion.mounting.raised = self._turn.raised
+
     def applied(self, settings: Settings) -> Settings:
         """Return settings in which the IMU is placed as it was decided; as they are before that."""
         found = self.found
         if found is None or (settings.imu.placed == GIVEN and not settings.imu.link):
             return settings
         frame = settings.imu.frame or (found.frame if settings.imu.placed == AUTO else '')
-        here = {'placed': GIVEN, 'link': '', 'frame': frame, 'transforms': ()}
+        here = replace(settings.imu, placed=GIVEN, link='', frame=frame, transforms=())
+        turned, place = found.rotation, found.xyz
         if self._turn is not None:
-            imu = replace(settings.imu, mounting=IDENTITY, position=ZERO, **here)
-        else:
-            imu = replace(settings.imu, mounting=found.rotation, position=found.xyz, **here)
-        return replace(settings, imu=imu)
+            turned, place = IDENTITY, ZERO
+        return replace(settings, imu=replace(here, mounting=turned, position=place))
 
     @property
     def seeks(self) -> bool:
@@ -118,6 +160,8 @@ class ImuMount:
     def learn(self, settings: Settings) -> None:
         """Take settings with other transforms: they may tell where the named frame is."""
         self.settings = settings
+        if self._turn is not None:
+            self._turn.settings = settings
         if self.seeks:
             self._decide(self.frame)
 
@@ -135,29 +179,28 @@ class ImuMount:
         if self.found is not None and not self.signal.quiet:
             self.signal.step(now, 0.0)
 
-    def one(
-        self, now: int, frame: str, felt: Felt, q: Sequence[float], rates: Sequence[float]
-    ) -> Felt:
+    def one(self, now: int, frame: str, felt: Felt, joints: Joints) -> Felt:
         """Take a message: orientation, its covariance_0, rate, force; return it in base axes."""
         self.hear(now, frame)
         self.told = self.found is not None
         if self._turn is None:
             self.busy = not self.told
             return felt
-        found = self._turn.one(felt, q, rates)
+        orientation, _, omega, force = felt
+        self.raw = orientation, omega, force
+        age = (now - min(joints.seen)) * 1e-9
+        found = self._turn.one(age, felt, joints.q, joints.qd)
         self.told = found is not None
         return found or ((0.0, 0.0, 0.0, 0.0), -1.0, NOWHERE, NOWHERE)
 
-    def parts(
-        self, segments: Sequence[ImuColumns], joints: JointRows
-    ) -> Iterator[tuple[Sequence[ImuColumns], Mask | None]]:
-        """Yield messages in base axes part by part, in order, with which of them are `told`.
+    def parts(self, segments: Sequence[ImuColumns], joints: JointRows) -> Iterator[Part]:
+        """Yield messages in base axes part by part, in order.
 
-        `joints` are the joint states, preceded by the newest before them. None: all are told.
+        `joints` are the joint states, preceded by the newest before them.
         """
         columns = [s for s in segments if len(s.log_time)]
         if not self.busy or not columns:
-            yield segments, None
+            yield Part(segments)
             return
         names, every = in_order(columns)
         time = every.log_time
@@ -170,20 +213,18 @@ class ImuMount:
             self.hear(int(time[0]), str(names[0]))
             yield self._part(names, every, joints)
 
-    def _part(
-        self, names: NDArray[np.str_], every: ImuColumns, joints: JointRows
-    ) -> tuple[Sequence[ImuColumns], Mask | None]:
+    def _part(self, names: NDArray[np.str_], every: ImuColumns, joints: JointRows) -> Part:
         n = len(every.log_time)
         if self.found is None:
             if not self.signal.raw:
                 self._reason()
             feed(self.signal, every.log_time, np.ones(n))
-            return runs_of(names, every), np.zeros(n, np.bool_)
+            return Part(runs_of(names, every), np.zeros(n, np.bool_))
         if self._turn is None:
             self.busy = False
-            return runs_of(names, every), None
+            return Part(runs_of(names, every))
         turned, told = self._turn.columns(every, joints)
-        return runs_of(names, turned), told
+        return Part(runs_of(names, turned), told, raw_of(every))
 
     def _reason(self) -> None:
         self.signal.detail = self.why
@@ -197,8 +238,11 @@ class ImuMount:
         if self.found is not None:
             self.told = True
             self._work()
-            for take in self.settle:
-                take(self.applied(self.settings))
+            placed = self.applied(self.settings)
+            self._place(placed)
+            if self._tracker is not None:
+                self._tracker.adopt(placed)
+                self.serve(self._tracker, self._place)
 
     def _work(self) -> None:
         """Begin to work by what was found."""
@@ -208,6 +252,8 @@ class ImuMount:
             self._turn = Turn(self.settings, found.joints, *of)
         if found is not None and self.settings.imu.placed == AUTO:
             self.doubt.detail = f'imu.mounting: auto took it from {source_words(found)}'
+        elif found is not None and found.joints:
+            self.doubt.detail = f'the configuration says that it is on {found.link}'
 
 
 def source_words(found: Mounted) -> str:
@@ -233,7 +279,10 @@ def mounted(settings: Settings, frame: str) -> Mounted | None:
         (without_prefix(parent, prefix), without_prefix(child, prefix), xyz, rotation)
         for parent, child, xyz, rotation in imu.transforms
     ]
-    place = place_of(robot, without_prefix(frame, prefix), transforms)
+    bare = without_prefix(frame, prefix)
+    if prefix and '/' in bare:  # another robot's
+        return None
+    place = place_of(robot, bare, transforms)
     links = {link.name for link in robot.links}
     source = URDF if place is not None and place.steps[0] in links else TF_STATIC
     return _on(robot, source, frame.lstrip('/'), place)
@@ -273,12 +322,12 @@ def felt_by(
         return felt, tracker.columns(felt)
     turned: list[ImuColumns] = []
     found: list[ImuRows] = []
-    for part, told in mount.parts(felt, reduce(preceded, joints)):
-        rows = tracker.columns(part)
-        if told is not None:
-            rows.gravity[~told], rows.unusable[~told] = np.nan, False
+    for part in mount.parts(felt, reduce(preceded, joints)):
+        rows = tracker.columns(part.columns, part.raw)
+        if part.told is not None:
+            rows.gravity[~part.told], rows.unusable[~part.told] = np.nan, False
         found.append(rows)
-        turned += part
+        turned += part.columns
     names = [f.name for f in fields(ImuRows)]
     together = (np.concatenate([getattr(rows, n) for rows in found]) for n in names)
     return turned, ImuRows(*together)

@@ -5,7 +5,7 @@ mounted, not how the robot stands.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ugv_acceptance.evaluation.inputs.imu_cell import BODY, ORIENTED, SECONDS, SQUARE
@@ -81,15 +81,22 @@ class Mounting:
     """Whether the IMU is mounted as configured, judged from its first two seconds on.
 
     `kind` is None until that is known, 0 if it is so, else the number in MOUNTING_KINDS of how it
-    looks mounted; it is so again once the lean is below 45 degrees.
+    looks mounted; it is so again once the lean is below 45 degrees. `raised(now)` is the base's z
+    in the sensor's axes if a joint moves the IMU.
     """
 
     imu: ImuInput
     kind: float | None = None
+    raised: Callable[[int], Vector] | None = None
+    _z: Vector = (0.0, 0.0, 1.0)
 
-    def judge(self, grid: ImuGrid, end: int) -> float:
-        """Take the window that ends at the row `end` of the grid; return `kind`, NaN for None."""
-        if self.imu.placed != GIVEN:
+    def judge(self, grid: ImuGrid, end: int, now: int) -> float:
+        """Take the window that ends at the row `end` of the grid and at `now` (ns).
+
+        Return `kind`, NaN for None.
+        """
+        self._z = self.raised(now) if self.raised else self.imu.mounting[2]
+        if self.imu.placed != GIVEN or math.isnan(self._z[0]):
             return math.nan
         if self.kind == 0.0:
             return 0.0
@@ -108,7 +115,7 @@ class Mounting:
 
     def _height(self, up: Vector) -> float:
         """Return the cosine of the lean."""
-        (x, y, z), (a, b, c) = self.imu.mounting[2], up
+        (x, y, z), (a, b, c) = self._z, up
         return x * a + y * b + z * c
 
     def _leans(self, up: Vector) -> bool:

@@ -10,16 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.inputs.joint_rows import JointRows
+from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.carried import carried_kernel
 from ugv_acceptance.model.kernels import Kernel
 from ugv_acceptance.model.robot import Matrix, Vector
-from ugv_acceptance.type_aliases import Floats
+from ugv_acceptance.type_aliases import Floats, Times
 
 Mask = NDArray[np.bool_]
 # Of a message: orientation x y z w, its covariance_0, rate (rad/s), specific force (m/s2).
 Felt: TypeAlias = tuple[Sequence[float], float, Sequence[float], Sequence[float]]
+# Orientation, rate and force of a message in the sensor's axes.
+Raw: TypeAlias = tuple[Sequence[float], Sequence[float], Sequence[float]]
+# A joint that may have turned by more than this (rad) since its position came tells no attitude.
+LATE = 0.05
 # The numbers of a message that vary: orientation, rate, force.
 WIDTH = 10
 
@@ -28,8 +33,9 @@ WIDTH = 10
 class Turn:
     """Turns messages by the positions and rates of `joints` (numbers), which move the IMU's `link`.
 
-    What an IMU repeats to the last digit is repeated here as well, so that a frozen one is found
-    although its joints move. A message before these joints are known cannot be turned.
+    A message cannot be turned before these joints are known, nor while they may have turned by more
+    than LATE since the oldest of their positions. `raised(now)` is the base's z in the
+    sensor's axes at the message received at `now` (ns), NaN where it is not known.
     """
 
     settings: Settings
@@ -38,52 +44,59 @@ class Turn:
     mounting: Matrix
     position: Vector
     kernel: Kernel = field(init=False)
-    _raw: tuple[float, ...] = ()
-    _turned: Felt | None = None
+    _turning: tuple[int, ...] = field(init=False)
+    _times: Times = field(default_factory=lambda: np.zeros(1, np.int64))
+    _raised: Sequence[Sequence[float]] | Floats = (NOWHERE,)
 
     def __post_init__(self) -> None:
         of = self.link, self.mounting, self.position
-        self.kernel = carried_kernel(self.settings.robot, *of)
+        robot = self.settings.robot
+        self.kernel = carried_kernel(robot, *of)
+        slides = [robot.joint(name).slides for name in robot.joint_names]
+        self._turning = tuple(j for j in self.joints if not slides[j])
 
-    def one(self, felt: Felt, q: Sequence[float], rates: Sequence[float]) -> Felt | None:
-        """Take a message with the newest positions and rates (j,); None where they are unknown."""
+    def one(
+        self, age: float, felt: Felt, q: Sequence[float], rates: Sequence[float]
+    ) -> Felt | None:
+        """Take a message with the newest positions and rates (j,); None where it cannot be turned.
+
+        `age` (s) is that of the oldest position.
+        """
         orientation, covariance_0, omega, force = felt
-        raw = (*orientation, *omega, *force)
-        if raw == self._raw and self._turned is not None and self._holds(raw):
-            turned, _, spin, push = self._turned
-            return turned, covariance_0, spin, push
-        self._raw, self._turned = raw, None
-        if not all(math.isfinite(q[j]) and math.isfinite(rates[j]) for j in self.joints):
+        self._raised = (NOWHERE,)
+        if not all(math.isfinite(q[j]) for j in self.joints):
             return None
-        turned, spin, push = self.kernel.one(*map(_number, q), *map(_number, rates), *raw)
-        if self._untold(orientation):
-            turned = orientation
-        self._turned = turned, covariance_0, spin, push
-        return self._turned
-
-    def _holds(self, raw: Sequence[float]) -> bool:
-        """Return whether a message that is repeated stands still: without noise it may not."""
-        return not self.settings.imu.noise_free and all(map(math.isfinite, raw))
-
-    def _untold(self, orientation: Sequence[float]) -> bool:
-        """Return whether an orientation may be only a default: it is left as it is."""
+        if not age * sum(abs(rates[j]) for j in self._turning) <= LATE:
+            return None
+        raw = (*orientation, *omega, *force)
+        turned, spin, push, *self._raised = self.kernel.one(
+            *map(_number, q), *map(_number, rates), *raw
+        )
         x, y, z, _ = orientation
-        return self.settings.imu.attitude == 'auto' and x == y == z == 0.0
+        if self.settings.imu.attitude == 'auto' and x == y == z == 0.0:
+            turned = orientation  # it may be only a default
+        return turned, covariance_0, spin, push
+
+    def raised(self, now: int) -> Vector:
+        """Return the base's z in the sensor's axes at a message received at `now` (ns)."""
+        at = int(np.searchsorted(self._times, now, side='right')) - 1
+        x, y, z = self._raised[max(at, 0)]
+        return float(x), float(y), float(z)
 
     def columns(self, every: ImuColumns, joints: JointRows) -> tuple[ImuColumns, Mask]:
         """Take messages (n,) in order of receipt; return them turned, and which could be.
 
         `joints` are joint states in order of receipt, the first of them older than all messages.
         """
-        raw = np.column_stack(
-            (every.orientation, every.angular_velocity, every.linear_acceleration)
-        )
+        raw = raw_of(every)
         at = np.searchsorted(joints.time, every.log_time, side='right') - 1
         q, rates = joints.q[at], joints.qd[at]
-        mine = list(self.joints)
-        known = np.isfinite(q[:, mine]).all(axis=1) & np.isfinite(rates[:, mine]).all(axis=1)
+        known = np.logical_and.reduce(np.isfinite(q[:, list(self.joints)]), axis=1)
+        age = (every.log_time - joints.oldest[at]) * 1e-9
+        # Added one after the other, as in `one`.
+        known &= age * sum(np.abs(rates[:, j]) for j in self._turning) <= LATE
         numbers = [np.where(np.isfinite(x), x, 0.0) for x in (*q.T, *rates.T)]
-        turned = np.empty((len(raw), WIDTH))
+        turned = np.empty((len(raw), WIDTH + 3))
         with np.errstate(all='ignore'):
             found = self.kernel.many(*numbers, *raw.T)
         for k, column in enumerate(value for part in found for value in part):
@@ -91,34 +104,16 @@ class Turn:
         if self.settings.imu.attitude == 'auto':
             untold = ~every.orientation[:, :3].any(axis=1)
             turned[untold, :4] = every.orientation[untold]
-        turned, known = self._repeated(raw, turned, known)
         covariance = np.where(known, every.orientation_covariance_0, -1.0)
         turned[~known] = np.nan
         turned[~known, :4] = 0.0
+        self._times, self._raised = every.log_time, turned[:, WIDTH:]
         return _with(every, turned, covariance), known
 
-    def _repeated(self, raw: Floats, turned: Floats, known: Mask) -> tuple[Floats, Mask]:
-        """Let what is repeated be repeated: the counterpart of the first lines of `one`."""
-        before = self._turned
-        last = self._raw
-        rows = np.arange(len(raw))
-        if not self.settings.imu.noise_free:
-            other = np.append(False, (raw[1:] != raw[:-1]).any(axis=1))
-            begins = other | ~np.isfinite(raw).all(axis=1)
-            again = before is not None and not begins[0] and tuple(raw[0].tolist()) == last
-            begins[0] = True
-            starts = np.flatnonzero(begins)
-            first = np.minimum.reduceat(np.where(known, rows, len(rows)), starts)
-            source = np.minimum(np.repeat(first, np.diff(np.append(starts, len(rows)))), rows)
-            if again and before is not None:
-                end = int(starts[1]) if len(starts) > 1 else len(rows)
-                turned[:end] = (*before[0], *before[2], *before[3])
-                known[:end], source[:end] = True, rows[:end]
-            turned, known = turned[source], known[source]
-        self._raw = tuple(raw[-1].tolist())
-        x = turned[-1].tolist()
-        self._turned = (tuple(x[:4]), 0.0, tuple(x[4:7]), tuple(x[7:])) if known[-1] else None
-        return turned, known
+
+def raw_of(every: ImuColumns) -> Floats:
+    """Return orientation, rate and force of messages as rows (n, WIDTH)."""
+    return np.column_stack((every.orientation, every.angular_velocity, every.linear_acceleration))
 
 
 def in_order(columns: Sequence[ImuColumns]) -> tuple[NDArray[np.str_], ImuColumns]:
@@ -153,7 +148,7 @@ def _with(every: ImuColumns, turned: Floats, covariance: Floats) -> ImuColumns:
         every.stamp,
         np.ascontiguousarray(turned[:, :4]),
         np.ascontiguousarray(turned[:, 4:7]),
-        np.ascontiguousarray(turned[:, 7:]),
+        np.ascontiguousarray(turned[:, 7:WIDTH]),
         covariance,
         every.angular_velocity_covariance_0,
         every.linear_acceleration_covariance_0,

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_set
+from ugv_acceptance.evaluation.inputs.joint_names import names_words, near_names, what_to_set
 from ugv_acceptance.evaluation.inputs.turns import FULL
 from ugv_acceptance.evaluation.settings import JointInput, Settings
 from ugv_acceptance.model.robot import Joint
@@ -78,7 +78,10 @@ def foreign_words(settings: Settings, names: Iterable[str]) -> str:
     wanted = list(
         zip(settings.robot.joint_names, (how.topic_name for how in settings.joints), strict=True)
     )
-    return f'none names a joint of the robot; {_others(wanted, told)}'
+    others = _others(wanted, told)
+    if not near_names([name for _, name in wanted], told):
+        others += '; if this is another robot, ugv-acceptance init writes its configuration'
+    return f'none names a joint of the robot; {others}'
 
 
 def _others(wanted: Sequence[tuple[str, str]], names: Sequence[str]) -> str:

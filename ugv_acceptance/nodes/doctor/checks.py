@@ -64,7 +64,7 @@ def examine(around: Surroundings, config: Config) -> Iterator[Finding]:
         yield from _own_description(around.robot, config)
     for warning in config.warnings:
         yield Finding(WARN, 'configuration', warning, 'see docs/robot_configuration.md')
-    if config.settings.hears_imu:
+    if config.settings.judges_tilt:
         kind = config.settings.ground.kind
         do = '' if kind else 'set ground.kind: flat, uneven or stairs'
         yield Finding(OK, 'ground', f'taken as {ground_words(kind)}', do)
@@ -93,8 +93,8 @@ def _own_description(told: Told, config: Config) -> Iterator[Finding]:
         text = f'nobody tells a URDF on {told.topic}: the one in force is compared with nothing'
         yield Finding(OK, name, text)
         return
-    for text in told.texts:
-        if other := difference_of(config, text, told.topic):
+    for one in told.texts:
+        if other := difference_of(config, one, told.topic):
             do = "configure the robot's own URDF, or none"
             yield Finding(FAIL, name, f'not the URDF in force: {other}', do)
             return

@@ -114,7 +114,7 @@ class Monitor(LifecycleNode):
 
     def _brought_up(self) -> bool:
         success = TransitionCallbackReturn.SUCCESS
-        return self.trigger_configure() == success and self.trigger_activate() == success
+        return bool(self.trigger_configure() == success and self.trigger_activate() == success)
 
     def _try_again(self) -> None:
         """Come up if the robot's description is there now; else say why not, once."""

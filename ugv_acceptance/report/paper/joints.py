@@ -26,12 +26,13 @@ PARTS = Parts()
 
 
 def check_parts(robot: Robot, parts: Parts = PARTS) -> None:
-    """Raise BadConfig where the robot has no turret, shoulder, elbow or flipper joint."""
+    """Raise BadConfig for another robot than the paper's, which has these joints."""
     for name in (parts.shoulder, parts.elbow, parts.turret, parts.flipper):
         if name not in robot.joint_names:
             raise BadConfig(
-                f'robot {robot.name}: expected a joint {name} for the figures of rollover, '
-                f'it has {", ".join(robot.joint_names)}'
+                f'paper: its numbers and figures are those of its own robot, a PackBot with two '
+                f'links: expected the configuration packbot, got {robot.name} without {name}; '
+                'model, map, speed and risk are for every robot'
             )
 
 

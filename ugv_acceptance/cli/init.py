@@ -1,0 +1,170 @@
+"""`ugv-acceptance init`: derives a robot's configuration from what its files and topics tell."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.options import Overwrite
+
+if TYPE_CHECKING:
+    from ugv_acceptance.cli.init_work import Found
+
+DONE, FAILS, OPEN = 0, 1, 3
+COLOURS = {
+    'ok': 'green',
+    'FAILS': 'bold red',
+    'open': 'yellow',
+    'not seen': 'dim',
+    'look': 'yellow',
+}
+
+
+def say(text: str) -> None:
+    """Say on a terminal what is being done; nothing in a script."""
+    if sys.stderr.isatty():
+        typer.echo(f'{text} ...', err=True)
+
+
+def is_asked() -> bool:
+    """Return whether a person is there who can be asked."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+def print_found(found: 'Found') -> int:
+    """Print checks, notes and what is open; return the exit code."""
+    from ugv_acceptance.configure.checks import exit_code
+
+    console = Console(highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ('check', '', 'what was found'):
+        table.add_column(column, overflow='fold')
+    for check in found.checks:
+        state = f'[{COLOURS[check.state]}]{check.state}[/]'
+        table.add_row(escape(check.what), state, escape(check.text))
+    for note in found.notes:
+        console.print(f'note: {escape(note)}', soft_wrap=True)
+    console.print(table)
+    for question in found.questions:
+        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
+        console.print(escape(text), soft_wrap=True)
+    code = exit_code(found.checks)
+    failed = [check.what for check in found.checks if check.state == 'FAILS']
+    words = {
+        DONE: f'done: {found.done}',
+        FAILS: f'NOT done, a check fails: {", ".join(failed)}',
+        OPEN: 'NOT done: something is open, and what hangs on it is not checked',
+    }
+    for path in found.written:
+        console.print(f'written: {escape(str(path))}', soft_wrap=True)
+    console.print(escape(words[code]), soft_wrap=True)
+    return code
+
+
+def init(
+    sources: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar='[SOURCE]...', help='A URDF or xacro, a recording, or both of one robot.'
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option('--out', '-o', help='The YAML to write.')] = Path(
+        'robot.yaml'
+    ),
+    live: Annotated[
+        bool, typer.Option('--live', help='Listen to the running robot: URDF, joints, IMU.')
+    ] = False,
+    seconds: Annotated[str, typer.Option('--for', help='With --live: how long.')] = '10s',
+    meshes: Annotated[
+        list[Path] | None,
+        typer.Option(help='Folder with packages or meshes that the robot names (repeatable).'),
+    ] = None,
+    xacro_arg: Annotated[
+        list[str] | None, typer.Option(help='Argument of the xacro, NAME:=VALUE (repeatable).')
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help='Draw the robot in this file: .png or .html.')
+    ] = None,
+    check: Annotated[
+        Path | None,
+        typer.Option(help='Check this configuration, against a recording if one is given.'),
+    ] = None,
+    mass: Annotated[
+        str | None, typer.Option(help='What it weighs on scales: 68kg; or urdf: as the URDF says.')
+    ] = None,
+    contacts: Annotated[
+        str | None, typer.Option(help='What touches the ground: yes (as found), no, LINK,LINK.')
+    ] = None,
+    tilt: Annotated[
+        str | None, typer.Option(help='The tilt of its contact points is real, or not-real.')
+    ] = None,
+    mounting: Annotated[
+        str | None,
+        typer.Option(help='How the IMU is turned: 180deg,-90deg,0; yes (as found); none.'),
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(help='JOINT=50 (N m; N of a slide), =none, =urdf; "*=urdf" (repeatable).'),
+    ] = None,
+    load_link: Annotated[
+        str | None, typer.Option(help='The link that carries the load, or none.')
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Derive a robot's configuration: contact points, joints, IMU, limits, with their sources.
+
+    Every line of the YAML says how sure it is. What no file tells is asked on a terminal, at most
+    five things; in a script the options answer. Without an answer it is written as unknown: what
+    hangs on it is not checked, and nothing passes. A xacro is a program: give only one you trust.
+
+    The exit code is 0 when done, 1 if a check fails, 2 for bad input, 3 if something is open.
+
+    \b
+    Examples:
+      ugv-acceptance init husky.urdf
+      ugv-acceptance init husky.urdf run/ --mass 52kg --picture husky.png
+      ugv-acceptance init robot.urdf.xacro --meshes ~/ws/src -o robot.yaml
+      ugv-acceptance init run/ --contacts wheel_1,wheel_2,wheel_3 --limit 'arm_*=urdf'
+      ugv-acceptance init --live --for 20s
+      ugv-acceptance init --check robot.yaml run/ --picture robot.html
+    """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from ugv_acceptance.cli.init_work import Asked, check_it, make_it
+    from ugv_acceptance.config import quantity
+    from ugv_acceptance.configure.questions import Answers
+
+    answers = Answers(mass, contacts, tilt, mounting, tuple(limit or ()), load_link)
+    heard = quantity(seconds, 'time', '--for') if live else None
+    arguments = dict(_argument(text) for text in xacro_arg or ())
+    asked = Asked(
+        tuple(sources or ()), tuple(meshes or ()), heard, arguments, picture, overwrite, say
+    )
+    if check is not None:
+        _refuse_answers(answers)
+        raise typer.Exit(print_found(check_it(check, asked)))
+    raise typer.Exit(print_found(make_it(out, asked, answers, _prompt if is_asked() else None)))
+
+
+def _argument(text: str) -> tuple[str, str]:
+    name, found, value = text.partition(':=')
+    if not found or not name:
+        raise BadConfig(f'--xacro-arg: expected NAME:=VALUE, got {text}')
+    return name, value
+
+
+def _refuse_answers(answers: object) -> None:
+    from ugv_acceptance.configure.questions import Answers
+
+    if answers != Answers():
+        raise BadConfig('--check: expected no answers beside it: it changes no configuration')
+
+
+def _prompt(text: str, guess: str) -> str:
+    """Ask a person a question; return what was typed, or the guess."""
+    told: str = typer.prompt(f'{text}\n ', default=guess, show_default=bool(guess))
+    return told
