@@ -158,7 +158,7 @@ class JointMerger:
                 self.q[j], self.seen[j] = untold.position, FOREVER
                 self.doubted = self._doubts()
         if late:
-            self.assumed |= self._untold.keys()
+            self.assumed.update(self._untold)
 
     @property
     def never_told(self) -> list[str]:
