@@ -146,8 +146,7 @@ class LiveEvaluator:
             if unusable and not watch.joints.invalid.raw:
                 watch.joints.invalid.detail = words.why_unusable(joints)
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
-        limit = self._fresh[0].limit
-        oldest = min(joints.seen)
+        limit, oldest = self._fresh[0].limit, min(joints.seen)
         # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
         late = oldest != NEVER or now - joints.began > STARTUP
         old = (late and now - oldest > limit) or joints.doubted

@@ -45,9 +45,9 @@ class JointMerger:
     names have such a message. `told` is what the last batch told, `turns` what messages told,
     `rates` (j,) tell which reported rates can be believed, `layouts` the lists of names that came.
 
-    A joint that no message told in STARTUP after the first is taken where `settings.untold` says,
-    until one tells it: its `seen` is FOREVER then. `assumed` are all that were ever taken so;
-    `doubted` says that one is now of which margins may be wrong.
+    A joint that no message told in STARTUP after the first, a harmless one at once, is taken where
+    `settings.untold` says, until one tells it: its `seen` is FOREVER then. `assumed` are all that
+    were taken so after STARTUP; `doubted` says that one is now of which margins may be wrong.
     """
 
     settings: Settings
@@ -140,8 +140,8 @@ class JointMerger:
             self._place(j, now, self.turns.told[j] if known else math.nan)
         if now // SECOND != layout.second or self._leaps.busy:
             self._leaps.look(now, layout, self.q)
-        if self._untold and now - self.began > STARTUP:
-            self._assume()
+        if self._untold:
+            self._assume(now - self.began > STARTUP)
         return True
 
     def _hear(self, layout: Layout) -> None:
@@ -151,13 +151,14 @@ class JointMerger:
                 self.seen[j] = NEVER
                 self.doubted = self._doubts()
 
-    def _assume(self) -> None:
-        """Take the joints that nobody told as held."""
+    def _assume(self, late: bool) -> None:  # noqa: FBT001 - whether STARTUP is over
+        """Take joints that nobody told as held: the harmless ones at once."""
         for j, untold in self._untold.items():
-            if self.seen[j] == NEVER:
+            if self.seen[j] == NEVER and (late or untold.harmless):
                 self.q[j], self.seen[j] = untold.position, FOREVER
-                self.assumed.add(j)
                 self.doubted = self._doubts()
+        if late:
+            self.assumed.update(self._untold)
 
     @property
     def never_told(self) -> list[str]:
@@ -365,10 +366,12 @@ class JointMerger:
 
     def _assume_rows(self, j: int, time: Times, q: Floats, seen: Times) -> Mask:
         """Take joint number j as held before the first row that names it; return where in doubt."""
-        rows: Mask = ((seen == NEVER) | (seen == FOREVER)) & (time - self.began > STARTUP)
+        late = time - self.began > STARTUP
+        rows: Mask = ((seen == NEVER) | (seen == FOREVER)) & (late | self._untold[j].harmless)
         if rows.any():
             q[rows], seen[rows] = self._untold[j].position, FOREVER
             self.seen[j] = FOREVER
+        if (rows & late).any():
             self.assumed.add(j)
         return np.zeros_like(rows) if self._untold[j].harmless else rows
 
