@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import PayloadMass, RobotFile, poses_like
+from ugv_acceptance.cli.options import PayloadMass, RobotFile
 
 if TYPE_CHECKING:
     from ugv_acceptance.model.robot import Robot
+    from ugv_acceptance.type_aliases import Floats
 
 
 def speed(
@@ -15,8 +16,7 @@ def speed(
     posture: Annotated[
         str,
         typer.Option(
-            help='Posture held while each joint turns: POSE or joint=30deg,...; by default all.',
-            autocompletion=poses_like,
+            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
         ),
     ] = '',
     payload: PayloadMass = '',
@@ -48,48 +48,48 @@ def speed(
     from ugv_acceptance.cli.robot_description import (
         payload_doubts,
         payload_from,
-        posture_from,
         warn,
     )
     from ugv_acceptance.config import load
-    from ugv_acceptance.studies.axes import check_stands_still
-    from ugv_acceptance.studies.postures import random_postures, sweeps
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
-    check_stands_still(robot, 'speed')
-    _check_joints(robot)
+    _check(robot)
     if reference <= 0.0:
         raise BadConfig(f'--reference: expected an error > 0 N m, got {reference:g}')
     load_carried, doubts = payload_from(robot, payload), payload_doubts(robot, payload)
     bound = critical or critical_value(samples=samples)
     if bound <= 1.0:
         raise BadConfig(f'--critical: expected a value > 1, got {bound:g}')
-    if posture:
-        sets = sweeps(robot, posture_from(robot, posture), samples)
-    else:
-        sets = [random_postures(robot, samples, seed=0)] * len(robot.joint_names)
     limits = [
-        float(speed_limit(robot, q, load_carried, reference, bound)[k]) for k, q in enumerate(sets)
+        float(speed_limit(robot, q, load_carried, reference, bound)[k])
+        for k, q in enumerate(_postures(robot, posture, samples))
     ]
     warn(doubts)
     if as_json:
-        degrees = [math.degrees(x) if np.isfinite(x) else None for x in limits]
-        found = dict(zip(robot.joint_names, degrees, strict=True))
-        document = {'critical_value': bound, 'speed_deg_s': found, 'warnings': doubts}
+        known = [x if np.isfinite(x) else None for x in limits]
+        pairs = [(robot.joint(n), x) for n, x in zip(robot.joint_names, known, strict=True)]
+        turns = {j.name: x and math.degrees(x) for j, x in pairs if not j.slides}
+        slides = {j.name: x for j, x in pairs if j.slides}
+        document = {'critical_value': bound, 'speed_deg_s': turns, 'warnings': doubts}
+        document |= {'speed_m_s': slides} if slides else {}
         typer.echo(json.dumps(document, indent=2))
         return
     typer.echo(
         f'{robot.name}, {load_carried.mass:g} kg, '
         f'error of the static model {reference:g} N m, F < {bound:.4f}'
     )
-    for line in _lines(robot, limits):
-        typer.echo(line)
+    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
+    for name, limit in zip(robot.joint_names, limits, strict=True):
+        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
 
 
-def _check_joints(robot: 'Robot') -> None:
+def _check(robot: 'Robot') -> None:
+    """Raise BadConfig for a robot whose joints do not move, or carry it as legs do."""
     from ugv_acceptance import BadConfig
+    from ugv_acceptance.studies.axes import check_stands_still
 
+    check_stands_still(robot, 'speed')
     if not robot.joint_names:
         raise BadConfig(
             f'speed: expected measured joints, {robot.name} has none: without joints that move, '
@@ -97,10 +97,14 @@ def _check_joints(robot: 'Robot') -> None:
         )
 
 
-def _lines(robot: 'Robot', limits: list[float]) -> list[str]:
-    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
-    pairs = zip(robot.joint_names, limits, strict=True)
-    return [f'  {name:{wide}}{_speed(robot, name, limit)}' for name, limit in pairs]
+def _postures(robot: 'Robot', posture: str, samples: int) -> 'list[Floats]':
+    """Return the postures (n, j) of each joint's motion: its sweep, or all that there are."""
+    from ugv_acceptance.cli.robot_description import posture_from
+    from ugv_acceptance.studies.postures import random_postures, sweeps
+
+    if posture:
+        return sweeps(robot, posture_from(robot, posture), samples)
+    return [random_postures(robot, samples, seed=0)] * len(robot.joint_names)
 
 
 def _speed(robot: 'Robot', name: str, limit: float) -> str:
