@@ -198,9 +198,8 @@ class LiveEvaluator:
         mount = self.mount
         if mount.busy:
             felt = orientation, covariance_0, omega, acceleration
-            orientation, covariance_0, omega, acceleration = mount.one(
-                now, frame, felt, self.joints
-            )
+            felt = mount.one(now, frame, felt, self.joints)
+            orientation, covariance_0, omega, acceleration = felt
         gravity, unusable = self._imu.step(
             now, stamp, orientation, covariance_0, omega, acceleration, frame, mount.raw
         )
@@ -213,9 +212,8 @@ class LiveEvaluator:
         margins = self._evaluate(now, stamp)
         angles: Any = margins.stability.angle if margins else None
         unknown = omega_covariance_0 == -1.0 or not self._imu.motion.gyro_trusted
-        rate = NO_RATE if unknown else WITNESSED
-        if covariance_0 == -1.0 and rate:
-            rate = UNWITNESSED
+        seen = UNWITNESSED if covariance_0 == -1.0 else WITNESSED
+        rate = NO_RATE if unknown else seen
         self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
         return margins
 
