@@ -173,6 +173,15 @@ def test_of_several_robots_the_description_in_the_namespace_of_the_joints_counts
     assert ugv.evaluate(bag).verdict == 'PASS'
 
 
+def test_more_texts_than_are_read_are_no_pass(tmp_path: Path, urdf: str) -> None:
+    """What was not read may be another robot: texts that always change cannot hide it."""
+    same = [f'{urdf}<!-- {k} -->' for k in range(8)]
+    assert ugv.evaluate(run(tmp_path, told(*same))).verdict == 'PASS'
+    found = ugv.evaluate(run(tmp_path, told(*same, heavier(urdf))))
+    assert found.verdict == 'INCONCLUSIVE'
+    assert 'more than 8 different texts' in found.reasons[0]
+
+
 HUSKY = ('front_left_wheel', 'front_right_wheel', 'rear_left_wheel', 'rear_right_wheel')
 UR5 = ('shoulder_pan_joint', 'shoulder_lift_joint', 'elbow_joint', 'wrist_1_joint')
 

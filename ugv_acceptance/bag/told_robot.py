@@ -15,6 +15,8 @@ from ugv_acceptance.bag.recording import Recording
 
 # Different texts that are kept; a robot has one.
 MOST_TEXTS = 8
+# A larger message (bytes) is not a robot's description.
+LARGEST = 20_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,13 @@ def description_message(urdf: bytes) -> bytes:
     return string_message(urdf.decode('utf-8', 'replace'))
 
 
+def description_of(data: bytes) -> str:
+    """Return the text of a robot's description; BadSample if the message holds none."""
+    if len(data) > LARGEST:
+        raise BadSample(f'expected a URDF below {LARGEST // 10**6} MB, got {len(data)} bytes')
+    return string_of(data)
+
+
 def descriptions_in(recording: Recording, name: str) -> Described:
     """Return the descriptions that a recording holds on the topic `name`.
 
@@ -51,11 +60,14 @@ def descriptions_in(recording: Recording, name: str) -> Described:
     texts: list[bytes] = []
     wrong: list[str] = []
     for message in _messages(bag, topics):
-        if message.data in seen or len(seen) >= MOST_TEXTS:
+        if message.data in seen:
             continue
+        if len(seen) == MOST_TEXTS:
+            wrong.append(f'more than {MOST_TEXTS} different texts, of which no more were read')
+            break
         seen.add(message.data)
         try:
-            texts.append(string_of(message.data).encode())
+            texts.append(description_of(message.data).encode())
         except BadSample as error:
             wrong.append(str(error))
     return Described(topics, tuple(dict.fromkeys(texts)), tuple(wrong))
@@ -86,10 +98,11 @@ def _messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
         return
     for member in sorted(bag.members, key=lambda member: member.span() or (0, 0)):
         held, expected = _only(member, wanted)
-        found = list(messages_of(held, wanted))
-        if held is not member and len(found) < expected:  # its index has left some out
-            found = list(messages_of(member, wanted))
-        yield from found
+        count = 0
+        for count, message in enumerate(messages_of(held, wanted), 1):  # noqa: B007 - used below
+            yield message
+        if held is not member and count < expected:  # its index has left some out
+            yield from messages_of(member, wanted)
 
 
 def _only(member: Member, wanted: set[str]) -> tuple[Member, int]:

@@ -15,7 +15,7 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
 from ugv_acceptance import BadConfig, BadSample
-from ugv_acceptance.bag.description import string_of
+from ugv_acceptance.bag.told_robot import description_of
 from ugv_acceptance.config import Config, description_topic, load
 from ugv_acceptance.config.same_robot import (
     FILE_AND_ROBOT,
@@ -227,7 +227,7 @@ def load_live(config: Path | None, urdf: Path | None, args: list[str]) -> Config
 
 def _told(data: bytes) -> str | BadSample:
     try:
-        return string_of(data)
+        return description_of(data)
     except BadSample as error:
         return error
     except Exception as error:  # noqa: BLE001 - no message may end the node
