@@ -135,8 +135,7 @@ class ImuTracker:
         numbers against each other needs no joints.
         """
         smooth = self.low_pass.step(stamp, acceleration)
-        size = _norm(smooth)
-        imu, g = self.settings.imu, self.settings.robot.gravity
+        size, imu, g = _norm(smooth), self.settings.imu, self.settings.robot.gravity
         if frame != self._frame:
             if self._frame is not None:
                 self.motion.frame(now)
@@ -146,10 +145,9 @@ class ImuTracker:
         still = spin <= imu.rest_rate
         rotation = covariance_0 != -1.0 and bool(_is_rotation(x, y, z, w))
         told = rotation and not (imu.attitude == 'auto' and x == y == z == 0.0)
-        shown = off <= GRAVITY_SLACK * g
+        shown, apart = off <= GRAVITY_SLACK * g, math.nan
         by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if rotation else NOWHERE
         by_acceleration = up_from_acceleration(*smooth, imu.mounting) if shown else NOWHERE
-        apart = math.nan
         if rotation and shown and still and off <= imu.rest_acceleration:
             apart = angle_between(by_orientation, by_acceleration)
         self.taken[0 if told else 1 if covariance_0 == -1.0 else 2] += 1
@@ -157,13 +155,15 @@ class ImuTracker:
         strange = off / g if still else math.nan
         believable = off == off and spin <= BELIEVABLE  # noqa: PLR0124 - not NaN
         doubted = apart if told else math.nan
-        of, rest = self.faults, self._rest
+        of, rest, motion = self.faults, self._rest, self.motion
         # Small values cannot change quiet signals: most calls are saved.
         seen = self._busy or self._foreign or empty >= 0.5 or rest.pending
         seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
         lost = seen and self._judge(now, empty, strange, doubted)
-        motion = self.motion
-        motion.step(now, stamp, *(raw or (orientation, omega, acceleration)), told)
+        if raw is None:
+            motion.step(now, stamp, orientation, omega, acceleration, told)
+        else:
+            motion.step(now, stamp, *raw, told)
         if imu.specific_force:
             known = believable and size >= FALL * g
             down = _force(smooth, omega, imu) if known else NOWHERE
