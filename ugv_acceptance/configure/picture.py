@@ -102,8 +102,9 @@ def _marks(robot: Robot, pose: Pose, parts: Sequence[Part]) -> Iterator[Mark]:
     most = np.array([height.max(axis=1) for height in heights]).reshape(-1, len(_WAYS))
     for contact in robot.contacts:
         _, at = point_of(tree, pose, contact.link, contact.position)
-        x, y, z = map(float, at)
-        yield Mark(contact.name, (x, y, z), _wrong(np.array((x, y, z)), most))
+        place = np.array(at, dtype=np.float64)
+        xyz = (float(place[0]), float(place[1]), float(place[2]))
+        yield Mark(contact.name, xyz, _wrong(place, most))
 
 
 def _wrong(at: Floats, most: Floats) -> str:
