@@ -33,8 +33,10 @@ ASKS_FOR: dict[str, tuple[list[str], str]] = {
     'init': (
         ['xacro', 'trimesh'],
         # No program of that name on the path either.
-        'import os; from pathlib import Path; os.environ["PATH"] = "";'
-        'from ugv_acceptance.configure.sources import expanded as f; f(Path("r.xacro"), (), {})',
+        (
+            'import os; from pathlib import Path; os.environ["PATH"] = "";'
+            'from ugv_acceptance.configure.sources import expanded as f; f(Path("r.xacro"), (), {})'
+        ),
     ),
     'pdf': (['weasyprint'], 'from ugv_acceptance.report.acceptance import pdf_of; pdf_of("")'),
     'sim': (['mujoco'], 'from ugv_acceptance.nodes.packbot_simulator import main; main([])'),
