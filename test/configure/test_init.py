@@ -169,17 +169,17 @@ def test_an_imu_against_gravity_fails_a_check(tmp_path: Path) -> None:
     assert 'IMU against gravity' in checked.stdout
 
 
-@pytest.mark.parametrize('wrong', ['raised', 'narrow'])
+@pytest.mark.parametrize('wrong', ['raised', 'narrow', 'away'])
 def test_a_wrong_contact_fails_a_check(tmp_path: Path, wrong: str) -> None:
     """Points in a tilted plane, or beside the centre of gravity, are told: exit 1."""
     assert init(tmp_path, rover(), '--mass', 'urdf').returncode == 0
     path = tmp_path / 'robot.yaml'
     text = path.read_text('utf-8')
-    found = (
-        text.replace('-0.15]', '-0.12]', 2)
-        if wrong == 'raised'
-        else text.replace('[-0.2,', '[0.1,')
-    )
+    found = {
+        'raised': text.replace('-0.15]', '-0.12]', 2),
+        'narrow': text.replace('[-0.2,', '[0.1,'),
+        'away': text.replace('[0.2, 0.275,', '[0.5, 0.375,'),
+    }[wrong]
     assert found != text
     path.write_text(found, 'utf-8')
     checked = ugv('init', '--check', path)

@@ -62,7 +62,8 @@ def test_the_console_says_what_is_unknown(key: str) -> None:
     assert margins is not None
     seen = Snapshot(
         1, OK, q=margins.q, torque=margins.torque, gravity=margins.gravity, known=True,
-        angle=tuple(map(float, margins.stability.angle)), state=int(margins.stability.state),
+        angle=tuple(float(angle) for angle in margins.stability.angle),
+        state=int(margins.stability.state),
     )  # fmt: skip
     frame = frame_of(seen, settings, figure_of(settings.robot))
     assert frame['level'] == 'STALE'

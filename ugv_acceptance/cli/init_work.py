@@ -82,7 +82,9 @@ def make_it(out: Path, asked: Asked, answers: Answers, prompt: Prompt | None) ->
     if told:
         written = yaml_of(draft)
         config = _loaded(written, text, out)
-    checks = checks_of(config, draft.urdf, positions(draft.home), evidence, questions_of(draft))
+    checks = checks_of(
+        config, draft.urdf, positions(draft.home), evidence, finder, questions_of(draft)
+    )
     if draft.joints.question:
         checks = (*checks, Check('joint names', OPEN, draft.joints.question))
     if made:
@@ -114,9 +116,11 @@ def check_it(path: Path, asked: Asked) -> Found:
         config = load(path, urdf_text=evidence.urdf if evidence else None)
     urdf = config.urdf
     posture = positions(rest_posture(urdf, evidence))
-    checks = checks_of(config, urdf, posture, evidence)
+    finder = mesh_finder(
+        config.path if config.description != 'file' else config.urdf_path, asked.meshes
+    )
+    checks = checks_of(config, urdf, posture, evidence, finder)
     if asked.picture is not None:
-        finder = mesh_finder(config.path, asked.meshes)
         _draw(asked.picture, config, urdf, posture, finder, checks, evidence)
     files = () if asked.picture is None else (asked.picture,)
     return Found(checks, config.warnings, (), files, 'no check fails')

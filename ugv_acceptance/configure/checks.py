@@ -14,7 +14,9 @@ from ugv_acceptance.config.setup_checks import DOUBT, SetupDoubt, setup_doubts
 from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.configure.evidence import Evidence, SeenImu
 from ugv_acceptance.configure.imu_gravity import up_of
+from ugv_acceptance.configure.outlines import FAR, away_from, outlines_of, reach_of
 from ugv_acceptance.configure.questions import Question
+from ugv_acceptance.configure.sources import MeshFinder
 from ugv_acceptance.evaluation.inputs.frames import place_of
 from ugv_acceptance.evaluation.settings import AUTO, UNKNOWN, Settings
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
@@ -29,6 +31,8 @@ OK, FAILS, OPEN, UNSEEN, LOOK = 'ok', 'FAILS', 'open', 'not seen', 'look'
 STANDS = 'how it stands'
 # A joint that nobody tells may carry so much of the mass, unless it is of the arm.
 SHARE = 0.05
+# A contact point so far (m) from all geometry is on none, whatever treads are not drawn.
+SURELY = 0.05
 # Up by the IMU at rest may be so far (rad) from up by the contact points: ground is not level.
 SLOPE = math.radians(10.0)
 
@@ -51,6 +55,7 @@ def checks_of(
     urdf: Urdf,
     posture: Mapping[str, float],
     evidence: Evidence | None,
+    meshes: MeshFinder,
     questions: Sequence[Question] = (),
 ) -> tuple[Check, ...]:
     """Return the checks of a configuration in a posture (rad, m), against what was seen if given.
@@ -60,6 +65,7 @@ def checks_of(
     settings = config.settings
     found = [
         *_stands(config, urdf, posture, evidence),
+        *_on_robot(config.settings.robot, urdf, posture, meshes),
         _told(settings, evidence),
         _gravity(config, posture, evidence),
         *(Check(q.key, OPEN, q.text) for q in questions),
@@ -96,6 +102,25 @@ def _stands(
         yield Check('.'.join(doubt.field), _state(doubt, evidence), doubt.words)
     if not doubts:
         yield Check(STANDS, OK, _balance(settings.robot, posture))
+
+
+def _on_robot(
+    robot: Robot, urdf: Urdf, posture: Mapping[str, float], meshes: MeshFinder
+) -> Iterator[Check]:
+    """Yield the contact points that are away from all geometry of the robot."""
+    if not robot.contacts:
+        return
+    outlines = outlines_of(urdf, posture, meshes)
+    reach, tree = reach_of(list(outlines.values())), tree_of(robot)
+    pose = pose_of(tree, body_positions(drives_of(robot, tree), positions_of(robot, posture)))
+    for contact in robot.contacts:
+        at = np.array(point_of(tree, pose, contact.link, contact.position)[1], dtype=np.float64)
+        off = away_from(at, reach)
+        if off > FAR:
+            # What was not read may be there.
+            known = contact.link in outlines and off > SURELY
+            words = f'{off * 1e3:.0f} mm away from all geometry of the robot that could be read'
+            yield Check(f'contacts.{contact.name}', FAILS if known else OPEN, words)
 
 
 def _state(doubt: SetupDoubt, evidence: Evidence | None) -> str:
