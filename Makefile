@@ -35,9 +35,10 @@ COLCON := out/colcon
 # Files and folders of tests that `make colcon` leaves to `make pytest`: what depends on the versions of Python and
 # NumPy is in the others, and in the nodes.
 ONCE := $(foreach name,angles bag_player console_inputs kills layers levels monitor_control monitor_inputs operator \
-    packbot_simulator page_of_ plain_english recipe relaxed restarted run_verb soak termination, \
+    own_description packbot_simulator page_of_ plain_english recipe relaxed restarted robot_listener run_verb soak \
+    termination, \
     '--ignore-glob=*test_$(name)*') \
-    $(foreach folder,bench campaign cases cli console error_rate hardening plan report run simulation studies, \
+    $(foreach folder,bench campaign cases cli configure console error_rate hardening plan report run simulation studies, \
     '--ignore-glob=*test/$(folder)/*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
