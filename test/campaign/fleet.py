@@ -15,7 +15,7 @@ from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.campaign.sources import Source
 from ugv_acceptance.campaign.work import Brief, Done
 from ugv_acceptance.config import load
-from ugv_acceptance.simulation.scenarios import STOWED as FOLDED
+from ugv_acceptance.simulation.poses import STOWED as FOLDED
 
 HOUR = 3_600_000_000_000
 EPOCH = 1_748_854_800_000_000_000

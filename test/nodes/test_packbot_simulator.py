@@ -192,7 +192,7 @@ def test_it_is_the_robot_of_its_configuration(live: Live, tmp_path: Path) -> Non
 
     def turned() -> bool:
         velocity.publish(ahead)
-        return min(told[-1].position) > 1.0
+        return bool(min(told[-1].position) > 1.0)
 
     live.until(turned)
     assert [name.endswith('_axle') for name in told[-1].name] == [True] * 4

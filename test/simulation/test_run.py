@@ -14,8 +14,9 @@ from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.simulation import shape
+from ugv_acceptance.simulation.poses import STOWED
 from ugv_acceptance.simulation.scenario import Command, Noise, Recording, Scenario
-from ugv_acceptance.simulation.scenarios import SCENARIOS, STOWED
+from ugv_acceptance.simulation.scenarios import SCENARIOS
 from ugv_acceptance.simulation.simulation import BUILD, Simulation
 from ugv_acceptance.simulation.stretches import run
 from ugv_acceptance.simulation.tip_cases import least_angle

@@ -12,9 +12,10 @@ from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.simulation.corruption import Corruption, weakened
 from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
 from ugv_acceptance.simulation.faults import Fault
+from ugv_acceptance.simulation.poses import STOWED
 from ugv_acceptance.simulation.repertoire import KINDS
 from ugv_acceptance.simulation.scenario import ImuLog, JointLog, Scenario
-from ugv_acceptance.simulation.scenarios import STOWED, gentle
+from ugv_acceptance.simulation.scenarios import gentle
 from ugv_acceptance.simulation.simulation import BUILD
 from ugv_acceptance.simulation.stretches import run, stretches
 

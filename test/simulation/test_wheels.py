@@ -13,9 +13,11 @@ from ugv_acceptance import BadConfig
 from ugv_acceptance.model.robot import Contact, Joint, Link, Matrix, Payload, Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.simulation.inertia import balanced_links
+from ugv_acceptance.simulation.power_loss import Released, power_loss
 from ugv_acceptance.simulation.scenario import Command
 from ugv_acceptance.simulation.shape import step
 from ugv_acceptance.simulation.simulation import BUILD, Simulation
+from ugv_acceptance.simulation.tip_cases import random_cases
 from ugv_acceptance.simulation.vehicle import Build, gravity_on_slope, vehicle_of
 
 FIXED = Build(base='fixed', motors=False)
@@ -138,6 +140,33 @@ def test_points_that_no_wheel_stands_on_roll_along() -> None:
     there = simulation.base()[0][0]
     simulation.advance(1.0)
     assert simulation.base()[0][0] == pytest.approx(there, abs=0.01)
+
+
+def test_wheels_are_not_let_go_when_the_power_goes() -> None:
+    """Measured wheels hold as held ones do: the falls and the brakes are of the arm alone."""
+    robot = arm_on_wheels()
+    axles = tuple(name for name, _ in robot.held)
+    told = replace(robot, joint_names=(*axles, *robot.joint_names), held=())
+    q = (0.0, -0.6, 0.9, 0.0, 0.0, 0.0)
+    weight = (0.0, 0.0, -9.81)
+    held = power_loss(Released(robot, q, robot.payload, weight))
+    measured = power_loss(Released(told, (0.3, 0.3, 0.3, 0.3, *q), robot.payload, weight))
+    assert [brake.joint for brake in measured.brakes] == [f'j{k}' for k in range(1, 7)]
+    assert measured.answer == held.answer
+    assert [f.turn for f in measured.falls] == pytest.approx([f.turn for f in held.falls], abs=1e-3)
+
+
+def test_random_cases_end_for_a_root_link_below_the_ground() -> None:
+    """Only what joints move has to be above it: footprints often are a little below."""
+    robot = arm_on_wheels()
+    sunk = replace(
+        robot,
+        contacts=tuple(
+            replace(c, position=(*c.position[:2], c.position[2] + 0.2)) for c in robot.contacts
+        ),
+        ground=robot.ground + 0.2,
+    )
+    assert len(random_cases(sunk, 3, seed=1)) == 3
 
 
 def test_no_load_leaves_every_mass_as_it_is() -> None:
