@@ -19,7 +19,7 @@ from ugv_acceptance.console.recording import RecordingFeed, ShownRecording, show
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
 from ugv_acceptance.evaluation.live import LiveEvaluator
 
-CONFIG = load()
+CONFIG = load('packbot')
 SETTINGS = CONFIG.settings
 BAGS = Path(__file__).parents[2] / 'bags'
 

@@ -22,6 +22,7 @@ ENTITIES = '<!DOCTYPE r [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>'
 LAUGHS = ''.join(f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 10))
 LAUGHS = f'<!DOCTYPE r [<!ENTITY a0 "ha">{LAUGHS}]>'
 EXTERNAL = '<!DOCTYPE r [<!ENTITY b SYSTEM "file:///etc/passwd">]>'
+SECOND_ROOT = '<link name="other"><inertial><mass value="3"/></inertial></link></robot>'
 SECOND_PARENT = (
     '<joint name="z" type="fixed"><parent link="base"/><child link="hand"/></joint></robot>'
 )
@@ -84,7 +85,7 @@ def hostile(folder: Path, patience: float = inf) -> Outcome:
         'external entity': (YAML, EXTERNAL + URDF.replace('name="two"', 'name="&b;"', 1)),
         'billion laughs': (YAML, LAUGHS + URDF.replace('name="two"', 'name="&a9;"', 1)),
         'two parents': (YAML, URDF.replace('</robot>', SECOND_PARENT)),
-        'two roots': (YAML, URDF.replace('</robot>', '<link name="other"/></robot>')),
+        'two roots': (YAML, URDF.replace('</robot>', SECOND_ROOT)),
         'no mass at all': (YAML, re.sub(r'<mass value="\d+"/>', '<mass value="0"/>', URDF)),
         'cycle of aliases': ('a: &a [*a]\n' + YAML, URDF),
         'cycle': (YAML, URDF.replace('<child link="arm"/>', '<child link="base"/>')),

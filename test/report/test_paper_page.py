@@ -123,5 +123,5 @@ def test_curve_and_grid_agree() -> None:
 
 def test_a_robot_without_flippers_is_refused() -> None:
     """The error names the joint that is missing."""
-    with pytest.raises(BadConfig, match='expected a joint shoulder_joint'):
+    with pytest.raises(BadConfig, match='without shoulder_joint'):
         rollover(Subject(paper_arm(), np.array([50.0, 50.0])))

@@ -73,7 +73,7 @@ def test_overreach_saturates_and_fails(tmp_path: Path) -> None:
 
 
 def test_a_run_is_recorded_on_the_robots_topics(tmp_path: Path) -> None:
-    """Topics are those of its configuration; without a payload link no load is told."""
+    """Topics are those of its configuration, and the URDF; without a payload link no load."""
     for robot, topics in (
         (rover(), {'/drives/state', '/sensors/imu'}),
         (arm_on_wheels(), {'/drives/state', '/sensors/imu', '/load'}),
@@ -82,7 +82,7 @@ def test_a_run_is_recorded_on_the_robots_topics(tmp_path: Path) -> None:
         folder = tmp_path / f'{len(topics)}'
         folder.mkdir()
         run = simulated(folder, robot, 'gentle', seconds=1.0)
-        assert {*open_bag(run.folder).topics} == topics
+        assert {*open_bag(run.folder).topics} == topics | {'/robot_description'}
 
 
 @pytest.mark.parametrize('name', NEEDS_ARM)
