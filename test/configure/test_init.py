@@ -8,6 +8,8 @@ import pytest
 import yaml
 from cli.here import ugv
 from configure.init_robots import arm_alone, dog, rover, tracked_arm
+from configure.small_robots import box, joint, link, shape, tyre, wheel
+from configure.small_robots import rover as small_rover
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr, string_message
 from ugv_acceptance.bag.writer import BagWriter
@@ -330,3 +332,26 @@ def test_legs_in_a_guessed_posture_are_asked_about(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
     links = {contact.link for contact in load(tmp_path / 'robot.yaml').settings.robot.contacts}
     assert len(links) == 4
+
+
+@pytest.mark.parametrize(('told', 'far'), [((), 0.06), (('fork_joint',), 0.005)])
+def test_a_caster_that_nobody_tells_makes_its_points_uncertain(
+    tmp_path: Path, told: tuple[str, ...], far: float
+) -> None:
+    """A point under a swivelling caster is anywhere on its circle, unless messages tell where."""
+    names = ['left_joint', 'right_joint', *told]
+    text = swivelling()
+    run = recorded(tmp_path / 'run', names, [0.0] * len(names), (0.0, 0.0, 9.81))
+    init(tmp_path, text, str(run), '--mass', 'urdf')
+    spread = dict(load(tmp_path / 'robot.yaml').uncertainty)
+    assert (spread['contacts.x_m'], spread['contacts.y_m']) == pytest.approx((far, far))
+
+
+def swivelling() -> str:
+    """Return the URDF of a rover with two wheels and one caster on a fork."""
+    round_ = tyre(0.1, 0.04)
+    pair = wheel('left', '0.1 0.2 0.1', round_) + wheel('right', '0.1 -0.2 0.1', round_)
+    fork = link('fork') + joint('fork', '-0.2 0 0.1', 'continuous', '0 0 1')
+    caster = wheel('caster', '-0.03 0 -0.05', tyre(0.05, 0.02), parent='fork')
+    imu = link('imu_link') + joint('imu_link', '0 0 0.1', 'fixed')
+    return small_rover(shape(box(0.5, 0.3, 0.1), '0 0 0.15'), pair, fork + caster + imu)

@@ -96,10 +96,14 @@ def names_of(stem: str, points: Sequence[Floats]) -> list[str]:
 
 @dataclass
 class Notes:
-    """What is to be said of contact points that are being derived: questions and remarks."""
+    """What is to be said of contact points that are being derived: questions and remarks.
+
+    `swivels` is by how much (m) joints without end move points at most.
+    """
 
     questions: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    swivels: dict[str, float] = field(default_factory=dict)
 
 
 def mm(length: float) -> str:
@@ -182,6 +186,7 @@ def contacts_of(
         0.0 if face is None else face.heading,
         ' '.join(notes.questions),
         tuple(notes.remarks),
+        tuple(notes.swivels.items()),
     )
 
 

@@ -306,9 +306,10 @@ class _Rolling:
                 continue
             if upright:
                 away = (wheel.centre - posture.frames[joint.child][1])[:2]
-                far = mm(2.0 * float(np.hypot(*away)))
+                far = 2.0 * float(np.hypot(*away))
+                notes.swivels[joint.name] = max(far, notes.swivels.get(joint.name, 0.0))
                 notes.remarks.append(
-                    f'{name} swivels: its point moves by up to {far} as {joint.name} turns'
+                    f'{name} swivels: its point moves by up to {mm(far)} as {joint.name} turns'
                 )
             elif endless(joint):
                 notes.questions.append(

@@ -40,6 +40,7 @@ class Contacts:
 
     `tilt` (rad, towards `heading`) is how far the plane of the points is off the root link's
     xy-plane. `question` is empty, or what a person has to say before these points can be used.
+    `swivels` pairs joints of casters with how far (m) they move a point at most.
     """
 
     points: tuple[DerivedContact, ...]
@@ -48,6 +49,7 @@ class Contacts:
     heading: float
     question: str = ''
     remarks: tuple[str, ...] = ()
+    swivels: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

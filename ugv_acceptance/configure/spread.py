@@ -140,8 +140,13 @@ def _of_limits(draft: Draft) -> Iterator[tuple[str, float, str]]:
 
 def _of_contacts(draft: Draft) -> Iterator[tuple[str, float, str]]:
     if draft.contacts.points and not draft.open & {CONTACTS, TILT}:
-        yield 'contacts.x_m', POINT, '+/-5 mm: treads, tracks and feet give way'
-        yield 'contacts.y_m', POINT, 'the same'
+        held = {name for name, _ in draft.joints.held}
+        far = max((far for name, far in draft.contacts.swivels if name in held), default=0.0)
+        why = '+/-5 mm: treads, tracks and feet give way'
+        if far > POINT:
+            why = f'+/-{1e3 * far:.0f} mm: casters swivel, and no message tells how'
+        yield 'contacts.x_m', max(far, POINT), why
+        yield 'contacts.y_m', max(far, POINT), 'the same'
 
 
 def _of_imu(draft: Draft) -> Iterator[tuple[str, float, str]]:
