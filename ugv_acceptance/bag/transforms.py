@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.encode import put_count, put_floats, put_text
 from ugv_acceptance.bag.layout import Cursor, Wire
+from ugv_acceptance.model.attitude import rotation_of
 from ugv_acceptance.model.robot import Matrix, Vector
 
 TYPE = 'tf2_msgs/msg/TFMessage'
@@ -49,17 +50,7 @@ def _transform(cursor: Cursor, data: bytes, where: str) -> TransformSample:
     if not abs(norm - 1.0) <= _NORM_SLACK or not all(map(math.isfinite, (x, y, z))):
         msg = f'{where}: expected finite numbers and a unit quaternion, got norm {norm:g}'
         raise BadSample(msg)
-    return TransformSample(parent, child, (x, y, z), _matrix([v / norm for v in quaternion]))
-
-
-def _matrix(q: Sequence[float]) -> Matrix:
-    """Return the rotation matrix of a unit quaternion x, y, z, w."""
-    x, y, z, w = q
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
-        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
-        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
-    )
+    return TransformSample(parent, child, (x, y, z), rotation_of(*(v / norm for v in quaternion)))
 
 
 def transforms_cdr(
