@@ -20,7 +20,7 @@ URDF = urdf_of(joint('lift'), joint('bend', parent='lift_link'))
 # What both have in common, though not the times and numbers of messages.
 SAID = """
 from ugv_acceptance.nodes.robot_listener import listen
-seen = listen(1.5)
+seen = listen(3.0)
 print((seen.urdf, seen.transforms, seen.joint_states, seen.joints, seen.imus, seen.doubts))
 """
 

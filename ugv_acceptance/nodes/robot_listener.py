@@ -20,7 +20,8 @@ from ugv_acceptance.configure.evidence import LIVE, Evidence
 from ugv_acceptance.nodes.bag_player import message_type
 from ugv_acceptance.nodes.executor import ros, spin
 
-# Seconds until publishers should be known; the listening begins when the first is.
+# Seconds in which publishers should be found, and then send; the listening begins with the first
+# message, for a slow machine needs long to come that far.
 DISCOVERY = 4.0
 # What a publisher keeps for late subscribers is heard only by one that asks for it.
 _LATCHED = QoSProfile(
@@ -47,11 +48,12 @@ def listen(
         heard = Listener(node, collector)
         began = time.monotonic()
         spin(node, stop, lambda: heard.look() or time.monotonic() > began + DISCOVERY)
-        end = time.monotonic() + seconds
+        end = time.monotonic() + seconds + (DISCOVERY if heard.topics else 0.0)
 
         def over() -> bool:
             heard.look()
-            return time.monotonic() >= end
+            since = heard.first
+            return time.monotonic() >= (end if since is None else min(end, since + seconds))
 
         spin(node, stop, over)
         stop.leave()
@@ -66,11 +68,15 @@ def listen(
 
 
 class Listener:
-    """Subscribes to every topic that tells of the robot; `topics` are those by name with type."""
+    """Subscribes to every topic that tells of the robot; `topics` are those by name with type.
+
+    `first` is the monotonic time (s) of the first message of a topic that goes on; None: none yet.
+    """
 
     def __init__(self, node: Node, collector: Collector) -> None:
         self._node, self._collector = node, collector
         self.topics: dict[str, str] = {}
+        self.first: float | None = None
 
     def look(self) -> bool:
         """Subscribe to the topics that came up since; return whether there is any."""
@@ -104,6 +110,8 @@ class Listener:
 
     def _taker(self, name: str) -> Callable[[Any], None]:
         def take(data: Any) -> None:  # noqa: ANN401 - bytes, for it is raw
+            if self.first is None and self.topics[name] not in (STRING, TF):
+                self.first = time.monotonic()
             self._collector.take(time.time_ns(), name, data)
 
         return take
