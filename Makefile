@@ -38,8 +38,9 @@ ONCE := $(foreach name,angles bag_player console_inputs kills layers levels moni
     own_description packbot_simulator page_of_ plain_english recipe relaxed restarted robot_listener run_verb soak \
     termination, \
     '--ignore-glob=*test_$(name)*') \
-    $(foreach folder,bench campaign cases cli configure console error_rate hardening plan report run simulation studies, \
-    '--ignore-glob=*test/$(folder)/*')
+    $(foreach folder,advice bench campaign cases cli configure console effort error_rate hardening monitoring offline plan \
+    report run simulation studies, \
+    '--ignore-glob=*test/$(folder)/*' '--ignore-glob=*test/evaluation/$(folder)/*')
 INSTALLED := $(COLCON)/install/ugv_acceptance
 
 help:
