@@ -63,11 +63,12 @@ def compare(
         if margins is None:
             continue
         s = margins.stability
-        one = [*margins.q, *margins.gravity, *margins.torque, *s.angle, *s.moment, *s.energy]
-        many = [
-            *(part.q[k], part.gravity[k], part.torque[k]),
-            *(part.angle[k], part.moment[k], part.energy[k]),
-        ]
+        one = [*margins.q, *margins.gravity, *margins.torque, *s.moment, *s.energy]
+        many = [*(part.q[k], part.gravity[k], part.torque[k]), *(part.moment[k], part.energy[k])]
+        for angle, other, moment in zip(s.angle, part.angle[k], s.moment, strict=True):
+            # On its back, right above an edge: past it by half a turn or not at all, as one rounds.
+            if margins.gravity[2] < 0.0 or moment != 0.0:
+                one, many = [*one, angle], [*many, np.array([other])]
         # The ZMP runs away to infinity as gravity turns parallel to the ground.
         if margins.gravity[2] < -1.0:
             one, many = [*one, s.zmp], [*many, part.zmp[k : k + 1]]

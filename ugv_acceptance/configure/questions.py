@@ -289,10 +289,16 @@ def _with_limits(draft: Draft, answers: Answers, _: Anew) -> Draft:
                 f'--limit: expected JOINT=50 of a measured joint, got {cut(said)}{hint}'
             )
         for name in names:
-            if pattern == name or found[name].limit.grade == ASK:
+            if pattern == name or (
+                found[name].limit.grade == ASK and (value != URDF or _has_effort(draft, name))
+            ):
                 found[name] = replace(found[name], limit=_limit(draft, found[name], value))
     joints = replace(draft.joints, measured=tuple(found.values()))
     return replace(draft, joints=joints)
+
+
+def _has_effort(draft: Draft, name: str) -> bool:
+    return any(one.name == name and math.isfinite(one.effort) for one in draft.urdf.joints)
 
 
 def _limit(draft: Draft, joint: DerivedJoint, value: str) -> Derived[float]:
