@@ -189,6 +189,7 @@ def test_a_contact_that_is_a_little_askew_on_its_wheel_is_warned_of(
         ('[0.34, 0.2, 0]', 'got one 40 mm off along the ground and 0 mm above it'),
         ('[0.3, 0.2, 0.02]', 'got one 0 mm off along the ground and 20 mm above it'),
         ('[0.3, 0.215, -0.01]', 'got one 0 mm off along the ground and 10 mm below it'),
+        ('[0.3, 0.26, 0]', 'mm beyond its side'),
     ],
 )
 def test_a_contact_of_the_body_that_misses_the_wheel_above_it_is_warned_of(

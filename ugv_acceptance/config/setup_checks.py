@@ -235,10 +235,12 @@ def _off_lowest(arm: Any, axle: Any, size: Vector) -> str | None:  # noqa: ANN40
     radius, aside = size[0], float(arm @ axle)
     ahead = float(np.linalg.norm((arm - aside * axle)[:2]))
     slack = max(UNDER, UNDER_SHARE * radius)
-    if abs(aside) > size[2] + BESIDE or ahead > radius:
-        return None
-    high = float(arm[2]) + radius
-    if ahead <= slack and abs(high) <= slack:
+    beyond, high = abs(aside) - size[2], float(arm[2]) + radius
+    in_line = ahead <= slack and abs(high) <= slack
+    # A wheel that is said to be wider than it is would tip without a warning.
+    if in_line and slack < beyond <= radius:
+        return f'{1e3 * beyond:.0f} mm beyond its side'
+    if in_line or beyond > BESIDE or ahead > radius:
         return None
     side = 'above' if high > -5e-4 else 'below'
     return f'{1e3 * ahead:.0f} mm off along the ground and {1e3 * abs(high):.0f} mm {side} it'
