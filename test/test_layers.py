@@ -16,7 +16,8 @@ MODULES = sorted(PACKAGE.rglob('*.py'))
 # What a layer may import of ours besides itself and the errors of ugv_acceptance/__init__.py.
 BELOW_OFFLINE = {'model', 'studies', 'evaluation', 'config', 'bag', 'monitoring', 'report'}
 BELOW_RUN = BELOW_OFFLINE | {'offline', 'simulation', 'plan', 'campaign', 'processes'}
-BELOW_NODES = BELOW_RUN | {'run', 'console', 'configure'}
+BELOW_DRILL = BELOW_RUN | {'run', 'console'}
+BELOW_NODES = BELOW_DRILL | {'configure', 'drill'}
 MAY_IMPORT: dict[str, set[str]] = {
     # The front door: for types, and when a name is first used.
     '__init__': {'bag', 'config', 'model', 'monitoring', 'offline'},
@@ -36,6 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'console': BELOW_OFFLINE | {'offline'},
     'plan': {'model', 'studies', 'evaluation', 'config', 'report'},
     'run': BELOW_RUN,
+    'drill': BELOW_DRILL,
     'nodes': BELOW_NODES,
     'cli': BELOW_NODES | {'nodes'},
 }

@@ -20,7 +20,8 @@ NO_PAYLOAD = 'optional; none was declared'
 class AlertRow:
     """One alert as shown: `state` in words, times in ns, `offers` the commands allowed on it.
 
-    `key` is the same for the same alert in all snapshots. `unseen`: nobody acknowledged it.
+    `key` is the same for the same alert in all snapshots. `unseen`: nobody acknowledged it. `worst`
+    (ns) is when the value in `text` came; None where it is not known.
     """
 
     key: str
@@ -35,6 +36,16 @@ class AlertRow:
     unseen: bool = False
     offers: tuple[str, ...] = ()
     note: str = ''
+    worst: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Countdown:
+    """A margin that shrinks: `seconds` until the robot `tips` to a side, or a joint saturates."""
+
+    tips: bool
+    subject: str
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +71,9 @@ class Snapshot:
     the operator should know, in words. `stamp` (ns) is in the header of the newest message.
     `ground` says in words what the ground is taken for; where it is not flat (`rough`) the angles
     are an upper bound, and `cautious` (rad) is the cautious margin. `carried`: points below the
-    tracks carry the robot.
+    tracks carry the robot. `countdown` is the margin used up first, None where none shrinks.
+    `black_box` is 'on', 'off', or what is wrong with it ('': not known); `running` (s) how long the
+    monitor has been active, NaN where that is not known.
     """
 
     time: int
@@ -82,6 +95,9 @@ class Snapshot:
     rough: bool = False
     cautious: float = math.nan
     carried: bool = False
+    countdown: Countdown | None = None
+    black_box: str = ''
+    running: float = math.nan
 
 
 class Feed(Protocol):
