@@ -27,7 +27,14 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
 from ugv_acceptance.console.hub import number_in
-from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.snapshot import (
+    NO_LOAD,
+    NO_PAYLOAD,
+    AlertRow,
+    InputRow,
+    Memory,
+    Snapshot,
+)
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
@@ -56,7 +63,7 @@ class ConsoleNode(Node):
     def __init__(self, config: Config) -> None:
         super().__init__('acceptance_console')
         self.config, self.settings = config, config.settings
-        self.book = AlertBook()
+        self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
         self.said: dict[str, str] = {}
         self.heard, self.margins = hearing.Heartbeat(), hearing.Heartbeat()
@@ -115,7 +122,7 @@ class ConsoleNode(Node):
         if silent or now >= self._look_due:
             self._look_due = now + _LOOK
             self._look_around()
-        return self._look(now)
+        return self.memory.keep(self._look(now))
 
     def command(self, do: str, values: dict[str, Any]) -> str:
         """Send the monitor a command about alerts, or declare a payload; BadSample for others."""
@@ -265,7 +272,8 @@ class ConsoleNode(Node):
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
-        return replace(row, text=self._own.get(row.key, row).text, advice=advice)
+        own = self._own.get(row.key, row)
+        return replace(row, text=own.text, advice=advice, worst=own.worst, peak=own.peak)
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:
         count, now = self.session.counts[name], self.session.clock.now()
