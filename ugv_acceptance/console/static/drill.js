@@ -16,7 +16,7 @@ export class Drill {
   }
 
   tell(words) {
-    this.ask(words, say('drill-answer'));
+    this.ask(words, (answer) => answer.ok || say('drill-answer')(answer));
   }
 
   // 1 to 9 give that answer; what is typed into a field is no answer.
@@ -58,12 +58,22 @@ export class Drill {
     if (phase !== this.phase) this.turn(phase);
   }
 
-  // In a new phase the panel comes into sight, and the focus to the button that goes on.
+  // In a new phase what counts comes into sight, and the focus to the button that goes on.
   turn(phase) {
     const first = this.phase === '', focused = document.activeElement;
     this.phase = phase;
-    if (!first) $('drill').scrollIntoView({ block: 'nearest' });
+    $('drill').dataset.phase = phase;
+    if (!first) this.look(phase);
     if (phase === 'judged' && (focused === document.body || $('drill').contains(focused))) $('drill-next').focus({ preventScroll: true });
+  }
+
+  // The robot while it is watched; else the whole panel, above all its end, below the header that stays.
+  look(phase) {
+    if (phase === 'watch') return window.scrollTo(0, 0);
+    const header = $('verdict').offsetHeight, { top, bottom } = $('drill').getBoundingClientRect();
+    $('drill').style.scrollMarginTop = `${header}px`;
+    if (bottom > window.innerHeight) $('drill').scrollIntoView({ block: 'end' });
+    else if (top < header) $('drill').scrollIntoView({ block: 'start' });
   }
 
   list(choices) {
@@ -96,6 +106,6 @@ export class Drill {
     if (this.kept) URL.revokeObjectURL(this.kept);
     this.kept = URL.createObjectURL(new Blob([`${JSON.stringify(record, null, 2)}\n`], { type: 'application/json' }));
     $('drill-save').href = this.kept;
-    text($('drill-written'), drill.written ? `Written to ${drill.written} where the drill runs.` : '');
+    text($('drill-written'), drill.written);
   }
 }
