@@ -7,7 +7,6 @@ from typing import Any
 from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
 
 from ugv_acceptance.report.format import worst_text
-from ugv_acceptance.report.training import training_lines
 from ugv_acceptance.type_aliases import Json
 
 # Characters that XML 1.0 cannot hold, even escaped.
@@ -35,19 +34,20 @@ def _suite(result: Json) -> TestSuite:
     suite.add_property('robot_sha256', result['robot']['sha256'])
     for outcome in result['criteria']['results']:
         suite.add_testcase(_case(outcome, suite.name))
-    training = result.get('operator_training')
-    if training is not None and training['required'] is not None:
-        suite.add_testcase(_trained(result, suite.name))
+    # Safeguards and what criteria require of the operator are no cases: they must not look green.
+    if result['verdict'] not in {
+        'PASS',
+        *(one['verdict'] for one in result['criteria']['results']),
+    }:
+        suite.add_testcase(_verdict(result, suite.name))
     return suite
 
 
-def _trained(result: Json, suite: str) -> TestCase:
-    """Return the case of criteria that require a trained operator: an error where none is shown."""
-    case = TestCase('operator training', suite)
-    lines = _clean('\n'.join(training_lines(result)))
-    if not result['operator_training']['met']:
-        case.result = [Error(lines, 'INCONCLUSIVE')]
-    case.system_out = lines
+def _verdict(result: Json, suite: str) -> TestCase:
+    """Return a case that carries a verdict which none of the criteria has."""
+    case = TestCase('verdict', suite)
+    kind = Failure if result['verdict'] == 'FAIL' else Error
+    case.result = [kind(_clean('; '.join(result['reasons'])), result['verdict'])]
     return case
 
 
