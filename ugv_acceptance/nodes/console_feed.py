@@ -27,18 +27,29 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
 from ugv_acceptance.console.hub import number_in
+from ugv_acceptance.console.monitor_values import (
+    countdown_of,
+    load_of,
+    number_of,
+    same_load,
+)
 from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
-from ugv_acceptance.evaluation.inputs.payload import payload_from
+from ugv_acceptance.model.robot import Vector
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import Stop, ros
 from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
-from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
+from ugv_acceptance.nodes.monitor.operator_desk import HAND, load_message
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs, qos_of
+from ugv_acceptance.nodes.operator_client import MONITOR, Command, OperatorClient
 
-MONITOR = 'acceptance_monitor'
+# Seconds in which the monitor answers a command; the page stands still until it does.
+ANSWER_WITHIN = 1.0
+# Seconds after which the verdict's payload is newer than one that was told.
+SETTLED = 1.5
 # Seconds without a verdict (it comes each second), and without margins while inputs arrive, until
 # the monitor counts as silent.
 VERDICT_SILENCE = 2.5
@@ -78,6 +89,7 @@ class ConsoleNode(Node):
         self._own: dict[str, AlertRow] = {}
         self._rows: tuple[InputRow, ...] = ()
         self._load: InertiaStamped | None = None
+        self._declared = -math.inf
         self._load_out: Any = None
         self._known_since: float | None = None
         self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
@@ -85,7 +97,7 @@ class ConsoleNode(Node):
         self.create_subscription(
             JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
-        self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
+        self._hand = OperatorClient(self)
         self._executor, self._never = EventsExecutor(), Future()
         self._executor.add_node(self)
 
@@ -118,47 +130,72 @@ class ConsoleNode(Node):
         return self._look(now)
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Send the monitor a command about alerts, or declare a payload; BadSample for others."""
-        if do in DOINGS:
-            self._hand.publish(self._operation(do, values))
-            return f'asked the monitor: {do}'
+        """Ask the monitor for what an operator wants; return its answer, which takes a moment.
+
+        Alerts are named by `key` or `keys`, of which those are taken that offer the command; with
+        neither all are meant. Raises BadSample if it was refused or is not answered.
+        """
         if do == 'payload':
             return self._declare(values)
-        raise BadSample(f'a live robot cannot do {do!r}')
+        if do == 'ground':
+            return self._ask(do, values, kind=str(values.get('kind')))
+        if do == 'hand':
+            allowed = 'true' if values.get('allowed') is True else 'false'
+            return self._ask(HAND, values, allowed=allowed)
+        if do not in DOINGS:
+            raise BadSample(f'a live robot cannot do {do!r:.80}')
+        if values.get('key') is None and values.get('keys') is None:
+            return self._ask(do, values)
+        rows = self._chosen(do, values)
+        seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
+        named = [
+            {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]} for row in rows
+        ]
+        return '; '.join([self._ask(do, values, **each, seconds=seconds) for each in named])
 
-    def _operation(self, do: str, values: dict[str, Any]) -> DiagnosticStatus:
-        message = DiagnosticStatus(name=do, message=str(values.get('note') or '')[:200])
-        message.hardware_id = str(values.get('by') or 'console')[:40]
-        if values.get('key') is not None:
-            row = self.book.row(values['key'])
-            named = {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]}
-            seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
-            message.values = key_values(named | {'seconds': seconds})
-        return message
+    def _chosen(self, do: str, values: dict[str, Any]) -> list[AlertRow]:
+        """Return the alerts a command names: that of a key, or those of keys that offer it."""
+        keys = values.get('keys')
+        if keys is None:
+            return [self.book.row(values['key'])]
+        if not isinstance(keys, list):
+            raise BadSample(f'keys: expected a list, got {keys!r:.80}')
+        known = [self.book.rows[key] for key in map(str, keys) if key in self.book.rows]
+        rows = [row for row in known if do in row.offers]
+        if not rows:
+            raise BadSample(f'{do}: no alert of this card offers that now')
+        return rows
+
+    def _ask(self, do: str, values: dict[str, Any], **more: object) -> str:
+        """Return the monitor's answer to a command. Raises BadSample if that is a refusal."""
+        if not self._hand.heard:
+            raise BadSample(f'{do}: no monitor hears it ({self._hand.where()})')
+        who, note = str(values.get('by') or 'console')[:40], str(values.get('note') or '')[:200]
+        answer = self._hand.ask(self._executor, Command(do, who, note, more), ANSWER_WITHIN)
+        if not answer.done:
+            raise BadSample(f'refused: {answer.text}')
+        return answer.text
 
     def _declare(self, values: dict[str, Any]) -> str:
         cog = values.get('cog_m')
         if not isinstance(cog, list) or len(cog) != 3:
-            raise BadSample(f'cog_m: expected three numbers, got {cog!r}')
+            raise BadSample(f'cog_m: expected three numbers, got {cog!r:.80}')
         numbers = dict(zip('xyz', cog, strict=True))
-        mass, com = number_in(values, 'mass_kg'), [number_in(numbers, k) for k in 'xyz']
-        link = self.settings.robot.payload_link or ''
-        if payload_from(self.settings.robot, mass, com, link) is None:
-            raise BadSample(f'expected a mass in kg from 0 on, in reach of {link}, got {mass}')
-        message = InertiaStamped()
-        message.header.frame_id = link
-        message.inertia.m = mass
-        message.inertia.com.x, message.inertia.com.y, message.inertia.com.z = com
-        self._carry(message)
-        return f'declared {mass:g} kg'
+        mass = number_in(values, 'mass_kg')
+        x, y, z = (number_in(numbers, k) for k in 'xyz')
+        said = self._ask('payload', values, mass_kg=repr(mass), cog_m=f'{x!r},{y!r},{z!r}')
+        self._carry(mass, (x, y, z))
+        return said
 
-    def _carry(self, message: InertiaStamped) -> None:
+    def _carry(self, mass: float, cog: Vector) -> None:
+        """Say a load on its topic from now on, for recorders and other consoles."""
         topic = self.config.topics.payload
         if self._load_out is None:
             self._load_out = self.create_publisher(
                 InertiaStamped, topic.name, qos_of(topic, topic.depth)
             )
-        self._load = message
+        self._load = load_message(self.settings.robot.payload_link or '', mass, cog)
+        self._declared = time.monotonic()
         self._say_load()
 
     def _say_load(self) -> None:
@@ -166,6 +203,17 @@ class ConsoleNode(Node):
         if self._load is not None:
             self._load.header.stamp = self.get_clock().now().to_msg()
             self._load_out.publish(self._load)
+
+    def _follow_load(self) -> None:
+        """Take the load that is in force at the monitor, whoever told it how."""
+        told, now = load_of(self.said), self.session.clock.now()
+        since = self.session.counts['payload'].last if self._load is None else 0
+        fresh = time.monotonic() - self._declared < SETTLED or now - since < SETTLED * 1e9
+        if told is None or fresh or same_load(told, self.session.evaluator.payload):
+            return
+        self.session.evaluator.carry(now, told.mass, told.cog, '')
+        if self._load is not None:
+            self._load = load_message(self._load.header.frame_id, told.mass, told.cog)
 
     def _beat(self, _: bytes) -> None:
         self.margins.beat(time.monotonic())
@@ -177,6 +225,7 @@ class ConsoleNode(Node):
         none = values.get('alerts_active') == values.get('alerts_unacknowledged') == '0'
         if none and 'code' not in values:
             self.book.clear()
+        self._follow_load()
 
     def _on_alerts(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -233,10 +282,21 @@ class ConsoleNode(Node):
         alerts = tuple(map(self._newest, self.book.also(self._own.values())))
         told = () if problem and self.verdict is None else alerts
         moment, rows = self.session.clock.now(), self._rows
+        heard = not self.heard.silent(now, VERDICT_SILENCE)
+        box = self.said.get('black_box', '') if heard else ''
+        running = number_of(self.said, 'active_s') if heard else math.nan
         if margins is None or problem or self.verdict is None:
-            q = tuple(joints.q)
-            load = evaluator.payload or NO_LOAD
-            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
+            return Snapshot(
+                moment,
+                STALE,
+                problem,
+                q=tuple(joints.q),
+                payload=evaluator.payload or NO_LOAD,
+                alerts=told,
+                inputs=rows,
+                black_box=box,
+                running=running,
+            )
         return Snapshot(
             moment,
             self.verdict.level[0],
@@ -255,8 +315,11 @@ class ConsoleNode(Node):
             stamp=margins.stamp,
             ground=self.said.get('ground', ''),
             rough='trend' in self.said,
-            cautious=math.radians(float(self.said.get('cautious_deg', 'nan'))),
+            cautious=math.radians(number_of(self.said, 'cautious_deg')),
             carried='trend' not in self.said and evaluator.carried,
+            countdown=countdown_of(self.said, now - (self.heard.last or now)),
+            black_box=box,
+            running=running,
         )
 
     def _newest(self, row: AlertRow) -> AlertRow:
