@@ -15,41 +15,34 @@ from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import InertiaStamped
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
-from ugv_acceptance import BadSample
 from ugv_acceptance.config import Config
 from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
-from ugv_acceptance.console.hub import number_in
-from ugv_acceptance.console.monitor_values import (
-    countdown_of,
-    load_of,
-    number_of,
-    same_load,
+from ugv_acceptance.console.monitor_values import countdown_of, number_of
+from ugv_acceptance.console.snapshot import (
+    NO_LOAD,
+    NO_PAYLOAD,
+    AlertRow,
+    InputRow,
+    Memory,
+    Snapshot,
 )
-from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import advice
-from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
-from ugv_acceptance.model.robot import Vector
+from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.console_operator import ConsoleOperator
 from ugv_acceptance.nodes.executor import Stop, ros
-from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
-from ugv_acceptance.nodes.monitor.operator_desk import HAND, load_message
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
-from ugv_acceptance.nodes.monitor.subscriptions import Inputs, qos_of
-from ugv_acceptance.nodes.operator_client import MONITOR, Command, OperatorClient
+from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.operator_client import MONITOR
 
-# Seconds in which the monitor answers a command; the page stands still until it does.
-ANSWER_WITHIN = 1.0
-# Seconds after which the verdict's payload is newer than one that was told.
-SETTLED = 1.5
 # Seconds without a verdict (it comes each second), and without margins while inputs arrive, until
 # the monitor counts as silent.
 VERDICT_SILENCE = 2.5
@@ -67,7 +60,7 @@ class ConsoleNode(Node):
     def __init__(self, config: Config) -> None:
         super().__init__('acceptance_console')
         self.config, self.settings = config, config.settings
-        self.book = AlertBook()
+        self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
         self.said: dict[str, str] = {}
         self.heard, self.margins = hearing.Heartbeat(), hearing.Heartbeat()
@@ -88,17 +81,14 @@ class ConsoleNode(Node):
         self._due = self._look_due = 0.0
         self._own: dict[str, AlertRow] = {}
         self._rows: tuple[InputRow, ...] = ()
-        self._load: InertiaStamped | None = None
-        self._declared = -math.inf
-        self._load_out: Any = None
         self._known_since: float | None = None
         self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
         self.create_subscription(DiagnosticArray, f'{MONITOR}/alerts', self._on_alerts, 50)
         self.create_subscription(
             JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
-        self._hand = OperatorClient(self)
         self._executor, self._never = EventsExecutor(), Future()
+        self._operator = ConsoleOperator(self, self._executor, config, session, self.book)
         self._executor.add_node(self)
 
     def describe(self) -> dict[str, Any]:
@@ -127,93 +117,11 @@ class ConsoleNode(Node):
         if silent or now >= self._look_due:
             self._look_due = now + _LOOK
             self._look_around()
-        return self._look(now)
+        return self.memory.keep(self._look(now))
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Ask the monitor for what an operator wants; return its answer, which takes a moment.
-
-        Alerts are named by `key` or `keys`, of which those are taken that offer the command; with
-        neither all are meant. Raises BadSample if it was refused or is not answered.
-        """
-        if do == 'payload':
-            return self._declare(values)
-        if do == 'ground':
-            return self._ask(do, values, kind=str(values.get('kind')))
-        if do == 'hand':
-            allowed = 'true' if values.get('allowed') is True else 'false'
-            return self._ask(HAND, values, allowed=allowed)
-        if do not in DOINGS:
-            raise BadSample(f'a live robot cannot do {do!r:.80}')
-        if values.get('key') is None and values.get('keys') is None:
-            return self._ask(do, values)
-        rows = self._chosen(do, values)
-        seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
-        named = [
-            {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]} for row in rows
-        ]
-        return '; '.join([self._ask(do, values, **each, seconds=seconds) for each in named])
-
-    def _chosen(self, do: str, values: dict[str, Any]) -> list[AlertRow]:
-        """Return the alerts a command names: that of a key, or those of keys that offer it."""
-        keys = values.get('keys')
-        if keys is None:
-            return [self.book.row(values['key'])]
-        if not isinstance(keys, list):
-            raise BadSample(f'keys: expected a list, got {keys!r:.80}')
-        known = [self.book.rows[key] for key in map(str, keys) if key in self.book.rows]
-        rows = [row for row in known if do in row.offers]
-        if not rows:
-            raise BadSample(f'{do}: no alert of this card offers that now')
-        return rows
-
-    def _ask(self, do: str, values: dict[str, Any], **more: object) -> str:
-        """Return the monitor's answer to a command. Raises BadSample if that is a refusal."""
-        if not self._hand.heard:
-            raise BadSample(f'{do}: no monitor hears it ({self._hand.where()})')
-        who, note = str(values.get('by') or 'console')[:40], str(values.get('note') or '')[:200]
-        answer = self._hand.ask(self._executor, Command(do, who, note, more), ANSWER_WITHIN)
-        if not answer.done:
-            raise BadSample(f'refused: {answer.text}')
-        return answer.text
-
-    def _declare(self, values: dict[str, Any]) -> str:
-        cog = values.get('cog_m')
-        if not isinstance(cog, list) or len(cog) != 3:
-            raise BadSample(f'cog_m: expected three numbers, got {cog!r:.80}')
-        numbers = dict(zip('xyz', cog, strict=True))
-        mass = number_in(values, 'mass_kg')
-        x, y, z = (number_in(numbers, k) for k in 'xyz')
-        said = self._ask('payload', values, mass_kg=repr(mass), cog_m=f'{x!r},{y!r},{z!r}')
-        self._carry(mass, (x, y, z))
-        return said
-
-    def _carry(self, mass: float, cog: Vector) -> None:
-        """Say a load on its topic from now on, for recorders and other consoles."""
-        topic = self.config.topics.payload
-        if self._load_out is None:
-            self._load_out = self.create_publisher(
-                InertiaStamped, topic.name, qos_of(topic, topic.depth)
-            )
-        self._load = load_message(self.settings.robot.payload_link or '', mass, cog)
-        self._declared = time.monotonic()
-        self._say_load()
-
-    def _say_load(self) -> None:
-        """Publish the declared load every second, so that a late subscriber receives it too."""
-        if self._load is not None:
-            self._load.header.stamp = self.get_clock().now().to_msg()
-            self._load_out.publish(self._load)
-
-    def _follow_load(self) -> None:
-        """Take the load that is in force at the monitor, whoever told it how."""
-        told, now = load_of(self.said), self.session.clock.now()
-        since = self.session.counts['payload'].last if self._load is None else 0
-        fresh = time.monotonic() - self._declared < SETTLED or now - since < SETTLED * 1e9
-        if told is None or fresh or same_load(told, self.session.evaluator.payload):
-            return
-        self.session.evaluator.carry(now, told.mass, told.cog, '')
-        if self._load is not None:
-            self._load = load_message(self._load.header.frame_id, told.mass, told.cog)
+        """Ask the monitor for what an operator wants; return its answer. BadSample: refused."""
+        return self._operator.command(do, values)
 
     def _beat(self, _: bytes) -> None:
         self.margins.beat(time.monotonic())
@@ -225,7 +133,7 @@ class ConsoleNode(Node):
         none = values.get('alerts_active') == values.get('alerts_unacknowledged') == '0'
         if none and 'code' not in values:
             self.book.clear()
-        self._follow_load()
+        self._operator.follow_load(self.said)
 
     def _on_alerts(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -241,7 +149,7 @@ class ConsoleNode(Node):
     def _every_second(self) -> None:
         self._inputs.look_around([])
         self.session.measure_rates()
-        self._say_load()
+        self._operator.say_load()
 
     def _look_around(self) -> None:
         """Advance the evaluation's time, and update active alerts and the state of the inputs."""
@@ -282,21 +190,12 @@ class ConsoleNode(Node):
         alerts = tuple(map(self._newest, self.book.also(self._own.values())))
         told = () if problem and self.verdict is None else alerts
         moment, rows = self.session.clock.now(), self._rows
-        heard = not self.heard.silent(now, VERDICT_SILENCE)
-        box = self.said.get('black_box', '') if heard else ''
-        running = number_of(self.said, 'active_s') if heard else math.nan
+        lamps = self._lamps(now)
         if margins is None or problem or self.verdict is None:
-            return Snapshot(
-                moment,
-                STALE,
-                problem,
-                q=tuple(joints.q),
-                payload=evaluator.payload or NO_LOAD,
-                alerts=told,
-                inputs=rows,
-                black_box=box,
-                running=running,
-            )
+            q = tuple(joints.q)
+            load = evaluator.payload or NO_LOAD
+            known = Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
+            return replace(known, **lamps)
         return Snapshot(
             moment,
             self.verdict.level[0],
@@ -313,14 +212,22 @@ class ConsoleNode(Node):
             inputs=rows,
             hints=hearing.hints_of(self.said),
             stamp=margins.stamp,
-            ground=self.said.get('ground', ''),
             rough='trend' in self.said,
             cautious=math.radians(number_of(self.said, 'cautious_deg')),
             carried='trend' not in self.said and evaluator.carried,
             countdown=countdown_of(self.said, now - (self.heard.last or now)),
-            black_box=box,
-            running=running,
+            **lamps,
         )
+
+    def _lamps(self, now: float) -> dict[str, Any]:
+        """Return what the verdict tells beside the margins: of a monitor that is alive."""
+        if self.heard.last is None or now - self.heard.last > VERDICT_SILENCE:
+            return {}
+        return {
+            'ground': self.said.get('ground', ''),
+            'black_box': self.said.get('black_box', ''),
+            'running': number_of(self.said, 'active_s'),
+        }
 
     def _newest(self, row: AlertRow) -> AlertRow:
         """Return an active alert with its worst value until now and the newest advice."""
@@ -328,7 +235,8 @@ class ConsoleNode(Node):
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
-        return replace(row, text=self._own.get(row.key, row).text, advice=advice)
+        own = self._own.get(row.key, row)
+        return replace(row, text=own.text, advice=advice, worst=own.worst, peak=own.peak)
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:
         count, now = self.session.counts[name], self.session.clock.now()
