@@ -32,9 +32,8 @@ def calm(page: Page, robot: Live) -> None:
         '["acknowledge", "reset"].forEach(x => console_page.socket.send(JSON.stringify({do: x})))'
     )
     page.run(f'window.hand = setInterval(() => {hand}, 300)')
-    page.wait(
-        f'{LEVEL} === "OK" && console_page.frame.cards.length + console_page.frame.past.length === 0'
-    )
+    none = '[...console_page.frame.cards, ...console_page.frame.past].length === 0'
+    page.wait(f'{LEVEL} === "OK" && {none}')
     page.run('clearInterval(hand)')
     # What the hand did last is done before this is answered: it must not reach into the test.
     asked = 'JSON.stringify({do: "axes", x: axes[0], y: axes[1], number: -1})'
