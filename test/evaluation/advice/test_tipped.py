@@ -34,7 +34,7 @@ PACKBOT = load('packbot').settings
         ((), False),
     ],
 )
-def test_it_has_tipped_from_twenty_degrees_past_on(left: tuple[float, ...], *, tipped: bool) -> None:
+def test_it_has_tipped_from_so_far_past_on(left: tuple[float, ...], *, tipped: bool) -> None:
     """One side twenty degrees past tipping is a fall; what is not known or has no edge is none."""
     assert math.degrees(TIPPED) == pytest.approx(20.0)
     assert has_tipped([math.radians(x) for x in left]) is tipped

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import SupportsFloat
 
 # Tilt (rad) past tipping from which a robot has tipped. From rest at 20 deg past it, a robot whose
-# centre of gravity is 0.3 m from the edge turns by 20 deg more in a quarter of a second and by 50 in
+# centre of gravity is 0.3 m from the edge turns by 20 deg more in a quarter of a second, by 50 in
 # 0.4 s: no arm is as fast. Up to there the numbers may be those of a robot that stands: one that
 # sways comes back from a few degrees past, and an arm at full reach, with a load that was declared
 # but is not carried, is 15 deg past on level ground.
