@@ -67,13 +67,13 @@ def raised(session: Session, code: str, subject: str = '', level: int = 0) -> li
 def test_advice_comes_without_holding_up_a_message() -> None:
     """First the general advice, then the computed one, which a thread has worked out."""
     session = session_with()
-    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, NEARER))
+    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
     session.alarm_tracker.take()
     assert 'raise the elbow' not in verdict_of(session).message
-    wait_until(session.advisory.arrived, lambda: give(session, NEARER))
+    wait_until(session.advisory.arrived, lambda: give(session, STRETCHED))
     wait_until(
         lambda: 'raise the elbow by' in verdict_of(session).message,
-        lambda: give(session, NEARER),
+        lambda: give(session, STRETCHED),
     )
     verdict = verdict_of(session)
     assert verdict.values['do'] == verdict.values['advice_1']
@@ -83,14 +83,14 @@ def test_advice_comes_without_holding_up_a_message() -> None:
 def test_after_a_fall_the_verdict_and_every_alert_say_to_stand_clear() -> None:
     """No motion of the arm and no load to set down, though both were advised before the fall."""
     session = session_with()
-    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, NEARER))
+    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
     verdict_of(session)
-    wait_until(session.advisory.arrived, lambda: give(session, NEARER))
+    wait_until(session.advisory.arrived, lambda: give(session, STRETCHED))
     wait_until(
         lambda: verdict_of(session).values.get('do') == STAND_CLEAR,
-        lambda: give(session, NEARER, 1.2),
+        lambda: give(session, STRETCHED, 1.2),
     )
-    give(session, NEARER, 1.2)
+    give(session, STRETCHED, 1.2)
     verdict, statuses = verdict_of(session), session.alarm_tracker.take()
     said = [value for key, value in verdict.values.items() if key.startswith('advice_')]
     assert (said, verdict.message.endswith(STAND_CLEAR)) == ([STAND_CLEAR], True)
@@ -98,7 +98,7 @@ def test_after_a_fall_the_verdict_and_every_alert_say_to_stand_clear() -> None:
     assert {alert_status(c, session).values['do'] for c in statuses} == {STAND_CLEAR}
     wait_until(
         lambda: verdict_of(session).values.get('do', '') != STAND_CLEAR,
-        lambda: give(session, NEARER),
+        lambda: give(session, STRETCHED),
     )
 
 

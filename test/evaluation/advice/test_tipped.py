@@ -26,17 +26,17 @@ PACKBOT = load('packbot').settings
     ('left', 'tipped'),
     [
         ((5.0, 5.0, 5.0, 5.0), False),
-        ((5.0, -9.9, 5.0, 5.0), False),
-        ((5.0, -10.0, 5.0, 5.0), True),
+        ((5.0, -19.9, 5.0, 5.0), False),
+        ((5.0, -20.0, 5.0, 5.0), True),
         ((math.inf, -35.0, math.nan, 80.0), True),
         ((math.nan,) * 4, False),
         ((math.inf,) * 4, False),
         ((), False),
     ],
 )
-def test_it_has_tipped_from_ten_degrees_past_on(left: tuple[float, ...], *, tipped: bool) -> None:
-    """One side ten degrees past tipping is a fall; what is not known or has no edge is none."""
-    assert math.degrees(TIPPED) == pytest.approx(10.0)
+def test_it_has_tipped_from_so_far_past_on(left: tuple[float, ...], *, tipped: bool) -> None:
+    """One side twenty degrees past tipping is a fall; what is not known or has no edge is none."""
+    assert math.degrees(TIPPED) == pytest.approx(20.0)
     assert has_tipped([math.radians(x) for x in left]) is tipped
 
 
