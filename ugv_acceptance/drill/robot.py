@@ -40,6 +40,8 @@ _REST = 1.0
 _AT_ONCE = 10.0
 # Share of a motor's limit from which it counts as at its limit.
 _ALL = 1.0 - 1e-9
+# How far (rad, m) a joint is from where it should be once it has given in.
+SINKS = math.radians(5.0)
 
 
 @dataclass(slots=True)
@@ -78,8 +80,8 @@ class Truth:
 
     `lean` (rad) is the angle between its z axis and that of the ground, `place` (3,) m its base on
     the ground, `q` (j,) its joints. `least` (rad) is the tilt left to `side` with the real load
-    (NaN, '': it does not stand), `at_limit` the joints whose motors give all they have, `known`
-    whether the monitor knows the margins.
+    (NaN, '': it does not stand), `yielding` the joints whose motors give all they have and are not
+    where they should be, `known` whether the monitor knows the margins.
     """
 
     time: float
@@ -88,7 +90,7 @@ class Truth:
     q: Floats
     side: str
     least: float
-    at_limit: tuple[str, ...]
+    yielding: tuple[str, ...]
     known: bool
 
 
@@ -205,7 +207,8 @@ class DrillRobot:
         simulation, names = self.simulation, self.simulation.robot.joint_names
         (place, up), (q, _, force) = simulation.base(), simulation.joints()
         limits = [simulation.robot.joint(name).effort for name in names]
-        full = zip(names, force.tolist(), limits, strict=True)
+        full = np.abs(force) >= np.array(limits) * _ALL
+        sinks = full & (np.abs(q - simulation.targets()) > SINKS)
         side, least = self._least(q.copy())
         return Truth(
             self.time,
@@ -214,7 +217,7 @@ class DrillRobot:
             q.copy(),
             side,
             least,
-            tuple(name for name, effort, limit in full if abs(effort) >= limit * _ALL),
+            tuple(name for name, yields in zip(names, sinks.tolist(), strict=True) if yields),
             self.session.evaluator.margins is not None,
         )
 

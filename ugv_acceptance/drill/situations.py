@@ -74,7 +74,7 @@ def tilt_left(robot: Robot, arm: Joints, tilt: tuple[float, float], load: float)
 def slope(robot: Robot, rng: Rng) -> Case:
     """Draw a raised arm that swings out over the low side of a slope."""
     sign, side = _side(rng)
-    load, shoulder, elbow = _between(rng, 2.0, 2.8), rng.uniform(78, 86), rng.uniform(-75, -55)
+    load, shoulder, elbow = _between(rng, 2.6, 3.2), rng.uniform(72, 80), rng.uniform(-70, -55)
     tilt, low = radians(float(rng.integers(12, 16))), sign * pi / 2.0
 
     def left(turret: float) -> float:
@@ -83,8 +83,7 @@ def slope(robot: Robot, rng: Rng) -> Case:
 
     while left(90.0) > radians(-7.0):
         tilt += radians(1.0)
-    start = next(a for a in (90.0, 80.0, 70.0, 60.0, 50.0, 40.0, 30.0, 20.0, 10.0, 0.0)
-        if left(a) > radians(13.0) or a == 0.0)  # fmt: skip
+    start = next(a for a in range(90, -91, -5) if left(a) > radians(13.0) or a == -90)
     swing = Act('joint_to', 3.0, 'turret_joint', low, rate=0.06)
     wrong = (
         Choice(
@@ -109,7 +108,7 @@ def slope(robot: Robot, rng: Rng) -> Case:
         (swing,),
         Trouble(frozenset({'TIP_OVER'})),
         (ADVISED, *wrong, _going_on('the tilt left shrinks as long as the arm moves downhill')[0]),
-        (STOP,),
+        (STOP, *FOLD),
         ('ended',),
         'On a slope stop first; then bring the load back over the tracks, or set it down.',
     )
@@ -146,7 +145,7 @@ def load(robot: Robot, rng: Rng) -> Case:
         out,
         Trouble(frozenset({'TORQUE_LIMIT'})),
         (ADVISED, *wrong, _going_on('a motor at its limit cannot hold: the arm falls')[0]),
-        (STOP,),
+        (STOP, Act('joint_to', 1.5, 'elbow_joint', radians(-140))),
         ('ended',),
         'Bring the load closer to the joint that is at its limit, or set it down.',
     )
@@ -256,15 +255,17 @@ def braking(robot: Robot, rng: Rng) -> Case:
 def false_alarm(robot: Robot, rng: Rng) -> Case:
     """Draw a payload declared far too heavy: an alert that the robot itself contradicts."""
     sign, side = _side(rng)
-    mass, factor = _between(rng, 1.0, 1.8), int(rng.integers(7, 10))
+    mass, typed = _between(rng, 1.0, 1.8), 4.0
     shoulder, elbow = rng.uniform(66, 74), rng.uniform(-65, -55)
     low, tilt = sign * pi / 2.0, radians(20.0)
     arm = posture(shoulder, elbow, sign * 90.0)
     while tilt_left(robot, arm, (tilt, low), mass) > radians(-5.0):
         tilt += radians(1.0)
+    while tilt_left(robot, posture(shoulder, elbow), (0.0, 0.0), typed) > radians(2.0):
+        typed += 0.5
     course = (
         Act('drive', 1.0, amount=0.3),
-        Act('declare', 3.0, amount=round(mass * factor, 1)),
+        Act('declare', 3.0, amount=typed),
         Act('slope', 7.0, amount=tilt, other=low, rate=0.05),
         Act('joint_to', 7.0, 'turret_joint', low, rate=0.25),
     )
@@ -285,14 +286,14 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
     )
     return Case(
         f'The robot drives over level ground with {mass} kg in its gripper, towards a bank. Somebody'
-        f' has just typed {mass * factor:.1f} kg into the monitor.',
+        f' has just typed {typed:g} kg into the monitor.',
         'DANGER, but the robot stands firmly and its motors hardly work. What do you do?',
         Setup(posture(shoulder, elbow), load=mass),
         course,
         Trouble(frozenset({'TIP_OVER', 'TORQUE_LIMIT'}), 3.0),
         (ADVISED, right, *wrong),
         (STOP, *FOLD),
-        ('ended', 'true_load', 'heard'),
+        ('ended', 'heard'),
         'Treat an alert as true until you have looked; then correct what it was told.',
         patience=14.0,
     )
