@@ -168,7 +168,9 @@ def _unchecked(same: _Same) -> str:
 def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
     """Return the seconds until the first margin is used up, and what happens then."""
     soon = snapshot.countdown
-    if soon is None or view.dead or view.fallen is not None or not soon.seconds > 0.0:
+    if soon is None or view.dead or view.doubted or view.fallen is not None:
+        return None, ''
+    if not soon.seconds > 0.0:
         return None, ''
     name = name_words(soon.subject)
     return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'
