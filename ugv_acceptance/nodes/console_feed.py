@@ -57,8 +57,8 @@ _LOOK = 0.5
 class ConsoleNode(Node):
     """A node without a thread: takes messages of robot and monitor when a snapshot is asked for."""
 
-    def __init__(self, config: Config) -> None:
-        super().__init__('acceptance_console')
+    def __init__(self, config: Config, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
+        super().__init__('acceptance_console', **node)
         self.config, self.settings = config, config.settings
         self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
