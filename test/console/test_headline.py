@@ -208,6 +208,15 @@ def test_what_was_known_last_is_kept_while_nothing_is() -> None:
     assert memory.keep(tilted(7.0)).last is None
 
 
+def test_numbers_beside_an_alert_of_no_data_are_not_remembered() -> None:
+    """What comes while an input is said to be silent was not known."""
+    memory = Memory(LastKnown(1, tilted(6.0).angle, ()))
+    silent = row('INPUT_STALE', 'imu', STALE)
+    last = memory.keep(tilted(30.0, level=STALE, alerts=(silent,))).last
+    assert last is not None
+    assert last.time == 1
+
+
 def test_unknown_values_of_the_configuration_are_asked_for() -> None:
     """Margins that are known are told beside what keeps them from being OK: nothing is dead."""
     head = said(tilted(23.0), unknown=(CONTACTS,))

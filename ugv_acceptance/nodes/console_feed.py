@@ -182,7 +182,9 @@ class ConsoleNode(Node):
         silent = level == STALE or margins is None
         # An alert, if there is one, says better what is missing and what to do.
         told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
-        return self.verdict.message if silent and not told else ''
+        if told or not silent:
+            return ''
+        return hearing.problem_of(self.verdict.message, self.said, self.settings)
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)
