@@ -6,11 +6,10 @@ from typing import Any
 
 import jsonschema
 import pytest
+from drill.drills import ALL, ONE_FAILED, drill, outcome
 
 from ugv_acceptance import AcceptanceError, __version__
 from ugv_acceptance.bag.atomic_files import write_json
-from ugv_acceptance.config import load
-from ugv_acceptance.drill.outcome import Drill, Outcome
 from ugv_acceptance.drill.record import (
     SITUATIONS,
     is_edited,
@@ -20,32 +19,9 @@ from ugv_acceptance.drill.record import (
 )
 
 NAN = float('nan')
-
-
-def outcome(name: str, *, passed: bool = True, least: float = 12.5) -> Outcome:
-    """Return how one situation ended."""
-    return Outcome(
-        situation=name,
-        title=f'The {name}',
-        seed=7,
-        passed=passed,
-        answers=(('stop', 3.25), ('lower', 5.0)),
-        happened='the robot stayed on its tracks' if passed else 'it tipped to the right',
-        lesson='lower the arm before you drive on',
-        least_deg=least,
-    )
-
-
-def drill(*outcomes: Outcome) -> Drill:
-    """Return a drill of Ada on the PackBot that ships."""
-    robot = load('packbot')
-    return Drill('Ada', robot.name, robot.sha256, 3, '2026-05-04T09:30:00Z', 24.0, outcomes)
-
-
-ALL = tuple(outcome(name) for name in SITUATIONS)
 KINDS = {
     'passed': drill(*ALL),
-    'to repeat': drill(outcome('slope', passed=False, least=NAN), *ALL[1:]),
+    'to repeat': drill(*ONE_FAILED),
     'incomplete': drill(ALL[0]),
 }
 
@@ -195,7 +171,7 @@ def test_the_lines_say_what_is_to_be_repeated_and_why() -> None:
     """First how it ended, then each situation with the times of the answers, then the robot."""
     lines = record_lines(record_json(drill(outcome('slope', passed=False), *ALL[1:3])))
     assert lines[0] == (
-        '[X] TO REPEAT  Ada, 2026-05-04 09:30 UTC: 2 of 7 situations passed, 24 min'
+        '[X] TO REPEAT  Ada, 2025-05-04 09:30 UTC: 2 of 7 situations passed, 24 min'
     )
     assert lines[1:6] == [
         '  to repeat  slope        stop after 3.2 s, lower after 5.0 s',

@@ -23,6 +23,7 @@ from ugv_acceptance.report.format import (
     number_text,
     origin_line,
 )
+from ugv_acceptance.report.training import training_lines
 
 COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
 MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
@@ -79,7 +80,8 @@ def print_result(result: dict[str, Any], console: Console | None = None) -> None
         console.print(f'    {escape(reason)}', soft_wrap=True)
     if len(result['reasons']) > 5:
         console.print(f'    and {len(result["reasons"]) - 5} more reasons')
-    for line in filter(None, (origin_line(result), assumed_line(result), ground_line(result))):
+    said = filter(None, (origin_line(result), assumed_line(result), ground_line(result)))
+    for line in [*said, *training_lines(result)]:
         console.print(f'    {escape(line)}', soft_wrap=True)
     unchecked = not_checked_lines(result)
     if unchecked:

@@ -14,6 +14,7 @@ from typing import Any
 
 from ugv_acceptance import AcceptanceError, __version__
 from ugv_acceptance.drill.outcome import Drill, Outcome
+from ugv_acceptance.offline.training import TrainingRecord
 from ugv_acceptance.type_aliases import Json
 
 KIND = 'ugv_acceptance drill'
@@ -97,12 +98,28 @@ def read_record(path: Path) -> Json:
 
     A record that was edited, yet is whole, is returned: ask `is_edited`.
     """
+    return _read(path, _content(path))
+
+
+def training_record(path: Path) -> TrainingRecord:
+    """Return a record as `evaluate` takes it. AcceptanceError as `read_record`."""
+    content = _content(path)
+    record = _read(path, content)
+    sha256 = hashlib.sha256(content).hexdigest()
+    return TrainingRecord(path, sha256, record, time_of(record['started']), is_edited(record))
+
+
+def _content(path: Path) -> bytes:
     try:
         with path.open('rb') as file:
-            content = file.read(LARGEST)
-        record = json.loads(content)
+            return file.read(LARGEST)
     except OSError as error:
         raise AcceptanceError(f'{path}: expected the record of a drill: {error.strerror}') from None
+
+
+def _read(path: Path, content: bytes) -> Json:
+    try:
+        record = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise AcceptanceError(
             f'{path}: expected the record of a drill, JSON, got: {str(error)[:SHOWN]}'

@@ -30,6 +30,7 @@ from ugv_acceptance.report.format import (
 )
 from ugv_acceptance.report.regions import svg_of
 from ugv_acceptance.report.run_charts import run_chart, track_map
+from ugv_acceptance.report.training import training_line, training_rows
 from ugv_acceptance.type_aliases import Json
 
 
@@ -91,6 +92,8 @@ def acceptance_page(
         interval=interval_text,
         range=range_text,
         missing=missing_text,
+        training=training_line,
+        drilled=training_rows,
     )
     return environment.get_template('acceptance.html').render(
         result=result,
