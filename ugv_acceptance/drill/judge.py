@@ -111,10 +111,9 @@ def _not_blind(facts: Facts, _: End) -> str:
     return ''
 
 
-def _true_load(_: Facts, end: End) -> str:
-    real, told = end.scene.robot.simulation.load, end.scene.robot.session.evaluator.payload.mass
-    wrong = abs(real - told) > 0.25
-    return f'the monitor believes in {told:.1f} kg, the gripper holds {real:.1f} kg' if wrong else ''
+def _true_ground(_: Facts, end: End) -> str:
+    told, now = end.scene.robot.setup.ground, end.scene.robot.session.settings.ground.kind
+    return '' if told == now else f'the monitor was told that the ground is {now}, so it is quiet'
 
 
 def _heard(facts: Facts, _: End) -> str:
@@ -142,7 +141,7 @@ NEEDS: dict[str, Need] = {
     'heard': _heard,
     'known': _known,
     'off': _off,
-    'true_load': _true_load,
+    'true_ground': _true_ground,
     'ended': _ended,
 }
 

@@ -32,7 +32,7 @@ WATCH, ASK, ACTING, JUDGED = 'watch', 'ask', 'acting', 'judged'
 # What may be done at any time: it ends neither the question nor, alone, the trouble.
 FREE = (
     Choice(STOP, 'Stop arm and tracks, then think on', (Act('stop'),)),
-    Choice(WAIT, 'Wait and see'),
+    Choice(WAIT, 'Wait and see', halts=False),
 )
 # Of these, in place of an answer, too little came of it.
 TOO_LATE = 'no answer is an answer too: what was under way went on'
@@ -76,6 +76,7 @@ class Play:
     _advice: Advice | None = None
     _left: float = 0.0
     _general: bool = False
+    _halted: bool = False
 
     def __post_init__(self) -> None:
         name = self.situation.name
@@ -100,6 +101,11 @@ class Play:
     def left(self) -> float | None:
         """Seconds that are left for an answer; None while nothing is asked."""
         return max(self._until - self.robot.time, 0.0) if self.phase == ASK else None
+
+    @property
+    def asked_for(self) -> float:
+        """Seconds since the question was asked; below 0 before."""
+        return self.robot.time - self._asked
 
     def _schedule(self, acts: tuple[Act, ...]) -> None:
         self._plan += [(self.robot.time + act.at, act) for act in acts]
@@ -176,18 +182,19 @@ class Play:
         self.answers.append((key, round(self.robot.time - self._asked, 2)))
         if key == STOP:
             self._plan.clear()
+            self._halted = True
             self._schedule(found.acts)
             self._until = self.robot.time + self.case.patience
         elif key == ADVICE:
             self._act(self._advised(), halt=True)
         else:
-            self._act(found.acts, halt=key not in {GO_ON, WAIT, 'acknowledge', 'silence', 'flat'})
+            self._act(found.acts, halt=found.halts)
 
     def _act(self, acts: tuple[Act, ...], *, halt: bool) -> None:
         """Carry out acts from now on, in place of the course of things if that is to `halt`."""
         if halt:
             self._plan.clear()
-            self.scene.busy = self.robot.time
+            self.scene.busy, self._halted = self.robot.time, True
         self._schedule(acts)
         self.phase, self._until = ACTING, self.robot.time + self.case.watched
 
@@ -220,8 +227,8 @@ class Play:
             return False
         if now >= self._until:
             return True
-        well = not self._plan and now > self.scene.busy and not self._fault()
-        self._over = min(self._over, now) if well and self.answer not in {GO_ON, WAIT} else math.inf
+        done = self._halted and not self._plan and now > self.scene.busy
+        self._over = min(self._over, now) if done and not self._fault() else math.inf
         return now - self._over >= QUIET
 
     def _end(self) -> End:

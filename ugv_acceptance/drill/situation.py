@@ -31,12 +31,16 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """An answer: `words` as shown, what is then done, and `lesson`, why it is wrong if it is."""
+    """An answer: `words` as shown, what is then done, and `lesson`, why it is wrong if it is.
+
+    It `halts` the course of the situation, unless the operator lets that go on beside the acts.
+    """
 
     key: str
     words: str
     acts: tuple[Act, ...] = ()
     lesson: str = ''
+    halts: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,8 +38,8 @@ ADVISED = Choice(ADVICE, '')
 def _going_on(lesson: str) -> tuple[Choice, Choice]:
     """Return the answers that change nothing, one of them with the alert acknowledged."""
     told = 'to acknowledge says that you have seen it; it changes nothing of the margin'
-    seen = Choice('acknowledge', OFF, (Act('acknowledge'),), told)
-    return Choice(GO_ON, ON, (), lesson), seen
+    seen = Choice('acknowledge', OFF, (Act('acknowledge'),), told, halts=False)
+    return Choice(GO_ON, ON, (), lesson, halts=False), seen
 
 
 def posture(shoulder: float, elbow: float, turret: float = 0.0) -> Joints:
@@ -94,8 +94,11 @@ def slope(robot: Robot, rng: Rng) -> Case:
         ),
         Choice(
             'reach',
-            'Lower the shoulder to bring the load near the ground',
-            (STOP, Act('joint_to', 1.0, 'shoulder_joint', radians(20), rate=0.4)),
+            'Lower the arm while it swings, to bring the load near the ground',
+            (
+                Act('joint_to', 0.0, 'turret_joint', low, rate=0.2),
+                Act('joint_to', 0.0, 'shoulder_joint', radians(40), rate=0.2),
+            ),
             'an arm that is lowered outwards reaches further out over the low side',
         ),
     )
@@ -120,8 +123,8 @@ def load(robot: Robot, rng: Rng) -> Case:
     shoulder, elbow = rng.uniform(80, 88), rng.uniform(-112, -100)
     turret = rng.uniform(-15.0, 15.0)
     out = (
-        Act('joint_to', 3.0, 'shoulder_joint', radians(rng.uniform(28, 36)), rate=0.05),
-        Act('joint_to', 3.0, 'elbow_joint', radians(rng.uniform(-30, -15)), rate=0.05),
+        Act('joint_to', 3.0, 'shoulder_joint', radians(rng.uniform(28, 36)), rate=0.04),
+        Act('joint_to', 3.0, 'elbow_joint', radians(rng.uniform(-30, -15)), rate=0.04),
     )
     wrong = (
         Choice(
@@ -131,10 +134,10 @@ def load(robot: Robot, rng: Rng) -> Case:
             'the load moves away from the shoulder first: that needs more torque, not less',
         ),
         Choice(
-            'stretch',
-            'Stretch the elbow, so that the load comes down sooner',
-            (STOP, Act('joint_to', 0.5, 'elbow_joint', radians(0), rate=0.4)),
-            'torque grows with the distance between load and joint',
+            'slower',
+            'Lower the shoulder slowly, to put the load on the ground',
+            (Act('joint_to', 0.5, 'shoulder_joint', radians(20), rate=0.15),),
+            'torque grows with the distance between load and joint, however slowly it moves',
         ),
     )
     return Case(
@@ -175,7 +178,7 @@ def sensor(robot: Robot, rng: Rng) -> Case:
     begin = tilt - radians(24.0) if tilt > radians(26.0) else radians(2.0)
     course = (
         Act('drive', 1.0, amount=speed),
-        Act('slope', 1.0, amount=tilt, other=low, rate=0.035),
+        Act('slope', 1.0, amount=tilt, other=low, rate=0.03),
         Act('fail', 4.0),
     )
     wrong = (
@@ -203,7 +206,7 @@ def sensor(robot: Robot, rng: Rng) -> Case:
         (ADVISED, *wrong),
         (STOP, Act('mend', 4.0)),
         ('known', 'not_blind'),
-        f'NO DATA means stop: the {what} comes first, the robot moves when the numbers are back.',
+        f'NO DATA means stop: see to the {what} first; it moves when the numbers are back.',
         check,
         sensor=(fault,),
     )
@@ -228,8 +231,8 @@ def braking(robot: Robot, rng: Rng) -> Case:
             'the harder it brakes, the more it turns over its front edge',
         ),
         Choice(
-            'faster',
-            'Drive on slowly uphill backwards, and brake as before',
+            'reverse',
+            'Drive on, then reverse at once to stop',
             (Act('drive', 1.0, amount=speed), Act('drive', 6.0, amount=-speed, rate=15.0)),
             'to reverse at once is to brake twice as hard',
         ),
@@ -248,7 +251,7 @@ def braking(robot: Robot, rng: Rng) -> Case:
         (STOP, *FOLD, *again),
         ('ended',),
         'Fold the arm over the tracks before you drive fast, and brake gently.',
-        patience=14.0,
+        patience=12.0,
     )
 
 
@@ -275,6 +278,7 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
             'Switch the monitor off: it is plainly wrong',
             (Act('silence'),),
             'a monitor that is off says nothing of the next edge either',
+            halts=False,
         ),
         *_going_on('while one alarm is wrong, nobody sees the next, which is right'),
     )
@@ -306,7 +310,6 @@ def fall(robot: Robot, rng: Rng) -> Case:
     shoulder, elbow, tilt = rng.uniform(58, 64), rng.uniform(-55, -45), radians(12.0)
     while tilt_left(robot, posture(shoulder, elbow, sign * 90), (tilt, low), mass) > radians(-8.0):
         tilt += radians(1.0)
-    start = 0.0 if sign < 0 else 0.0
     course = (
         Act('joint_to', 1.0, 'turret_joint', low, rate=0.8),
         Act('joint_to', 14.0, 'shoulder_joint', radians(10), rate=0.5),
@@ -331,13 +334,13 @@ def fall(robot: Robot, rng: Rng) -> Case:
             (Act('drive', 1.0, amount=0.5),),
             'on one track it does not drive, it turns and slides',
         ),
-        Choice(GO_ON, ON, (), 'after a fall the task is over'),
+        Choice(GO_ON, ON, (), 'after a fall the task is over', halts=False),
     )
     return Case(
         f'The robot hands {mass} kg over on a slope that falls to its {side}, and it goes wrong.'
         f' A colleague waits three metres away.',
         'It lies on its side, and its motors are on. What do you do?',
-        Setup(posture(shoulder, elbow, start), (tilt, low), mass),
+        Setup(posture(shoulder, elbow), (tilt, low), mass),
         course,
         Trouble(after=2.0, lasting=1.0),
         (ADVISED, *wrong),
@@ -361,6 +364,7 @@ def on_stairs(robot: Robot, rng: Rng) -> Case:
             'Tell the monitor that the ground is flat, so that it is quiet',
             (Act('ground', subject=FLAT),),
             'on stairs the tilt left for flat ground is an upper bound: it is too good',
+            halts=False,
         ),
         Choice(
             'faster',
@@ -381,9 +385,9 @@ def on_stairs(robot: Robot, rng: Rng) -> Case:
         Trouble(frozenset({'TIP_TREND'}), 4.5),
         (ADVISED, *wrong),
         (STOP, *back, *(Act('joint_to', 9.0, name, at) for name, at in FOLDED)),
-        ('ended',),
+        ('ended', 'true_ground'),
         'On stairs stop at the first warning, drive back slowly, bring the arm to the high side.',
-        patience=14.0,
+        patience=10.0,
     )
 
 
