@@ -17,6 +17,7 @@ from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, LastKnown, Snapshot
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
@@ -118,6 +119,9 @@ class ShownRecording:
         if not track.known[k] or any(self._silent(w, when) for w in range(2)):
             told = replace(told, level=max([*active, STALE]), last=self._last(k))
             return replace(told, **self._ground(k, when, payload, known=False))
+        if has_tipped(track.angle[k]):
+            rows = (replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
+            told = replace(told, alerts=tuple(rows))
         return replace(
             told,
             level=max([*active, OK]),

@@ -5,10 +5,11 @@ Advice takes some hundredths of a second, so that it is computed in a thread of 
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.effort.facts import JointMeaning
@@ -31,7 +32,7 @@ class Advisory:
 
     `efforts` is what the joints' efforts mean and say, None before the robot has rested; `estimate`
     is the payload that they suggest, if it differs from the declared one. `on_problem(text)` writes
-    to the log.
+    to the log. `pool` computes: a thread, unless simulated time has to wait for it.
     """
 
     evaluator: LiveEvaluator
@@ -43,7 +44,7 @@ class Advisory:
     rests: LiveRests = field(init=False)
     _made: int = 0
     _told: int = 0
-    _pool: ThreadPoolExecutor = field(
+    pool: Executor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
     )
     _asked: 'Future[tuple[Advice, ...]] | None' = None
@@ -59,7 +60,7 @@ class Advisory:
             self.advice = ()
         elif self._asked is None and now - self._made >= FRESH:
             case = evaluator.settings, margins.q, margins.gravity, evaluator.payload
-            self._asked, self._made = self._pool.submit(advise, *case), now
+            self._asked, self._made = self.pool.submit(advise, *case), now
 
     def arrived(self) -> bool:
         """Collect advice whose computation has finished; return whether its subjects changed."""
@@ -74,7 +75,7 @@ class Advisory:
 
     def close(self) -> None:
         """Stop: end the thread that computes advice."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self.pool.shutdown(wait=False, cancel_futures=True)
 
     def feel(self) -> None:
         """Remember the efforts at rest and judge them now and then; to be called once a second."""
@@ -98,7 +99,7 @@ class Advisory:
     def _judge(self) -> None:
         """Judge the efforts remembered so far, in the thread for advice."""
         case = self.evaluator.settings, (), self.rests.rests()
-        self._judging = self._pool.submit(understand, *case)
+        self._judging = self.pool.submit(understand, *case)
 
     def felt(self, found: Understanding) -> None:
         """Take what the efforts mean and say; in motion the payload suggested before stays."""
@@ -113,9 +114,20 @@ class Advisory:
         joints = () if self.efforts is None else self.efforts.joints
         return [joint for joint in joints if joint.opposed]
 
+    @property
+    def tipped(self) -> bool:
+        """Whether the robot has tipped over, by its newest margins."""
+        margins = self.evaluator.margins
+        return margins is not None and has_tipped(margins.stability.angle)  # type: ignore[arg-type]
+
     def do(self, alert: Alert) -> str:
-        """Return what to do about an alert: the computed advice for its margin, else general."""
+        """Return what to do about an alert: the computed advice for its margin, else general.
+
+        To stand clear is all that is said, about any alert, once the robot has tipped.
+        """
         rule = alert.rule
+        if self.tipped:
+            return STAND_CLEAR
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
         return advice(rule.code, self.evaluator.settings.robot)
@@ -153,8 +165,9 @@ class Advisory:
             values['slide_left_deg'] = round(math.degrees(left), 2)
         if self.estimate is not None:
             values['payload_estimate_kg'] = round(max(self.estimate.mass, 0.0), 2)
-        for k, found in enumerate(self.advice[:3]):
-            values[f'advice_{k + 1}'] = found.sentence
+        # What was computed before a fall may arrive after it.
+        told = [STAND_CLEAR] if self.tipped else [found.sentence for found in self.advice[:3]]
+        values |= {f'advice_{k + 1}': sentence for k, sentence in enumerate(told)}
         return values
 
     def slide(self) -> float:

@@ -33,6 +33,7 @@ from ugv_acceptance.console.snapshot import (
     Memory,
     Snapshot,
 )
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
@@ -57,8 +58,8 @@ _LOOK = 0.5
 class ConsoleNode(Node):
     """A node without a thread: takes messages of robot and monitor when a snapshot is asked for."""
 
-    def __init__(self, config: Config) -> None:
-        super().__init__('acceptance_console')
+    def __init__(self, config: Config, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
+        super().__init__('acceptance_console', **node)
         self.config, self.settings = config, config.settings
         self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
@@ -179,10 +180,12 @@ class ConsoleNode(Node):
         if arriving and self.margins.silent(now, MARGIN_SILENCE):
             return 'the monitor is silent although its inputs arrive'
         level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
-        silent = level == STALE or margins is None
-        # An alert, if there is one, says better what is missing and what to do.
+        # A verdict from before margins were lost says that they are kept: it is no reason. If there
+        # is an alert, it says better what is missing and what to do.
         told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
-        return self.verdict.message if silent and not told else ''
+        if told or level != STALE:
+            return ''
+        return hearing.problem_of(self.verdict.message, self.said, self.settings)
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)
@@ -235,6 +238,7 @@ class ConsoleNode(Node):
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
+        advice = STAND_CLEAR if self.session.advisory.tipped else advice
         own = self._own.get(row.key, row)
         return replace(row, text=own.text, advice=advice, worst=own.worst, peak=own.peak)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ugv_acceptance.evaluation.advice.paths import Path, joint_paths, turn_paths
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Payload, Robot
@@ -92,9 +93,9 @@ SLACK, LEAST_GAIN = 1e-6, 0.1
 class Advice:
     """One piece of advice: a motion or action, how long it takes and what a margin gains by it.
 
-    `kind` is joint, turn or payload; `amount` in rad (m if prismatic) or kg. After `seconds` the
-    `margin` (a side or a joint) has gained `gain` (rad of tilt; N m or N of torque); `enough` says
-    whether that ends the warning. `sentence` is for the operator.
+    `kind` is joint, turn, payload or, after a fall, stand_clear; `amount` in rad (m if prismatic)
+    or kg. After `seconds` the `margin` (a side or a joint) has gained `gain` (rad of tilt; N m or N
+    of torque); `enough` says whether that ends the warning. `sentence` is for the operator.
     """
 
     kind: str
@@ -112,7 +113,7 @@ class _Case:
     """The situation for which advice is searched.
 
     `scores` (m,) of all margins (see `scores_of`), `worst` the number of the margin to improve,
-    `enough` the score at which its warning ends.
+    `enough` the score at which its warning ends. Nothing is searched for a robot that has `tipped`.
     """
 
     settings: Settings
@@ -124,6 +125,7 @@ class _Case:
     state: int
     worst: int
     enough: float
+    tipped: bool = False
 
     @property
     def subject(self) -> str:
@@ -171,6 +173,7 @@ def advise(
 ) -> tuple[Advice, ...]:
     """Return advice, the best first; none if the margin is above its warning limit or unknown.
 
+    A robot that has tipped gets one piece, whatever the margin: STAND_CLEAR.
     `q` (j,) rad or m, `gravity` (3,) m/s2 in `base_link`. `of` names the margin to improve (a side
     or a joint); None chooses the most severe one.
     """
@@ -189,11 +192,17 @@ def advise_each(
     The model evaluates all together, so that fifty take little longer than one.
     """
     cases = _cases(settings, q, gravity, payload, of)
-    warned = [case for case in cases if case is not None and case.scores[case.worst] < 1.0]
+    known = [case for case in cases if case is not None]
+    warned = [case for case in known if not case.tipped and case.scores[case.worst] < 1.0]
     found: dict[int, list[Advice]] = {id(case): [] for case in warned}
+    found |= {id(case): [_stand_clear(case)] for case in known if case.tipped}
     for case, advice in chain(_moves(warned), _loads(warned)):
         found[id(case)].append(advice)
     return [tuple(sorted(found.get(id(case), ()), key=_order)) for case in cases]
+
+
+def _stand_clear(case: _Case) -> Advice:
+    return Advice('stand_clear', 'robot', 0.0, 0.0, case.subject, 0.0, False, STAND_CLEAR)  # noqa: FBT003
 
 
 def _order(advice: Advice) -> tuple[bool, bool, float]:
@@ -219,12 +228,13 @@ def _cases(
         _most_severe(mine) if name is None else margin_names(settings).index(name)
         for mine, name in zip(scores, of, strict=True)
     ]
-    rows = zip(at, down, scores, now.torque, now.state.tolist(), worst, strict=True)
+    tipped = list(map(has_tipped, now.angle))
+    rows = zip(at, down, scores, now.torque, now.state.tolist(), worst, tipped, strict=True)
     return [
-        _Case(settings, x, g, payload, score, torque, state, k, _enough(settings, k))
+        _Case(settings, x, g, payload, score, torque, state, k, _enough(settings, k), fell)
         if told
         else None
-        for told, (x, g, score, torque, state, k) in zip(known, rows, strict=True)
+        for told, (x, g, score, torque, state, k, fell) in zip(known, rows, strict=True)
     ]
 
 
