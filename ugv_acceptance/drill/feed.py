@@ -34,9 +34,10 @@ class DrillFeed:
 
     def __post_init__(self) -> None:
         self.settings = self.course.config.settings
-        self._begin()
+        self.restart()
 
-    def _begin(self) -> None:
+    def restart(self) -> None:
+        """Let the time for reading begin now."""
         self._then = self.now()
         self._ready = self._then + READING
         self._memory = Memory()
@@ -88,5 +89,5 @@ class DrillFeed:
             raise BadSample(f'in a drill choose one of the answers; it cannot do {do!r:.40}')
         said = self.course.next() if do == 'next' else self.course.repeat()
         if self.course.phase != ENDED:
-            self._begin()
+            self.restart()
         return said
