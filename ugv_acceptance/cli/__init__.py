@@ -36,6 +36,7 @@ VERBS = (
     'plan',
     'run',
     'simulate',
+    'drill',
     'model',
     'map',
     'paper',

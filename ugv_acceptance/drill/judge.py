@@ -1,4 +1,4 @@
-"""Judges a situation by what the simulated robot did: facts first, then rules, each with numbers."""
+"""Judges a situation by what the simulated robot did: facts first, then rules, with numbers."""
 
 import math
 from collections.abc import Callable

@@ -17,7 +17,6 @@ from ugv_acceptance.drill.outcome import Outcome
 from ugv_acceptance.drill.robot import LOOK, DrillRobot, Truth
 from ugv_acceptance.drill.situation import (
     ADVICE,
-    GO_ON,
     STOP,
     WAIT,
     Act,
@@ -162,7 +161,7 @@ class Play:
     def _words(self) -> str:
         """Return what the monitor says is to be done now, as an answer."""
         said = str(self.robot.verdict.values.get('do', ''))
-        words = self.case.advised_words or (said.split(':')[0] if self._advice else said)
+        words = self.case.advised_words or (said.partition(':')[0] if self._advice else said)
         return f'{words[:1].upper()}{words[1:]}'
 
     def _computed(self) -> Advice | None:
@@ -171,8 +170,8 @@ class Play:
         told = advice and advice[0].kind != 'stand_clear' and advice[0].sentence == said
         return advice[0] if told else None
 
-    def choose(self, key: str) -> None:
-        """Carry out the answer with a key. Raises BadSample where nothing is asked, or not that."""
+    def choose(self, key: str) -> str:
+        """Carry out the answer with a key; return its words. BadSample: not asked."""
         if self.phase != ASK:
             raise BadSample('choose: expected a question, there is none now')
         found = next((choice for choice in self.choices if choice.key == key), None)
@@ -189,6 +188,7 @@ class Play:
             self._act(self._advised(), halt=True)
         else:
             self._act(found.acts, halt=found.halts)
+        return found.words
 
     def _act(self, acts: tuple[Act, ...], *, halt: bool) -> None:
         """Carry out acts from now on, in place of the course of things if that is to `halt`."""
@@ -233,9 +233,7 @@ class Play:
 
     def _end(self) -> End:
         levels = {
-            (a.rule.code, a.rule.subject)
-            for a in self.robot.session.active
-            if a.rule.level >= WARN
+            (a.rule.code, a.rule.subject) for a in self.robot.session.active if a.rule.level >= WARN
         }
         return End(self.truth, self.scene, not levels & self._first, self._fell)
 

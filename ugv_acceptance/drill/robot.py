@@ -122,9 +122,7 @@ class DrillRobot:
         )
         _, self._upright = self.simulation.base()
         load = Payload(setup.load, robot.payload.cog)
-        self.simulation.apply(
-            Command(0.0, slope=setup.slope, slope_rate=_AT_ONCE, payload=load)
-        )
+        self.simulation.apply(Command(0.0, slope=setup.slope, slope_rate=_AT_ONCE, payload=load))
         self.virtual.remote.advance(_REST)
         self._set_clock()
         self.session = self._session()

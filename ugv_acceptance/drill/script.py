@@ -10,13 +10,14 @@ of it; it comes after 2 s unless the line says when. A line for a situation wins
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.drill.course import Course
+from ugv_acceptance.drill.outcome import Outcome
 from ugv_acceptance.drill.play import ASK, JUDGED, Play
-from ugv_acceptance.drill.situation import ADVICE, GO_ON, Choice
+from ugv_acceptance.drill.situation import ADVICE, GO_ON
 from ugv_acceptance.drill.situations import SITUATIONS
 
 # Seconds to an answer for which the script gives none.
@@ -64,9 +65,9 @@ def _answer(text: str, number: int) -> Answer:
     return Answer(found['what'], after)
 
 
-def choice_of(what: str, choices: Iterable[Choice]) -> str:
+def choice_of(what: str, play: Play) -> str:
     """Return the key of the answer that a script means. Raises BadConfig: none, or several."""
-    offered = list(choices)
+    offered = play.choices
     key = _NAMES.get(what, what.replace(' ', '_'))
     if any(choice.key == key for choice in offered):
         return key
@@ -74,7 +75,7 @@ def choice_of(what: str, choices: Iterable[Choice]) -> str:
     found = [c.key for c in offered if all(word in c.words.lower() for word in words)]
     if len(found) != 1:
         told = '; '.join(f'{choice.key} ({choice.words})' for choice in offered)
-        raise BadConfig(f'expected one of: {told}; got {what!r}')
+        raise BadConfig(f'{play.situation.name}: expected one of: {told}; got {what!r}')
     return found[0]
 
 
@@ -84,16 +85,19 @@ def perform(play: Play, answers: Sequence[Answer], step: float = 0.05) -> None:
     while play.phase != JUDGED:
         play.advance(step)
         while waiting and play.phase == ASK and play.asked_for >= waiting[0].after - 1e-9:
-            try:
-                play.choose(choice_of(waiting.pop(0).what, play.choices))
-            except BadConfig as error:
-                raise BadConfig(f'{play.situation.name}: {error}') from None
+            play.choose(choice_of(waiting.pop(0).what, play))
 
 
-def run_script(course: Course, script: Script) -> None:
-    """Play a whole drill by a script. A situation that it does not name gets no answer."""
+def run_script(
+    course: Course, script: Script, told: Callable[[Outcome], None] = lambda _: None
+) -> None:
+    """Play a whole drill by a script; `told` takes the outcome of each situation as it ends.
+
+    A situation that the script does not name gets no answer. Raises BadConfig as `perform`.
+    """
     while not course.over:
         name = course.play.situation.name
         perform(course.play, script.get(name, script.get(ALL, ())))
         course.advance(0.0)
+        told(course.outcomes[-1])
         course.next()

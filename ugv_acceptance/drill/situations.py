@@ -4,10 +4,9 @@ In each the course of things ends badly by itself: on the simulated robot one ca
 tips it, overloads a joint, or moves it while nobody knows its margins.
 """
 
-from math import pi, radians
+from math import degrees, pi, radians
 
-import numpy as np
-
+from ugv_acceptance.drill.arm import FOLD, FOLDED, Rng, between, posture, side_of, tilt_left
 from ugv_acceptance.drill.situation import (
     ADVICE,
     GO_ON,
@@ -19,17 +18,10 @@ from ugv_acceptance.drill.situation import (
     Trouble,
 )
 from ugv_acceptance.evaluation.ground import FLAT, STAIRS
-from ugv_acceptance.model.robot import Payload, Robot
-from ugv_acceptance.model.stability import margins
+from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.simulation.faults import Fault
 from ugv_acceptance.simulation.shape import stairs
-from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
-Rng = np.random.Generator
-Joints = tuple[tuple[str, float], ...]
-# The arm folded over the deck (rad).
-FOLDED = (('turret_joint', 0.0), ('shoulder_joint', radians(115)), ('elbow_joint', radians(-140)))
-FOLD = tuple(Act('joint_to', 1.5, name, at) for name, at in FOLDED)
 STOP = Act('stop')
 ON, OFF = 'Go on as planned', 'Acknowledge the alert and go on'
 ADVISED = Choice(ADVICE, '')
@@ -42,39 +34,10 @@ def _going_on(lesson: str) -> tuple[Choice, Choice]:
     return Choice(GO_ON, ON, (), lesson, halts=False), seen
 
 
-def posture(shoulder: float, elbow: float, turret: float = 0.0) -> Joints:
-    """Return the arm's posture by angles in degrees, flippers folded back along the tracks."""
-    return (
-        ('flipper_joint', pi),
-        ('turret_joint', radians(turret)),
-        ('shoulder_joint', radians(shoulder)),
-        ('elbow_joint', radians(elbow)),
-    )
-
-
-def _between(rng: Rng, low: float, high: float) -> float:
-    """Return a number between two, with one decimal, so that a story can tell it."""
-    return round(float(rng.uniform(low, high)), 1)
-
-
-def _side(rng: Rng) -> tuple[float, str]:
-    """Return a side as its sign (left +1, right -1) and in words."""
-    left = bool(rng.integers(2))
-    return (1.0, 'left') if left else (-1.0, 'right')
-
-
-def tilt_left(robot: Robot, arm: Joints, tilt: tuple[float, float], load: float) -> float:
-    """Return the least tilt left (rad) in a posture on a slope (tilt, heading), with a load."""
-    at = dict(arm)
-    q = np.array([at.get(name, 0.0) for name in robot.joint_names])
-    down = np.array(gravity_on_slope(robot.gravity, *tilt))
-    return float(margins(robot, q, down, Payload(load, robot.payload.cog)).angle.min())
-
-
 def slope(robot: Robot, rng: Rng) -> Case:
     """Draw a raised arm that swings out over the low side of a slope."""
-    sign, side = _side(rng)
-    load, shoulder, elbow = _between(rng, 2.6, 3.2), rng.uniform(72, 80), rng.uniform(-70, -55)
+    sign, side = side_of(rng)
+    load, shoulder, elbow = between(rng, 2.6, 3.2), rng.uniform(72, 80), rng.uniform(-70, -55)
     tilt, low = radians(float(rng.integers(12, 16))), sign * pi / 2.0
 
     def left(turret: float) -> float:
@@ -103,7 +66,7 @@ def slope(robot: Robot, rng: Rng) -> Case:
         ),
     )
     return Case(
-        f'The robot stands on a slope of {round(np.degrees(tilt))} degrees that falls to its {side},'
+        f'The robot stands on a slope of {degrees(tilt):.0f} degrees that falls to its {side},'
         f' with {load} kg in its raised arm. The arm swings slowly out to the {side}, to hand the'
         ' load over.',
         'The alert is there and the arm still moves. What do you do?',
@@ -117,9 +80,9 @@ def slope(robot: Robot, rng: Rng) -> Case:
     )
 
 
-def load(robot: Robot, rng: Rng) -> Case:
+def load(_: Robot, rng: Rng) -> Case:
     """Draw an arm that is stretched out with more than its shoulder holds."""
-    mass = _between(rng, 3.6, 4.4)
+    mass = between(rng, 3.6, 4.4)
     shoulder, elbow = rng.uniform(80, 88), rng.uniform(-112, -100)
     turret = rng.uniform(-15.0, 15.0)
     out = (
@@ -168,9 +131,9 @@ def _dead(rng: Rng) -> tuple[Fault, str, str]:
 
 def sensor(robot: Robot, rng: Rng) -> Case:
     """Draw a sensor that dies while the robot drives along a slope that gets steeper."""
-    sign, side = _side(rng)
+    sign, side = side_of(rng)
     fault, what, check = _dead(rng)
-    mass, speed = _between(rng, 2.0, 3.0), _between(rng, 0.1, 0.3)
+    mass, speed = between(rng, 2.0, 3.0), between(rng, 0.1, 0.3)
     arm = posture(rng.uniform(72, 80), rng.uniform(-65, -55), sign * 90.0)
     low, tilt = sign * pi / 2.0, 0.0
     while tilt_left(robot, arm, (tilt, low), mass) > radians(-6.0):
@@ -212,10 +175,10 @@ def sensor(robot: Robot, rng: Rng) -> Case:
     )
 
 
-def braking(robot: Robot, rng: Rng) -> Case:
+def braking(_: Robot, rng: Rng) -> Case:
     """Draw a robot that brakes hard downhill with its arm stretched out ahead."""
-    tilt, mass = float(rng.integers(8, 12)), _between(rng, 3.0, 3.5)
-    shoulder, speed = rng.uniform(85, 88), _between(rng, 1.6, 1.9)
+    tilt, mass = float(rng.integers(8, 12)), between(rng, 3.0, 3.5)
+    shoulder, speed = rng.uniform(85, 88), between(rng, 1.6, 1.9)
     drive = Act('drive', 5.0, amount=speed)
     course = (
         Act('drive', 1.0, amount=0.6, rate=2.0),
@@ -257,8 +220,8 @@ def braking(robot: Robot, rng: Rng) -> Case:
 
 def false_alarm(robot: Robot, rng: Rng) -> Case:
     """Draw a payload declared far too heavy: an alert that the robot itself contradicts."""
-    sign, side = _side(rng)
-    mass, typed = _between(rng, 1.0, 1.8), 4.0
+    sign, _ = side_of(rng)
+    mass, typed = between(rng, 1.0, 1.8), 4.0
     shoulder, elbow = rng.uniform(66, 74), rng.uniform(-65, -55)
     low, tilt = sign * pi / 2.0, radians(20.0)
     arm = posture(shoulder, elbow, sign * 90.0)
@@ -305,8 +268,8 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
 
 def fall(robot: Robot, rng: Rng) -> Case:
     """Draw a robot that tips over on a slope, and lies there with its motors on."""
-    sign, side = _side(rng)
-    mass, low = _between(rng, 3.2, 3.8), sign * pi / 2.0
+    sign, side = side_of(rng)
+    mass, low = between(rng, 3.2, 3.8), sign * pi / 2.0
     shoulder, elbow, tilt = rng.uniform(58, 64), rng.uniform(-55, -45), radians(12.0)
     while tilt_left(robot, posture(shoulder, elbow, sign * 90), (tilt, low), mass) > radians(-8.0):
         tilt += radians(1.0)
@@ -352,9 +315,9 @@ def fall(robot: Robot, rng: Rng) -> Case:
     )
 
 
-def on_stairs(robot: Robot, rng: Rng) -> Case:
+def on_stairs(_: Robot, rng: Rng) -> Case:
     """Draw a robot that climbs stairs with its load behind it."""
-    mass = _between(rng, 2.6, 3.4)
+    mass = between(rng, 2.6, 3.4)
     rise, shoulder = round(float(rng.uniform(0.055, 0.065)), 3), rng.uniform(72, 78)
     back = Act('drive', 1.5, amount=-0.12), Act('drive', 9.0)
     course = (Act('drive', 1.0, amount=0.2), Act('drive', 3.0, amount=0.05))
@@ -379,7 +342,10 @@ def on_stairs(robot: Robot, rng: Rng) -> Case:
         ' back. The monitor knows that these are stairs.',
         'What do you do?',
         Setup(
-            posture(shoulder, -40.0, 180.0), load=mass, ground=STAIRS, blocks=stairs(0.6, rise, 0.25, 8)
+            posture(shoulder, -40.0, 180.0),
+            load=mass,
+            ground=STAIRS,
+            blocks=stairs(0.6, rise, 0.25, 8),
         ),
         course,
         Trouble(frozenset({'TIP_TREND'}), 4.5),

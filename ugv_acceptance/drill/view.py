@@ -58,9 +58,7 @@ def snapshot_of(robot: DrillRobot) -> Snapshot:
 def _alerts(robot: DrillRobot, said: dict[str, str]) -> tuple[AlertRow, ...]:
     """Return the alerts, active ones with their worst value until now and the newest advice."""
     session = robot.session
-    active = {
-        f'{a.rule.code}-{a.rule.subject}-{LEVELS[a.rule.level]}': a for a in session.active
-    }
+    active = {f'{a.rule.code}-{a.rule.subject}-{LEVELS[a.rule.level]}': a for a in session.active}
     rows = []
     for row in robot.alerts.rows.values():
         alert = active.get(row.key)
