@@ -5,7 +5,7 @@ person acknowledges as one; two sides, or two joints, are never one.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -213,8 +213,3 @@ def _when(at: int | None, snapshot: Snapshot) -> str:
     if snapshot.source != 'live' and math.isfinite(snapshot.running):
         return f'at {snapshot.running - ago:.1f} s'
     return 'now' if ago < 1.0 else f'{ago:.0f} s ago'
-
-
-def keys_for(do: str, keys: Iterable[str], rows: Mapping[str, AlertRow]) -> list[str]:
-    """Return those of a card's `keys` whose alert offers a command; others are left as they are."""
-    return [key for key in keys if key in rows and do in rows[key].offers]

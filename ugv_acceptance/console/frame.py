@@ -16,10 +16,9 @@ from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as STAND_CLEAR_ADVICE
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, WARN
-from ugv_acceptance.evaluation.criteria.not_judged import unlimited
+from ugv_acceptance.evaluation.criteria.not_judged import left_open, unlimited
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import tilt_not_checked
 from ugv_acceptance.evaluation.margin_words import share_words, tenths_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
@@ -159,16 +158,21 @@ class _Same:
 def _unchecked(same: _Same) -> str:
     """Return what no verdict on a robot covers, in one line; '' if all is covered."""
     settings = same.settings
-    found = [] if settings.judges_tilt else [tilt_not_checked(settings)]
-    joints = [name_words(name) for name in unlimited(settings)]
-    found += [f'torque of {", ".join(joints)} (no limit known)'] * bool(joints)
+    joints = ', '.join(name_words(name) for name in unlimited(settings))
+    found = [one.what for one in left_open(settings).not_checked]
+    found = [f'{name_words(what)} (not in the configuration)' for what in found]
+    found += ['tip-over (no IMU)'] * (not settings.hears_imu)
+    found += ['torques (no joint states)'] * (not settings.hears_joints)
+    found += [f'torque of {joints} (no limit known)'] * bool(joints)
     return f'NOT CHECKED: {", ".join(found)}' if found else ''
 
 
 def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
     """Return the seconds until the first margin is used up, and what happens then."""
     soon = snapshot.countdown
-    if soon is None or view.dead or view.fallen is not None or not soon.seconds > 0.0:
+    if soon is None or view.dead or view.doubted or view.fallen is not None:
+        return None, ''
+    if not soon.seconds > 0.0:
         return None, ''
     name = name_words(soon.subject)
     return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'
