@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+from rich.table import Table
+from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import VerticalScroll
@@ -260,7 +262,7 @@ class Terminal(App[None]):
         if self._source == 'live':
             lamps.append(f'   as {self.who}{f", note: {self.note}" if self.note else ""}')
         lamps.append(f'\n{self.said}' if self.said else '', 'bold')
-        drawn = {
+        drawn: dict[str, Text | Table] = {
             'headline': headline_of(frame, plain=self.plain),
             'now': now_of(frame),
             'cards': cards_of(frame, self.chosen),
