@@ -16,10 +16,9 @@ from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as STAND_CLEAR_ADVICE
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, WARN
-from ugv_acceptance.evaluation.criteria.not_judged import unlimited
+from ugv_acceptance.evaluation.criteria.not_judged import left_open, unlimited
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import tilt_not_checked
 from ugv_acceptance.evaluation.margin_words import share_words, tenths_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
@@ -59,9 +58,9 @@ def describe_robot(settings: Settings) -> Plain:
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     view = view_of(snapshot, settings)
-    headline = headline_of(snapshot, settings, view)
+    headline = headline_of(view)
     seconds, seconds_to = _countdown(snapshot, view)
-    active, past = cards_of(view, snapshot, settings)
+    active, past = cards_of(view)
     torque, worst = _torque(snapshot, settings, dead=view.dead)
     return {
         'time_s': snapshot.time / 1e9,
@@ -121,7 +120,7 @@ def numbers(values: Iterable[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[Plain], list[Plain]]:
+def cards_of(view: View) -> tuple[list[Plain], list[Plain]]:
     """Return the cards of what is active, and of what is over.
 
     What is over, and what was advised by numbers that are dead, gives no advice.
@@ -129,7 +128,8 @@ def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[P
     fallen = None if view.fallen is None else STAND_CLEAR_ADVICE
     now = '' if view.dead else fallen
     cards = [
-        card_of(group, snapshot, settings, now if group.active else '') for group in view.groups
+        card_of(group, view.snapshot, view.settings, now if group.active else '')
+        for group in view.groups
     ]
     return [card for card in cards if card['active']], [c for c in cards if not c['active']]
 
@@ -159,16 +159,21 @@ class _Same:
 def _unchecked(same: _Same) -> str:
     """Return what no verdict on a robot covers, in one line; '' if all is covered."""
     settings = same.settings
-    found = [] if settings.judges_tilt else [tilt_not_checked(settings)]
-    joints = [name_words(name) for name in unlimited(settings)]
-    found += [f'torque of {", ".join(joints)} (no limit known)'] * bool(joints)
+    joints = ', '.join(name_words(name) for name in unlimited(settings))
+    found = [one.what for one in left_open(settings).not_checked]
+    found = [f'{name_words(what)} (not in the configuration)' for what in found]
+    found += ['tip-over (no IMU)'] * (not settings.hears_imu)
+    found += ['torques (no joint states)'] * (not settings.hears_joints)
+    found += [f'torque of {joints} (no limit known)'] * bool(joints)
     return f'NOT CHECKED: {", ".join(found)}' if found else ''
 
 
 def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
     """Return the seconds until the first margin is used up, and what happens then."""
     soon = snapshot.countdown
-    if soon is None or view.dead or view.fallen is not None or not soon.seconds > 0.0:
+    if soon is None or view.dead or view.doubted or view.fallen is not None:
+        return None, ''
+    if not soon.seconds > 0.0:
         return None, ''
     name = name_words(soon.subject)
     return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'

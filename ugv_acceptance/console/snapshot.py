@@ -123,8 +123,12 @@ class Memory:
     last: LastKnown | None = None
 
     def keep(self, snapshot: Snapshot) -> Snapshot:
-        """Return a snapshot that knows what was known last, and remember what it knows itself."""
-        if snapshot.known:
+        """Return a snapshot that knows what was known last, and remember what it knows itself.
+
+        Numbers that come while an alert says that there are no data are none.
+        """
+        lost = any(row.level == STALE and row.end is None for row in snapshot.alerts)
+        if snapshot.known and not lost:
             self.last = LastKnown(snapshot.time, snapshot.angle, snapshot.torque, snapshot.rough)
             return snapshot
         return snapshot if self.last is None else replace(snapshot, last=self.last)

@@ -57,8 +57,8 @@ _LOOK = 0.5
 class ConsoleNode(Node):
     """A node without a thread: takes messages of robot and monitor when a snapshot is asked for."""
 
-    def __init__(self, config: Config) -> None:
-        super().__init__('acceptance_console')
+    def __init__(self, config: Config, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
+        super().__init__('acceptance_console', **node)
         self.config, self.settings = config, config.settings
         self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
@@ -179,10 +179,12 @@ class ConsoleNode(Node):
         if arriving and self.margins.silent(now, MARGIN_SILENCE):
             return 'the monitor is silent although its inputs arrive'
         level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
-        silent = level == STALE or margins is None
-        # An alert, if there is one, says better what is missing and what to do.
+        # A verdict from before margins were lost says that they are kept: it is no reason. If there
+        # is an alert, it says better what is missing and what to do.
         told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
-        return self.verdict.message if silent and not told else ''
+        if told or level != STALE:
+            return ''
+        return hearing.problem_of(self.verdict.message, self.said, self.settings)
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)

@@ -16,7 +16,7 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.description import TYPE
 from ugv_acceptance.bag.told_robot import description_message
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.alarms import Alarm, Alarms, Change, State, key_of
+from ugv_acceptance.evaluation.alerts.alarms import Alarm, Alarms, Change, State, key_of, latches
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, WARN, Rule
 from ugv_acceptance.monitoring.session import Session
@@ -127,7 +127,8 @@ def _operate_all(alarms: Alarms, now: int, o: Operation) -> list[Change]:
     if o.do != 'reset':
         raise BadSample(f'{o.do}: expected the code of an alert, got none')
     changes = alarms.reset(now, o.who, o.note)
-    unseen = [a for a in alarms.table.values() if a.state is State.RETURNED_UNACKNOWLEDGED]
+    over = [a for a in alarms.table.values() if a.state is State.RETURNED_UNACKNOWLEDGED]
+    unseen = [alarm for alarm in over if latches(alarm.rule)]
     if unseen and not changes:
         raise BadSample(f'reset: {_words(unseen)}: acknowledge first')
     return changes
