@@ -83,6 +83,8 @@ def acceptance_page(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
     environment.filters.update(
+        training=training_line,
+        drilled=training_rows,
         number=number_text,
         seconds=seconds_text,
         level=level_words,
@@ -92,8 +94,6 @@ def acceptance_page(
         interval=interval_text,
         range=range_text,
         missing=missing_text,
-        training=training_line,
-        drilled=training_rows,
     )
     return environment.get_template('acceptance.html').render(
         result=result,
