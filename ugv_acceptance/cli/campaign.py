@@ -252,9 +252,9 @@ def campaign(
 
     \b
     Examples:
-      ugv-acceptance campaign recordings --require-mtbf 96 --failures failures.yaml
+      ugv-acceptance campaign recordings --require-mtbf 96 --failures log.yaml
       ugv-acceptance campaign s3://bucket/runs --scheduler tcp://head:8786
-      ugv-acceptance campaign recordings --compare 'old=*/fw1/*' --compare 'new=*/fw2/*'
+      ugv-acceptance campaign runs --compare 'old=*/fw1/*' --compare 'new=*/fw2/*'
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.campaign.carry_out import Place, all_failures, carry_out
     from ugv_acceptance.campaign.failure_log import read_log

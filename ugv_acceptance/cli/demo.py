@@ -31,9 +31,10 @@ def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
     It is 0 where both the live run and the recording were judged.
     """
     from ugv_acceptance.cli.result_text import print_result
+    from ugv_acceptance.cli.terminal_output import console_of
     from ugv_acceptance.offline.evaluate import evaluate
 
-    console = Console(highlight=False)
+    console = console_of()
     path = find(bag)
     domain = free_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)
@@ -45,7 +46,7 @@ def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
     alerts, played = live(path, rate, console, page=page)
     console.rule('2. The same run from the recording')
     result = evaluate(path).result
-    print_result(result)
+    print_result(result, console)
     return conclude(console, alerts, played, result)
 
 

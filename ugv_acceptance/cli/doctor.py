@@ -62,7 +62,7 @@ def doctor(
     \b
     Examples:
       ugv-acceptance doctor
-      ugv-acceptance doctor --config my_robot.yaml --seconds 10 --ros-args -r __ns:=/robot1
+      ugv-acceptance doctor -c my_robot.yaml --seconds 10 --ros-args -r __ns:=/r1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.doctor import consult
 

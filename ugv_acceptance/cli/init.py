@@ -130,7 +130,7 @@ def init(
       ugv-acceptance init husky.urdf
       ugv-acceptance init husky.urdf run/ --mass 52kg --picture husky.png
       ugv-acceptance init robot.urdf.xacro --meshes ~/ws/src -o robot.yaml
-      ugv-acceptance init run/ --contacts wheel_1,wheel_2,wheel_3 --limit 'arm_*=urdf'
+      ugv-acceptance init run/ --contacts wheel_1,wheel_2 --limit 'arm_*=urdf'
       ugv-acceptance init --live --for 20s
       ugv-acceptance init --check robot.yaml run/ --picture robot.html
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart

@@ -64,9 +64,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     \b
     Examples:
       ugv-acceptance map torque
-      ugv-acceptance map rollover --orientation right --slope 30deg --posture flipper_joint=180deg
-      ugv-acceptance map payload --limit shoulder_joint=70,elbow_joint=70 --out payload.png
-      ugv-acceptance map rollover --x flipper_joint=-30deg:180deg --y elbow_joint --out tip.csv
+      ugv-acceptance map rollover --orientation right --posture flipper_joint=180deg
+      ugv-acceptance map payload --limit elbow_joint=70 --out payload.png
+      ugv-acceptance map rollover --x flipper_joint=0deg:180deg --out tip.csv
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import whole

@@ -274,9 +274,9 @@ def model(
     Examples:
       ugv-acceptance model
       ugv-acceptance model --posture shoulder_joint=30deg,flipper_joint=180deg
-      ugv-acceptance model --config packbot_eod --posture STOW,shoulder_joint=90deg
+      ugv-acceptance model -c packbot_eod --posture STOW,shoulder_joint=90deg
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
-      ugv-acceptance model --posture shoulder_joint=60deg --tilt roll=15deg --power-loss
+      ugv-acceptance model --posture shoulder_joint=60deg --power-loss
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.power_loss import describe_power_loss, print_power_loss

@@ -29,10 +29,18 @@ GroundKinds = Annotated[
     ),
 ]
 PayloadMass = Annotated[str, typer.Option(help='Mass of the payload: 4 (kg) or "10 lb".')]
+Verbose = Annotated[
+    bool, typer.Option('--verbose', '-v', help='Print all there is, not a dozen lines.')
+]
 Overwrite = Annotated[
     bool,
     typer.Option('--overwrite', help='Replace files that exist, whatever they are; never inputs.'),
 ]
+
+
+def dash(path: Path | None) -> Path | None:
+    """Return the path of an output: `-` is standard output."""
+    return Path('/dev/stdout') if path == Path('-') else path
 
 
 def poses_like(context: typer.Context, incomplete: str) -> list[str]:

@@ -50,7 +50,7 @@ def plan(
     Examples:
       ugv-acceptance plan -o plan.yaml --card card.html
       ugv-acceptance plan --from plan.yaml --card card.html
-      ugv-acceptance plan --config my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
+      ugv-acceptance plan -c my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.cli import output_kinds as kinds

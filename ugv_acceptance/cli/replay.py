@@ -45,7 +45,7 @@ def replay(
     \b
     Examples:
       ugv-acceptance replay bags/packbot_fail
-      ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data --topics /joint_states
+      ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data
       ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
       ugv-acceptance replay run --no-restamp
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart

@@ -62,7 +62,7 @@ def simulate(
       ugv-acceptance simulate --list
       ugv-acceptance simulate overreach --seed 2 --bag out/overreach
       ugv-acceptance simulate tilt --config husky.yaml --bag out/tilt
-      ugv-acceptance simulate work -s 600 --bag out/work --fault frozen-encoder:elbow_joint@60-90
+      ugv-acceptance simulate work -s 600 --bag out/work --fault imu-bias@60-90
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     if listed:
         _print_list()
