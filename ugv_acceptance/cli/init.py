@@ -5,13 +5,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.options import Overwrite
+from ugv_acceptance.cli.terminal_output import console_of, say, wrote
 
 if TYPE_CHECKING:
     from ugv_acceptance.cli.init_work import Found
@@ -26,7 +24,7 @@ COLOURS = {
 }
 
 
-def say(text: str) -> None:
+def doing(text: str) -> None:
     """Say on a terminal what is being done; nothing in a script."""
     if sys.stderr.isatty():
         typer.echo(f'{text} ...', err=True)
@@ -41,29 +39,25 @@ def print_found(found: 'Found') -> int:
     """Print checks, notes and what is open; return the exit code."""
     from ugv_acceptance.configure.checks import exit_code
 
-    console = Console(highlight=False)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ('check', '', 'what was found'):
-        table.add_column(column, overflow='fold')
-    for check in found.checks:
-        state = f'[{COLOURS[check.state]}]{check.state}[/]'
-        table.add_row(escape(check.what), state, escape(check.text))
-    for note in found.notes:
-        console.print(f'note: {escape(note)}', soft_wrap=True)
-    console.print(table)
-    for question in found.questions:
-        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
-        console.print(escape(text), soft_wrap=True)
-    code = exit_code(found.checks)
+    console, code = console_of(), exit_code(found.checks)
     failed = [check.what for check in found.checks if check.state == 'FAILS']
     words = {
-        DONE: f'done: {found.done}',
-        FAILS: f'NOT done, a check fails: {", ".join(failed)}',
-        OPEN: 'NOT done: something is open, and what hangs on it is not checked',
+        DONE: f'[bold green]done:[/] {escape(found.done)}',
+        FAILS: f'[bold red]NOT done, a check fails:[/] {escape(", ".join(failed))}',
+        OPEN: '[bold yellow]NOT done:[/] something is open, and what hangs on it is not checked',
     }
-    for path in found.written:
-        console.print(f'written: {escape(str(path))}', soft_wrap=True)
-    console.print(escape(words[code]), soft_wrap=True)
+    say(console, words[code])
+    for note in found.notes:
+        say(console, f'note: {escape(note)}')
+    wide = max((len(check.what) for check in found.checks), default=0)
+    for check in found.checks:
+        state = f'[{COLOURS[check.state]}]{check.state:8}[/]'
+        say(console, f'{check.what:{wide}}  {state}  {escape(check.text)}', 2, wide + 14)
+    for question in found.questions:
+        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
+        say(console, escape(text))
+    say(console, words[code])
+    wrote(*found.written)
     return code
 
 
@@ -142,7 +136,7 @@ def init(
     heard = quantity(seconds, 'time', '--for') if live else None
     arguments = dict(_argument(text) for text in xacro_arg or ())
     asked = Asked(
-        tuple(sources or ()), tuple(meshes or ()), heard, arguments, picture, overwrite, say
+        tuple(sources or ()), tuple(meshes or ()), heard, arguments, picture, overwrite, doing
     )
     if check is not None:
         _refuse_answers(answers)

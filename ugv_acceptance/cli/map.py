@@ -69,11 +69,14 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
       ugv-acceptance map rollover --x flipper_joint=0deg:180deg --out tip.csv
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from rich.markup import escape
+
     from ugv_acceptance.bag.atomic_files import whole
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
+    from ugv_acceptance.cli.terminal_output import result_console, say, wrote
     from ugv_acceptance.config import load
     from ugv_acceptance.offline.own_robot import robot_of
     from ugv_acceptance.report.map_data import map_of
@@ -89,14 +92,16 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     data = with_levels(map_of(kind, scene), caution, failure)
     warn(payload_doubts(scene.robot, payload))
     track = _track(loaded, scene, from_bag) if from_bag else None
-    typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}')
+    console = result_console(*paths)
+    say(console, escape(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}'))
     found = classes(data.margin, data.levels.caution, data.levels.failure)
     for k, name in enumerate(CLASSES):
-        typer.echo(f'  {name:8}{100.0 * area_fraction(found == k, scene.grid):6.1f} % of the map')
+        share = 100.0 * area_fraction(found == k, scene.grid)
+        console.print(f'  {name:8}{share:6.1f} % of the map')
     for path in paths:
         with whole(path) as file:
             write_map(file, path.suffix.lower(), scene, data, track)
-        typer.echo(f'Wrote {path}.')
+        wrote(path)
 
 
 def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':

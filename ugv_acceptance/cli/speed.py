@@ -43,6 +43,7 @@ def speed(
     import math
 
     import numpy as np
+    from rich.markup import escape
 
     from ugv_acceptance import BadConfig
     from ugv_acceptance.cli.robot_description import (
@@ -50,6 +51,7 @@ def speed(
         payload_from,
         warn,
     )
+    from ugv_acceptance.cli.terminal_output import console_of, say
     from ugv_acceptance.config import load
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
@@ -75,13 +77,12 @@ def speed(
         document |= {'speed_m_s': slides} if slides else {}
         typer.echo(json.dumps(document, indent=2))
         return
-    typer.echo(
-        f'{robot.name}, {load_carried.mass:g} kg, '
-        f'error of the static model {reference:g} N m, F < {bound:.4f}'
-    )
+    console = console_of()
+    of_model = f'error of the static model {reference:g} N m, F < {bound:.4f}'
+    say(console, escape(f'{robot.name}, {load_carried.mass:g} kg, {of_model}'))
     wide = max(24, *(len(name) + 1 for name in robot.joint_names))
     for name, limit in zip(robot.joint_names, limits, strict=True):
-        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
+        console.print(escape(f'  {name:{wide}}{_speed(robot, name, limit)}'), soft_wrap=True)
 
 
 def _check(robot: 'Robot') -> None:

@@ -6,6 +6,7 @@ to standard error, so that a pipe holds the result alone.
 
 import os
 import re
+import shlex
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -86,9 +87,7 @@ def _folded(text: Text, width: int, indent: int, hang: int) -> list[Text]:
     """Return the lines of a text: as many words in each as fit."""
     parts, start, end, room = [], 0, 0, width - indent
     for word in _WORD.finditer(text.plain):
-        if not parts and not end:
-            start = word.start()
-        elif word.end() - start > room:
+        if end and word.end() - start > room:
             parts.append(text[start:end])
             start, room = word.start(), width - hang
         end = word.end()
@@ -109,27 +108,31 @@ def shown_verdict(word: str, text: str) -> str:
     return f'[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(text)}'
 
 
-def table_of(title: str, *columns: str, header: bool = True) -> Table:
-    """Return an empty table: the first column to the left, others to the right."""
+def table_of(title: str, *columns: str, names: int = 1, header: bool = True) -> Table:
+    """Return an empty table: first columns of names, folded where they are long, then numbers."""
     table = Table(
         title=title or None,
         title_justify='left',
         title_style='bold',
         box=box.SIMPLE_HEAD if header else None,
+        show_edge=False,
         pad_edge=False,
         show_header=header,
     )
     for k, column in enumerate(columns):
-        table.add_column(column, justify='left' if k == 0 else 'right', overflow='fold')
+        name = k < names
+        table.add_column(
+            column, justify='left' if name else 'right', overflow='fold', no_wrap=not name
+        )
     return table
 
 
 def print_table(console: Console, table: Table) -> None:
-    """Print a table without blanks at the ends of its lines."""
+    """Print a table without blanks at the ends of its lines, and an empty line after it."""
     with console.capture() as captured:
         console.print(table)
     text = '\n'.join(line.rstrip() for line in captured.get().splitlines())
-    console.out(text.strip('\n'), highlight=False)
+    console.out(text.strip('\n') + '\n', highlight=False)
 
 
 def wrote(*paths: Path | None) -> None:
@@ -144,6 +147,13 @@ def wrote(*paths: Path | None) -> None:
 def result_console(*written: Path | None) -> Console:
     """Return the console of the result: standard error where a file goes to standard output."""
     return console_of(sys.stderr if {str(path) for path in written} & _STDOUT else sys.stdout)
+
+
+def again(*more: str) -> str:
+    """Return the command line as it was typed, with more words, for a shell."""
+    words = ['ugv-acceptance', *sys.argv[1:]]
+    at = words.index('--ros-args') if '--ros-args' in words else len(words)
+    return shlex.join([*words[:at], *more, *words[at:]])
 
 
 def complain(text: str) -> None:
