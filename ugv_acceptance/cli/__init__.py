@@ -113,9 +113,9 @@ def asked_words() -> list[str]:
     """Return the words that were typed after the program; those of a shell that completes them."""
     if f'{COMPLETE}_COMPLETE' not in os.environ:
         return sys.argv[1:]
-    typed = os.environ.get('COMP_WORDS') or os.environ.get('_TYPER_COMPLETE_ARGS', '')
-    # The last word may be only the start of one.
-    return [*typed.split()[1:], *([''] if typed[-1:].isspace() else [])][:-1]
+    from ugv_acceptance.cli.completion import typed_words
+
+    return typed_words()
 
 
 def verbs_for(words: Sequence[str]) -> Sequence[str]:

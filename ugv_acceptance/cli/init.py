@@ -8,6 +8,7 @@ import typer
 from rich.markup import escape
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.completion import words_like
 from ugv_acceptance.cli.options import Overwrite
 from ugv_acceptance.cli.terminal_output import console_of, say, wrote
 
@@ -90,24 +91,42 @@ def init(
         typer.Option(help='Check this configuration, against a recording if one is given.'),
     ] = None,
     mass: Annotated[
-        str | None, typer.Option(help='What it weighs on scales: 68kg; or urdf: as the URDF says.')
+        str | None,
+        typer.Option(
+            help='What it weighs on scales: 68kg; or urdf: as the URDF says.',
+            autocompletion=words_like('urdf'),
+        ),
     ] = None,
     contacts: Annotated[
-        str | None, typer.Option(help='What touches the ground: yes (as found), no, LINK,LINK.')
+        str | None,
+        typer.Option(
+            help='What touches the ground: yes (as found), no, LINK,LINK.',
+            autocompletion=words_like('yes', 'no'),
+        ),
     ] = None,
     tilt: Annotated[
-        str | None, typer.Option(help='The tilt of its contact points is real, or not-real.')
+        str | None,
+        typer.Option(
+            help='The tilt of its contact points is real, or not-real.',
+            autocompletion=words_like('real', 'not-real'),
+        ),
     ] = None,
     mounting: Annotated[
         str | None,
-        typer.Option(help='How the IMU is turned: 180deg,-90deg,0; yes (as found); none.'),
+        typer.Option(
+            help='How the IMU is turned: 180deg,-90deg,0; yes (as found); none.',
+            autocompletion=words_like('yes', 'none'),
+        ),
     ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(help='JOINT=50 (N m; N of a slide), =none, =urdf; "*=urdf" (repeatable).'),
     ] = None,
     load_link: Annotated[
-        str | None, typer.Option(help='The link that carries the load, or none.')
+        str | None,
+        typer.Option(
+            help='The link that carries the load, or none.', autocompletion=words_like('none')
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:

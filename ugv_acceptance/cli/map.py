@@ -5,6 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import (
+    MAPS,
+    ORIENTATIONS,
+    joints_like,
+    map_files_like,
+    poses_like,
+    words_like,
+)
 from ugv_acceptance.cli.options import Overwrite, PayloadMass, RobotFile
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 from ugv_acceptance.type_aliases import Floats
@@ -15,30 +23,44 @@ if TYPE_CHECKING:
 
 
 def map(  # noqa: A001 - the verb's name; one parameter an option
-    kind: Annotated[str, typer.Argument(help='torque, rollover, payload or drag.')],
+    kind: Annotated[
+        str,
+        typer.Argument(help='torque, rollover, payload or drag.', autocompletion=words_like(*MAPS)),
+    ],
     out: Annotated[
         list[Path] | None,
-        typer.Option(help='File to write: .svg, .png, .csv or .npz; may be given again.'),
+        typer.Option(
+            help='File to write: .svg, .png, .csv or .npz; may be given again.',
+            autocompletion=map_files_like,
+        ),
     ] = None,
     config: RobotFile = None,
     x: Annotated[
         str,
         typer.Option(
             help='Joint of the horizontal axis: JOINT or JOINT=0deg:180deg; by default the first '
-            'of the arm that lifts.'
+            'of the arm that lifts.',
+            autocompletion=joints_like,
         ),
     ] = '',
     y: Annotated[
         str,
         typer.Option(
-            help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg; by default the second.'
+            help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg; by default the second.',
+            autocompletion=joints_like,
         ),
     ] = '',
-    posture: Annotated[str, typer.Option(help='Posture of the other joints: joint=30deg,...')] = '',
+    posture: Annotated[
+        str,
+        typer.Option(
+            help='Posture of the other joints: joint=30deg,...', autocompletion=poses_like
+        ),
+    ] = '',
     orientation: Annotated[
         str,
         typer.Option(
-            help='How the ground lies: level, right, left, nose-up, nose-down, nose-up-right, ...'
+            help='How the ground lies: level, right, left, nose-up, nose-down, nose-up-right, ...',
+            autocompletion=words_like(*ORIENTATIONS),
         ),
     ] = 'level',
     slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',

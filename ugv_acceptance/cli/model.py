@@ -9,7 +9,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile, poses_like
+from ugv_acceptance.cli.completion import joints_like, poses_like
+from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
 from ugv_acceptance.cli.terminal_output import (
     COLOURS,
     console_of,
@@ -291,7 +292,10 @@ def model(
     ] = False,
     braked: Annotated[
         str,
-        typer.Option(help='With --power-loss: joints whose brakes close without power, NAME,NAME.'),
+        typer.Option(
+            help='With --power-loss: joints whose brakes close without power, NAME,NAME.',
+            autocompletion=joints_like,
+        ),
     ] = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import RobotFile, poses_like
+from ugv_acceptance.cli.completion import poses_like
+from ugv_acceptance.cli.options import RobotFile
 
 
 def risk(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from ugv_acceptance.cli.completion import FAULTS, SCENARIOS, words_like
 from ugv_acceptance.cli.options import ConfigFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
 from ugv_acceptance.cli.terminal_output import (
@@ -30,7 +31,11 @@ SHOWN = 8
 
 def simulate(
     scenario: Annotated[
-        str, typer.Argument(help='A scenario by name; --list says which there are.')
+        str,
+        typer.Argument(
+            help='A scenario by name; --list says which there are.',
+            autocompletion=words_like(*SCENARIOS),
+        ),
     ] = 'gentle',
     seconds: Annotated[
         float | None,
@@ -46,7 +51,8 @@ def simulate(
         list[str] | None,
         typer.Option(
             help='KIND[:SUBJECT][=AMOUNT][@START[-END]], times in s, an angle as 30deg; '
-            'may be given several times.'
+            'may be given several times.',
+            autocompletion=words_like(*FAULTS),
         ),
     ] = None,
     config: ConfigFile = None,

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import poses_like
 from ugv_acceptance.cli.options import PayloadMass, RobotFile
 
 if TYPE_CHECKING:
@@ -16,7 +17,8 @@ def speed(
     posture: Annotated[
         str,
         typer.Option(
-            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
+            help='Posture held while each joint turns: joint=30deg,...; by default all postures.',
+            autocompletion=poses_like,
         ),
     ] = '',
     payload: PayloadMass = '',

@@ -7,6 +7,7 @@ import typer
 from rich.markup import escape
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.cli.completion import configs_like
 from ugv_acceptance.cli.terminal_output import COLOURS, console_of, say, say_list, while_read
 from ugv_acceptance.type_aliases import Json
 
@@ -27,7 +28,13 @@ def verify(
     ],
     bag: Annotated[list[Path] | None, typer.Option(help='The recording, if it was moved.')] = None,
     config: Annotated[
-        Path | None, typer.Option('--config', '-c', help="The robot's YAML file, if it was moved.")
+        Path | None,
+        typer.Option(
+            '--config',
+            '-c',
+            help="The robot's YAML file, if it was moved.",
+            autocompletion=configs_like,
+        ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help='The URDF, if it was moved.')] = None,
     criteria: Annotated[Path | None, typer.Option(help='The criteria, if they were moved.')] = None,
