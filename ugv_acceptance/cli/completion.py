@@ -57,7 +57,7 @@ def words_like(*words: str) -> Complete:
 
 def configs_like(incomplete: str) -> list[str]:
     """Return the configurations that ship and YAML files of this folder that begin so."""
-    here = sorted(path.name for end in ('yaml', 'yml') for path in Path().glob(f'*.{end}'))
+    here = sorted(path.name for end in ('yaml', 'yml') for path in Path().glob(f'[!.]*.{end}'))
     return _begin([*shipped_configs(), *here], incomplete)
 
 

@@ -19,14 +19,12 @@ from ugv_acceptance.cli.terminal_output import (
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.margin_words import share_words, tipping_words
 from ugv_acceptance.report.format import (
-    assumed_line,
     carrying_lines,
     ground_line,
     is_bound,
     missing_text,
     not_checked_lines,
     number_text,
-    origin_line,
     short_name,
 )
 
@@ -51,8 +49,8 @@ SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
 def print_details(result: Result, console: Console) -> None:
     """Print what the short text leaves out."""
-    for line in filter(None, (origin_line(result), assumed_line(result), ground_line(result))):
-        say(console, escape(line), 2)
+    if ground_line(result):
+        say(console, escape(ground_line(result)), 2)
     unchecked = not_checked_lines(result)
     if unchecked:
         say(console, '[bold]NOT CHECKED:[/]', 2)

@@ -36,6 +36,7 @@ from ugv_acceptance.cli.terminal_output import (
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.margin_words import share_words, tipping_words
 from ugv_acceptance.report.format import (
+    assumed_line,
     doubts_of,
     ground_line,
     is_bound,
@@ -83,6 +84,8 @@ def _print_result(result: Result, console: Console, *, verbose: bool) -> None:
     console.print(_headline(result), soft_wrap=True)
     most = ALL if verbose else _REASONS
     say_list(console, result['reasons'], most, f'reasons {LISTED}', 2)
+    given = (origin_line(result), assumed_line(result)) if verbose else (_given_line(result),)
+    say_list(console, given, ALL, '', 2)
     _print_marked(console, 'doubt', doubts_of(result), ALL if verbose else _DOUBTS)
     _print_marked(console, 'warning', _warnings(result), ALL if verbose else _WARNINGS)
     (print_details if verbose else _print_short)(result, console)
@@ -92,7 +95,7 @@ def _print_result(result: Result, console: Console, *, verbose: bool) -> None:
 
 def _warnings(result: Result) -> list[str]:
     """Return what is odd with the robot's own files: margins are only as good as these."""
-    return list(result['robot']['warnings']) if 'robot' in result else []
+    return list(result['robot']['warnings'])
 
 
 def _print_marked(console: Console, mark: str, lines: Sequence[str], most: int) -> None:
@@ -153,8 +156,19 @@ def _least(result: Result, told: Sequence[Result]) -> list[str]:
 def _data_line(result: Result) -> str:
     coverage = result['coverage']
     part = f' ({share_of(coverage["fraction"])})' if coverage['fraction'] < _WHOLE else ''
-    text = f'{coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s evaluated{part}'
-    return f'{text}; {origin_line(result)}'
+    return f'{coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s evaluated{part}'
+
+
+def _given_line(result: Result) -> str:
+    """Return what a recording is of: simulated or real, and a robot known how well."""
+    assumed = result['robot']['assumed']
+    if assumed is None:
+        words = "the robot's configuration does not say which numbers are assumed"
+    elif not assumed:
+        words = 'no number of the robot is only assumed'
+    else:
+        words = f'{counted(len(assumed), "number")} of the robot assumed, not measured'
+    return f'{origin_line(result)}; {words}'
 
 
 def _troubles(result: Result) -> list[str]:
@@ -224,12 +238,8 @@ def _left_out(result: Result, shown: int) -> str:
     counts = (
         (len(result['alerts']) - shown, 'alert', ''),
         (len(result['not_checked']), 'reason of NOT CHECKED', 'reasons of NOT CHECKED'),
-        (
-            len((result['robot']['assumed'] if 'robot' in result else {}) or ()),
-            'assumed number',
-            '',
-        ),
+        (len(result['robot']['assumed'] or ()), 'assumed number', ''),
         (len(result.get('carrying', ())), 'joint that carried it', 'joints that carried it'),
     )
     told = [counted(count, one, many) for count, one, many in counts if count]
-    return f'{", ".join([*told, "all margins"])} left out: -v lists them'
+    return f'{", ".join(told) or "all margins"} left out: -v lists them'

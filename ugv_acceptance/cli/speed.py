@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from ugv_acceptance.type_aliases import Floats
 
 
+# Letters of a joint's name, for a table of 80 columns.
+_NAME = 58
+
+
 def speed(
     config: RobotFile = None,
     posture: Annotated[
@@ -55,6 +59,7 @@ def speed(
     )
     from ugv_acceptance.cli.terminal_output import console_of, say
     from ugv_acceptance.config import load
+    from ugv_acceptance.report.format import short_name
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
@@ -82,9 +87,10 @@ def speed(
     console = console_of()
     of_model = f'error of the static model {reference:g} N m, F < {bound:.4f}'
     say(console, escape(f'{robot.name}, {load_carried.mass:g} kg, {of_model}'))
-    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
-    for name, limit in zip(robot.joint_names, limits, strict=True):
-        console.print(escape(f'  {name:{wide}}{_speed(robot, name, limit)}'), soft_wrap=True)
+    shown = [short_name(name, _NAME) for name in robot.joint_names]
+    wide = max(24, *(len(name) + 1 for name in shown))
+    for name, label, limit in zip(robot.joint_names, shown, limits, strict=True):
+        console.print(escape(f'  {label:{wide}}{_speed(robot, name, limit)}'), soft_wrap=True)
 
 
 def _check(robot: 'Robot') -> None:
