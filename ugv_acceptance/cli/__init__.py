@@ -53,8 +53,10 @@ VERBS = (
 # for each other longer than they work: up to a tenth of what judging a recording costs.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
+PROGRAM = 'ugv-acceptance'
+
 app = typer.Typer(
-    name='ugv-acceptance',
+    name=PROGRAM,
     cls=Group,
     rich_markup_mode='rich',
     help='Acceptance monitoring of unmanned ground vehicles: torque and tip-over margins.',
@@ -86,7 +88,7 @@ def main() -> None:
         for verb in verbs_for(asked_words()):
             add(verb)
         try:
-            sys.exit(app(standalone_mode=False))
+            sys.exit(app(prog_name=PROGRAM, standalone_mode=False))
         except Exception as error:
             # A library being imported may turn the signal into an error of its own.
             if told():
