@@ -1,4 +1,4 @@
-"""`ugv-acceptance drill`: trains an operator on the simulator, and records what came of it."""
+"""`ugv-acceptance drill`: trains an operator on the simulator, and records the outcome."""
 
 import os
 import sys
@@ -50,7 +50,7 @@ def drill(
     listed: Annotated[bool, typer.Option('--list', help='Print the situations and end.')] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Train an operator: situations on the simulator, "what do you do?", and what comes of it.
+    """Train an operator: situations on the simulator, what do you do, and what happens then.
 
     The simulated PackBot does what is answered, and that decides. Exit code 0: passed; 1: something
     to repeat.
@@ -100,7 +100,7 @@ def drill(
 
 
 class _Clock:
-    """What came of a drill so far; its time is measured from when this was made."""
+    """The result of a drill so far; its time is measured from when this was made."""
 
     def __init__(self, course: 'Course', operator: str) -> None:
         import time
@@ -158,7 +158,7 @@ def _in_terminal(course: 'Course') -> None:
 
 
 def _say(outcome: 'Outcome') -> None:
-    """Print what came of a situation: a line each for how it ended, what happened, the lesson."""
+    """Print the outcome of a situation: how it ended, what happened, the lesson."""
     from textwrap import fill
 
     mark = '[OK] passed' if outcome.passed else '[X] to repeat'

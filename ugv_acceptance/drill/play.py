@@ -33,12 +33,14 @@ FREE = (
     Choice(STOP, 'Stop arm and tracks, then think on', (Act('stop'),)),
     Choice(WAIT, 'Wait and see', halts=False),
 )
-# Of these, in place of an answer, too little came of it.
+# Why these are no answer.
 TOO_LATE = 'no answer is an answer too: what was under way went on'
 NOT_ENOUGH = 'to stop is a beginning: then do what the alert says'
 # Seconds that a robot which has tipped is watched on, that nothing happens before a situation is
 # over, and that lie between two motions of somebody who follows the advice.
 FALLS, QUIET, AGAIN = 2.0, 1.0, 1.0
+# Seconds that a robot is watched on which stands still because the operator only stopped it.
+STANDS = 4.0
 # Seconds in which an alert whose cause is gone ends by itself.
 PATIENT = 6.5
 # Seconds after which a question is asked whatever the robot does.
@@ -129,6 +131,8 @@ class Play:
         self.facts.take(self.truth, self.scene, since, answered=bool(self.answers))
         if self.phase == ASK and self.robot.time >= self._until:
             self._act((), halt=False)
+            if self._halted:
+                self._until = self.robot.time + STANDS
         elif self.phase == ACTING and self.answer == ADVICE:
             self._follow()
         if self._is_over():
@@ -219,10 +223,11 @@ class Play:
             self._schedule(self.case.advised)
 
     def _is_over(self) -> bool:
-        """Return whether the situation is over: it tipped, time is up, or all has become well."""
-        now, tipped = self.robot.time, self.facts.tipped
-        if not self._fell and not math.isnan(tipped):
-            return now - self._asked >= tipped + FALLS
+        """Return whether it is over: the robot failed, time is up, or all has become well."""
+        now, ends = self.robot.time, (self.facts.tipped, self.facts.gave_in[1])
+        first = min((at for at in ends if not math.isnan(at)), default=math.inf)
+        if not self._fell and now - self._asked >= first + FALLS:
+            return True
         if self.phase != ACTING:
             return False
         if now >= self._until:

@@ -46,8 +46,8 @@ def slope(robot: Robot, rng: Rng) -> Case:
 
     while left(90.0) > radians(-7.0):
         tilt += radians(1.0)
-    start = next(a for a in range(90, -91, -5) if left(a) > radians(13.0) or a == -90)
-    swing = Act('joint_to', 3.0, 'turret_joint', low, rate=0.06)
+    start = next(a for a in range(90, -91, -5) if left(a) > radians(12.0) or a == -90)
+    swing = Act('joint_to', 1.5, 'turret_joint', low, rate=0.06)
     wrong = (
         Choice(
             'faster',
@@ -83,11 +83,11 @@ def slope(robot: Robot, rng: Rng) -> Case:
 def load(_: Robot, rng: Rng) -> Case:
     """Draw an arm that is stretched out with more than its shoulder holds."""
     mass = between(rng, 3.6, 4.4)
-    shoulder, elbow = rng.uniform(80, 88), rng.uniform(-112, -100)
+    shoulder, elbow = rng.uniform(79, 83), rng.uniform(-108, -102)
     turret = rng.uniform(-15.0, 15.0)
     out = (
-        Act('joint_to', 3.0, 'shoulder_joint', radians(rng.uniform(28, 36)), rate=0.04),
-        Act('joint_to', 3.0, 'elbow_joint', radians(rng.uniform(-30, -15)), rate=0.04),
+        Act('joint_to', 1.5, 'shoulder_joint', radians(rng.uniform(28, 36)), rate=0.04),
+        Act('joint_to', 1.5, 'elbow_joint', radians(rng.uniform(-30, -15)), rate=0.04),
     )
     wrong = (
         Choice(
@@ -252,8 +252,8 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
         'it takes a moment until the alert ends',
     )
     return Case(
-        f'The robot drives over level ground with {mass} kg in its gripper, towards a bank. Somebody'
-        f' has just typed {typed:g} kg into the monitor.',
+        f'The robot drives over level ground with {mass} kg in its gripper, towards a bank.'
+        f' Somebody has just typed {typed:g} kg into the monitor.',
         'DANGER, but the robot stands firmly and its motors hardly work. What do you do?',
         Setup(posture(shoulder, elbow), load=mass),
         course,
