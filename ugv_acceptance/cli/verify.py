@@ -143,8 +143,7 @@ def again(
         criteria = _near(named, folder, '--criteria')
     entered = told.get('identity')
     drills = drill or [_near(path, folder, '--drill') for path in _drills(told)]
-    records = tuple(training_record(path) for path in drills)
-    options = Options(compare_effort='effort' in told, training=records)
+    options = Options(compare_effort='effort' in told, training=tuple(map(training_record, drills)))
     result = evaluate(
         opened,
         config=loaded,
