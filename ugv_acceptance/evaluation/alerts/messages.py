@@ -251,6 +251,8 @@ ALERTS = {
 # The faults only a live node sees, with their levels; the other alerts a recording shows as well.
 LIVE = {code: text.level for code, text in ALERTS.items() if text.level is not None}
 RECORDED = tuple(code for code in ALERTS if code not in LIVE)
+# The alerts whose sentence has a worst value, so that its own time is worth telling.
+HAVE_WORST = frozenset(code for code, text in ALERTS.items() if '{at}' in text.happened)
 
 
 def describe(alert: Alert, settings: Settings, start: int | None = None) -> str:
@@ -331,6 +333,7 @@ def suspect_of(code: str) -> str:
 
 __all__ = [
     'ALERTS',
+    'HAVE_WORST',
     'LEVELS_FOR_PEOPLE',
     'LIVE',
     'RECORDED',

@@ -90,9 +90,9 @@ def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
     values = [c.demand for c in criteria.criteria if isinstance(c.demand, Value)]
     sides = {v.of for v in values if v.signal == 'tip_angle'}
     if not sides and settings.judges_tilt:
-        yield NotChecked('degrees of tilt left', 'no criterion demands any')
+        yield NotChecked('tilt left', 'no criterion demands any')
     elif ANY not in sides and len(sides) < 4:
-        yield NotChecked('degrees of tilt left', f'criteria demand them only to the {_of(sides)}')
+        yield NotChecked('tilt left', f'criteria demand them only to the {_of(sides)}')
     of_torque = [v for v in values if v.signal.startswith('torque')]
     if settings.hears_joints and not of_torque:
         yield NotChecked('margin of torques', 'no criterion demands any')
