@@ -67,7 +67,10 @@ SHOWN = (
     'CLOCK',
 )
 # What the card adds to what a level says to do, where a step asks for it.
-_EXPECTED_HERE = {'CAUTION': ', unless this step must show it', 'DANGER': ', unless this step must show it'}
+_EXPECTED_HERE = {
+    'CAUTION': ', unless this step must show it',
+    'DANGER': ', unless this step must show it',
+}
 # Lines of a step's preparation that say ground and load, which stand in their own rows.
 GROUND_AND_LOAD = 2
 

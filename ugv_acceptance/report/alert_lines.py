@@ -1,4 +1,4 @@
-"""An alert of a result in the words that every document says: level, code, worst value, its time."""
+"""An alert of a result as documents say it: level, code, and the worst value beside its time."""
 
 from ugv_acceptance.evaluation.alerts.level_words import level_words
 from ugv_acceptance.evaluation.alerts.messages import HAVE_WORST

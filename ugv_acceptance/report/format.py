@@ -103,7 +103,8 @@ def worst_text(measured: Json) -> str:
         texts = ((name, _data_text(x, measured)) for name, x in pairs)
         return ', '.join(f'{name} {text}' if several else text for name, text in texts)
     if 'share' in measured:
-        return f'{measured["visited"]} of {measured["cells"]} cells ({share_words(measured["share"], 1)})'
+        share = share_words(measured['share'], 1)
+        return f'{measured["visited"]} of {measured["cells"]} cells ({share})'
     count = measured['alerts']
     return 'no alert' if not count else f'{count} alert{"s" if count > 1 else ""}'
 
