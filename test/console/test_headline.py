@@ -40,7 +40,7 @@ def row(code: str, subject: str, level: int = ERROR, **changes: Any) -> AlertRow
 
 def said(snapshot: Snapshot, **settings: Any) -> Headline:
     """Return the headline of a snapshot of the PackBot."""
-    return headline_of(snapshot, replace(SETTINGS, **settings))
+    return headline_of(view_of(snapshot, replace(SETTINGS, **settings)))
 
 
 def words_of(headline: Headline) -> str:

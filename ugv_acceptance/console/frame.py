@@ -58,9 +58,9 @@ def describe_robot(settings: Settings) -> Plain:
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     view = view_of(snapshot, settings)
-    headline = headline_of(snapshot, settings, view)
+    headline = headline_of(view)
     seconds, seconds_to = _countdown(snapshot, view)
-    active, past = cards_of(view, snapshot, settings)
+    active, past = cards_of(view)
     torque, worst = _torque(snapshot, settings, dead=view.dead)
     return {
         'time_s': snapshot.time / 1e9,
@@ -120,7 +120,7 @@ def numbers(values: Iterable[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[Plain], list[Plain]]:
+def cards_of(view: View) -> tuple[list[Plain], list[Plain]]:
     """Return the cards of what is active, and of what is over.
 
     What is over, and what was advised by numbers that are dead, gives no advice.
@@ -128,7 +128,8 @@ def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[P
     fallen = None if view.fallen is None else STAND_CLEAR_ADVICE
     now = '' if view.dead else fallen
     cards = [
-        card_of(group, snapshot, settings, now if group.active else '') for group in view.groups
+        card_of(group, view.snapshot, view.settings, now if group.active else '')
+        for group in view.groups
     ]
     return [card for card in cards if card['active']], [c for c in cards if not c['active']]
 
