@@ -41,8 +41,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/alerts/state_machine.py', 'Signal.step',
      'value > self.peak -> value >= self.peak'):
         'a value as bad as the peak leaves everything as it is',
-    ('evaluation/alerts/state_machine.py', 'Signal.set', 'peak > self.peak -> peak >= self.peak'):
-        'the same',
     ('evaluation/alerts/prediction.py', '', '3 -> 4'):
         'FEW only chooses between two ways to one result',
     ('evaluation/alerts/prediction.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',

@@ -85,13 +85,12 @@ def test_without_data_nothing_is_said_to_be_left() -> None:
 
 
 def test_a_fine_robot_is_ok() -> None:
-    """Nothing wrong: OK, and what is left in words."""
+    """Nothing wrong: OK, and the least margins in words."""
     found = frame(FINE)
-    assert (found['word'], found['cause'], found['advice']) == ('OK', 'all margins kept', '')
-    assert (
-        found['left']
-        == '22.9 degrees of tilt left to the right, shoulder_joint at 40% of its limit'
-    )
+    head = found['headline']
+    assert (found['word'], head['what'], head['number']) == ('OK', 'ALL MARGINS KEPT', '22 deg')
+    assert head['notes'] == ['22 deg to tipping: RIGHT, shoulder 40 %']
+    assert (head['action'], head['cause'], found['cards']) == ('', '', [])
 
 
 def test_degrees_stand_at_the_edge() -> None:
@@ -113,14 +112,9 @@ def test_tipping_comes_before_a_motor() -> None:
     """Of two alerts of one level, the one about tipping is the cause; the other is counted."""
     rows = (alert('TORQUE_LIMIT', 'elbow', start=9), alert())
     found = frame(replace(FINE, level=ERROR, alerts=rows))
-    assert (found['word'], found['cause']) == ('DANGER', 'TIP_OVER it is (and 1 more)')
-    assert found['advice'] == 'do that'
-
-
-def test_a_caution_under_its_danger_is_left_out() -> None:
-    """The warning of a limit whose error is active says nothing new."""
-    rows = (alert(key='w', level=WARN), alert(key='e'))
-    assert [row['key'] for row in frame(replace(FINE, alerts=rows))['alerts']] == ['e']
+    head = found['headline']
+    assert (found['word'], head['cause'], head['more']) == ('DANGER', 'TIP_OVER it is', 1)
+    assert head['action'] == 'DO THAT'
 
 
 def test_what_is_over_and_unseen_is_said() -> None:
@@ -169,8 +163,9 @@ def test_on_stairs_the_degrees_are_an_upper_bound() -> None:
     stairs = replace(FINE, ground='stairs', rough=True, cautious=0.1)
     made = frame(stairs)
     assert made['ground'] == {'words': 'stairs', 'rough': True, 'cautious_deg': 5.729578}
-    assert 'not begun to tip' in made['cause']
-    assert 'at most 22.9 deg of tilt left (right, upper bound), 5.7 deg taken' in made['left']
+    assert 'not begun to tip' in made['headline']['cause']
+    assert made['headline']['number'] == '<= 22 deg'
+    assert 'at most 22 deg to tipping: RIGHT (upper bound, 5.7 deg' in made['headline']['notes'][0]
     flat = frame(replace(FINE, ground='flat'))
     assert flat['ground'] == {'words': 'flat', 'rough': False, 'cautious_deg': None}
     assert flat['cause'] == 'all margins kept'

@@ -29,6 +29,7 @@ from evaluation.streams import (
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ugv_acceptance.evaluation.alerts.alarms import key_of
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings, Untold
@@ -40,8 +41,7 @@ LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 def facts(alerts: list[Alert]) -> Counter[tuple[Any, ...]]:
     """Return what an alert says, as something to compare without its order."""
     return Counter(
-        (a.rule.code, a.rule.subject, a.rule.level, a.start, a.end, f'{a.peak:.9g}', a.detail)
-        for a in alerts
+        (*key_of(a.rule), a.start, a.end, f'{a.peak:.9g}', a.worst_at, a.detail) for a in alerts
     )
 
 

@@ -74,6 +74,16 @@ def test_an_alert_is_told_with_its_times_and_peak() -> None:
     assert alert_result(unknown, TOLD, T0)['peak'] is None
 
 
+def test_an_alert_is_told_with_the_time_of_its_peak() -> None:
+    """That is not when it was raised; nothing where there is no value, or nobody knows when."""
+    alert = Alert(Rule('TORQUE_LIMIT', 'lift', WARN, 32.0, 30.0, 0, 0), T0, 33.0)
+    assert alert_result(alert, TOLD, T0)['worst_s'] is None
+    alert.worst_at = T0 + 3 * S
+    assert alert_result(alert, TOLD, T0 - S // 2)['worst_s'] == 3.5
+    alert.peak = -math.inf
+    assert alert_result(alert, TOLD, T0)['worst_s'] is None
+
+
 def test_the_largest_is_the_first_of_equals_and_never_not_a_number() -> None:
     """Of equal largest values the first is kept, across parts too, and never NaN."""
     found = Extreme()

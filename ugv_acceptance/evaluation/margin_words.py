@@ -10,16 +10,24 @@ import math
 _FINE = 10.0
 # Half a unit in the last place of what a float makes of a decimal number.
 _SLACK = 1e-9
+# What is not smaller (degrees, percent) is none that anybody measured.
+_MOST = 1e12
 
 
 def degrees_words(angle: float) -> str:
     """Return an angle (rad) of tilt left, cut towards less: "6 deg", "5.9 deg"; '-': not known."""
-    if not math.isfinite(angle):
-        return '-'
     degrees = math.degrees(angle)
+    if not abs(degrees) < _MOST:
+        return '-'
     if abs(degrees) >= _FINE:
         return f'{math.floor(degrees + _SLACK)} deg'
     return f'{math.floor(10.0 * degrees + _SLACK) / 10.0:g} deg'
+
+
+def tenths_words(angle: float) -> str:
+    """Return an angle (rad) in degrees for a box, cut: "6.0", "22.9"; '-': not known."""
+    degrees = math.degrees(angle)
+    return f'{math.floor(10.0 * degrees + _SLACK) / 10.0:.1f}' if abs(degrees) < _MOST else '-'
 
 
 def tipping_words(side: str, angle: float) -> str:
@@ -31,9 +39,8 @@ def tipping_words(side: str, angle: float) -> str:
 
 def share_words(share: float) -> str:
     """Return a share of a limit in percent, cut: only 1 or more reads "100 %"; '-': not known."""
-    if not math.isfinite(share):
-        return '-'
-    return f'{math.floor(100.0 * share + _SLACK)} %'
+    percent = 100.0 * share
+    return f'{math.floor(percent + _SLACK)} %' if abs(percent) < _MOST else '-'
 
 
 def rate_words(rate: float, unit: str) -> str:

@@ -75,7 +75,8 @@ class AlertRecord:
     """An alert of a run for users: level WARN, ERROR or STALE; times in s since the run began.
 
     `end_s` is None if it was active to the end. `peak` is the worst value in the unit of the alert
-    (degrees, N m, ...), None if it has none. `message` says what happened, `advice` what to do.
+    (degrees, N m, ...), None if it has none, and `worst_s` when that came. `message` says what
+    happened, `advice` what to do.
     """
 
     code: str
@@ -84,6 +85,7 @@ class AlertRecord:
     start_s: float
     end_s: float | None
     peak: float | None
+    worst_s: float | None
     message: str
     advice: str
 
@@ -246,6 +248,7 @@ def alert_result(
         'start_s': (alert.start - start) / 1e9,
         'end_s': None if alert.end is None else (alert.end - start) / 1e9,
         'peak': _peak(alert),
+        'worst_s': _worst_s(alert, start),
         'message': describe(alert, settings),
         'advice': told or advice(rule.code, settings.robot),
         'advice_computed': told is not None,
@@ -266,6 +269,13 @@ def _peak(alert: Alert) -> float | None:
     if alert.rule.code == 'ARM_ON_GROUND':
         return -float(alert.peak)
     return float(alert.peak) if np.isfinite(alert.peak) else None
+
+
+def _worst_s(alert: Alert, start: int) -> float | None:
+    """Return when the worst value came, in s since `start` (ns); None without value or time."""
+    if alert.worst_at is None or _peak(alert) is None:
+        return None
+    return (alert.worst_at - start) / 1e9
 
 
 def _torque_result(summary: Summary, j: int, start: int) -> dict[str, Any]:

@@ -149,7 +149,18 @@ def _over(session: Session, alarm: Alarm, left: str, values: dict[str, object]) 
 
 def _named(alert: Alert) -> dict[str, object]:
     rule = alert.rule
-    return {'code': rule.code, 'subject': rule.subject, 'class': suspect_of(rule.code)}
+    return {
+        'code': rule.code,
+        'subject': rule.subject,
+        'class': suspect_of(rule.code),
+        'peak': float(alert.peak),
+        'worst_ns': _worst_ns(alert),
+    }
+
+
+def _worst_ns(alert: Alert) -> int | str:
+    """Return when the worst value of an alert came (ns); '' where nobody knows."""
+    return '' if alert.worst_at is None else alert.worst_at
 
 
 def _severity(alert: Alert) -> tuple[int, int]:
@@ -169,6 +180,7 @@ def alert_status(change: Change, session: Session) -> Status:
         'start_ns': alert.start,
         'end_ns': '' if alert.end is None else alert.end,
         'peak': float(alert.peak),
+        'worst_ns': _worst_ns(alert),
         'do': session.advisory.do(alert),
         'class': suspect_of(rule.code),
         'alarm': change.state.value,

@@ -188,25 +188,27 @@ class Annotation:
         """Yield the messages of an alert's beginning (`which` is 1) or end, and the new verdict."""
         session, now, alert = self._session, event.time, event.alert
         if event.begins:
-            self._open[id(alert)] = replace(alert, end=None, peak=self._peak(alert))
+            peak, at = self._peak(alert)
+            self._open[id(alert)] = replace(alert, end=None, peak=peak, worst_at=at)
             changes = session.raise_alert(self._open[id(alert)])
         else:
             mine = self._open.pop(id(alert))
-            mine.end, mine.peak = alert.end, alert.peak
+            mine.end, mine.peak, mine.worst_at = alert.end, alert.peak, alert.worst_at
             changes = session.alarm_tracker.take()
         session.advisory.renew(now, session.active)
         statuses = [alert_status(change, session) for change in changes]
         yield Said(now, self.names['alerts'], self._array(now, statuses))
         yield from self._verdict(now)
 
-    def _peak(self, alert: Alert) -> float:
-        """Return an alert's value when it was raised: its later peak was not known then."""
+    def _peak(self, alert: Alert) -> tuple[float, int | None]:
+        """Return an alert's value when it was raised, and its time: no later peak was known."""
         margins, rule = self._session.evaluator.margins, alert.rule
         if margins is None or rule.code not in {'TIP_OVER', 'TORQUE_LIMIT'}:
-            return alert.peak
+            return alert.peak, alert.worst_at
         if rule.code == 'TIP_OVER':
-            return -float(margins.stability.angle[SIDES.index(rule.subject)])
-        return abs(margins.torque[self.settings.robot.joint_names.index(rule.subject)])
+            return -float(margins.stability.angle[SIDES.index(rule.subject)]), margins.time
+        joint = self.settings.robot.joint_names.index(rule.subject)
+        return abs(margins.torque[joint]), margins.time
 
     def _verdict(self, now: int) -> Iterator[Said]:
         session, status = self._session, verdict_of(self._session)

@@ -1,7 +1,7 @@
 """Alerts: a deadband, a delay on and a delay off, dated to when they fell due."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import hypothesis
@@ -16,7 +16,7 @@ from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert, Rule, Signal, feed, runs
 from ugv_acceptance.evaluation.settings import Delays, Limits
 
-Found = list[tuple[int, int | None, float]]
+Found = list[tuple[int, int | None, float, int | None]]
 # Limits 1 and 0.5, times in ns that a table can walk through one by one.
 _values = st.sampled_from([0.0, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, math.nan])
 _delays = st.integers(0, 12)
@@ -28,8 +28,8 @@ def rule(on_delay: int, off_delay: int) -> Rule:
 
 
 def found(log: list[Alert]) -> Found:
-    """Return start, end and peak of every alert."""
-    return [(a.start, a.end, a.peak) for a in log]
+    """Return start, end and peak of every alert, and when the peak came."""
+    return [(a.start, a.end, a.peak, a.worst_at) for a in log]
 
 
 def stepped(told: Rule, times: Sequence[int], values: Sequence[float], end: int) -> Found:
@@ -61,7 +61,7 @@ def table(told: Rule, times: Sequence[int], values: Sequence[float], end: int) -
     the on-delay, and ends when it has been good for the off-delay.
     """
     samples = dict(zip(times, values, strict=True))
-    bad, since, worst = False, 0, -math.inf
+    bad, since, worst, at = False, 0, -math.inf, -1
     alerts: list[list[Any]] = []
     active = False
     for now in range(end + 1):
@@ -69,21 +69,22 @@ def table(told: Rule, times: Sequence[int], values: Sequence[float], end: int) -
         for _ in range(2):
             if bad and not active and now - since >= told.on_delay:
                 active = True
-                alerts.append([since + told.on_delay, None, worst])
+                alerts.append([since + told.on_delay, None, worst, at])
             if not bad and active and now - since >= told.off_delay:
                 active = False
                 alerts[-1][1] = since + told.off_delay
             value = samples.pop(now, math.nan)
             if value >= told.on and not bad:
                 bad, since = True, now
-                worst = value
+                if not active:
+                    worst, at = value, now
             elif value < told.off and bad:
                 bad, since = False, now
             if bad and value > worst:
-                worst = value
+                worst, at = value, now
             if bad and active:
-                alerts[-1][2] = worst = max(worst, alerts[-1][2])
-    return [(a, b, c) for a, b, c in alerts]
+                alerts[-1][2:] = worst, at
+    return [(a, b, c, d) for a, b, c, d in alerts]
 
 
 @st.composite
@@ -133,7 +134,7 @@ def test_the_passing_of_time_changes_no_dates(
 
 def test_a_value_in_the_deadband_keeps_an_alert() -> None:
     """An alert ends only when the value is below the lower limit, not within the deadband."""
-    assert stepped(rule(0, 0), [10, 20, 30], [1.0, 0.5, 0.49], 40) == [(10, 30, 1.0)]
+    assert stepped(rule(0, 0), [10, 20, 30], [1.0, 0.5, 0.49], 40) == [(10, 30, 1.0, 10)]
 
 
 def test_a_short_excursion_raises_nothing() -> None:
@@ -143,13 +144,13 @@ def test_a_short_excursion_raises_nothing() -> None:
 
 def test_an_alert_that_falls_due_between_samples_has_that_date() -> None:
     """Start and end of an alert are when they fell due, not when a sample made them known."""
-    assert stepped(rule(100, 50), [10, 500, 2000], [5.0, 0.0, 0.0], 3000) == [(110, 550, 5.0)]
+    assert stepped(rule(100, 50), [10, 500, 2000], [5.0, 0.0, 0.0], 3000) == [(110, 550, 5.0, 10)]
 
 
 def test_not_a_number_changes_nothing() -> None:
     """NaN neither raises nor clears an alert, and is never its peak."""
     values = [2.0, math.nan, math.nan, 0.0]
-    assert stepped(rule(0, 0), [1, 2, 3, 4], values, 9) == [(1, 4, 2.0)]
+    assert stepped(rule(0, 0), [1, 2, 3, 4], values, 9) == [(1, 4, 2.0, 1)]
     assert stepped(rule(0, 0), [1, 2], [math.nan, math.nan], 9) == []
 
 
@@ -207,7 +208,7 @@ def test_a_value_that_stays_as_bad_raises_what_is_due() -> None:
         signal.step(now, 5.0)
     assert signal.log == []
     signal.step(150, 5.0)
-    assert found(signal.log) == [(100, None, 5.0)]
+    assert found(signal.log) == [(100, None, 5.0, 0)]
 
 
 @pytest.mark.parametrize(
@@ -230,4 +231,16 @@ def test_runs_are_the_stretches_on_one_side(
 
 def test_the_first_value_of_a_part_may_be_the_worst() -> None:
     """The peak of an alert from the part before may be the first value of the next part."""
-    assert fed(rule(0, 0), [1, 2, 3], [2.0, 9.0, 3.0], 5, [1]) == [(1, None, 9.0)]
+    assert fed(rule(0, 0), [1, 2, 3], [2.0, 9.0, 3.0], 5, [1]) == [(1, None, 9.0, 2)]
+
+
+@pytest.mark.parametrize('way', [stepped, fed])
+def test_the_worst_value_has_its_own_time(way: Callable[..., Found]) -> None:
+    """It is when the worst came first: after the alert was raised, before it, or in a relapse."""
+    told = rule(100, 100)
+    late = way(told, [0, 200, 300, 400, 500], [1.0, 2.0, 7.0, 7.0, 0.0], 1000)
+    assert late == [(100, 600, 7.0, 300)]
+    early = way(told, [0, 50, 200, 300], [1.0, 9.0, 2.0, 0.0], 1000)
+    assert early == [(100, 400, 9.0, 50)]
+    relapse = way(told, [0, 200, 250, 280, 300], [3.0, 0.0, 2.0, 4.0, 0.0], 1000)
+    assert relapse == [(100, 400, 4.0, 280)]

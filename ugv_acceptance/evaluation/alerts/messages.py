@@ -6,6 +6,11 @@ from ugv_acceptance.evaluation.alerts.alert_text import AlertText
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 from ugv_acceptance.evaluation.alerts.imu_alerts import IMU_ALERTS
 from ugv_acceptance.evaluation.alerts.imu_words import found, seems, window
+from ugv_acceptance.evaluation.alerts.level_words import (
+    LEVELS_FOR_PEOPLE,
+    level_words,
+    pattern_words,
+)
 from ugv_acceptance.evaluation.alerts.robot_words import (
     height,
     moving,
@@ -13,24 +18,9 @@ from ugv_acceptance.evaluation.alerts.robot_words import (
     relaxed_limit,
     tilt_left,
 )
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN, Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import TURNING, Robot
-
-# A level as people read it; machines (ROS, JSON, CSV, files of criteria and plans) read LEVELS.
-LEVELS_FOR_PEOPLE = dict(zip(LEVELS, ('OK', 'CAUTION', 'DANGER', 'NO DATA'), strict=True))
-
-
-def level_words(level: int | str) -> str:
-    """Return a level, by its number or its name in LEVELS, as people read it."""
-    return LEVELS_FOR_PEOPLE[LEVELS[level] if isinstance(level, int) else level]
-
-
-def pattern_words(pattern: str) -> str:
-    """Return LEVEL, LEVEL CODE or LEVEL CODE SUBJECT as people read it: DANGER TIP_OVER left."""
-    level, space, rest = pattern.partition(' ')
-    return level_words(level) + space + rest
-
 
 ALERTS = {
     'TORQUE_LIMIT': AlertText(
@@ -305,3 +295,16 @@ def advice(code: str, robot: Robot | None = None) -> str:
 def suspect_of(code: str) -> str:
     """Return where to look first for the failure behind an alert, such as "physical / sensor"."""
     return ALERTS[code].suspect.path
+
+
+__all__ = [
+    'ALERTS',
+    'LEVELS_FOR_PEOPLE',
+    'LIVE',
+    'RECORDED',
+    'advice',
+    'describe',
+    'level_words',
+    'pattern_words',
+    'suspect_of',
+]

@@ -41,6 +41,7 @@ class Alert:
     """An alert that was raised: times in ns; `peak` is the worst value; `end` None while active.
 
     `detail` says in words what the numbers do not: which value came, and which was expected.
+    `worst_at` is when `peak` came, which may be in the on-delay before `start`; None: not known.
     """
 
     rule: Rule
@@ -48,6 +49,7 @@ class Alert:
     peak: float
     end: int | None = None
     detail: str = ''
+    worst_at: int | None = None
 
 
 @dataclass(slots=True)
@@ -55,7 +57,8 @@ class Signal:
     """The state machine of one rule; `log` receives its alerts, whose `end` is set later in place.
 
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
-    when the state changes unless the value does first. While `quiet`, only a value of `on` or more
+    when the state changes unless the value does first. `peak` is the worst value since it was good,
+    `peak_at` (ns) when that came first. While `quiet`, only a value of `on` or more
     can change anything, so callers may skip smaller ones. `detail` is what an alert raised next
     says in words: set it before a value that is bad while `raw` is not.
     """
@@ -66,6 +69,7 @@ class Signal:
     alert: Alert | None = None
     due: int | None = None
     peak: float = field(default=-np.inf)
+    peak_at: int | None = None
     quiet: bool = True
     detail: str = ''
     on: float = field(init=False)
@@ -89,21 +93,25 @@ class Signal:
             self.clear(now)
         else:
             if self.raw and value > self.peak:
-                self._rise(value)
+                self._rise(value, now)
             self.advance(now)
 
-    def set(self, now: int, peak: float) -> None:
-        """Take that the value is bad from `now` (ns) on; `peak` is its worst until it is good."""
+    def set(self, now: int, peak: float, at: int | None = None) -> None:
+        """Take that the value is bad from `now` (ns) on; `peak` is its worst until it is good.
+
+        `at` is when the worst comes first (ns; None: now).
+        """
+        at = now if at is None else at
         if not self.raw:
             self.advance(now)
             self.raw = True
             if self.alert is None:
                 self.due = now + self.rule.on_delay
-                self.peak = peak
+                self.peak, self.peak_at = peak, at
             else:
                 self.due = None
         if peak > self.peak:
-            self._rise(peak)
+            self._rise(peak, at)
         self.advance(now)
 
     def clear(self, now: int) -> None:
@@ -118,7 +126,8 @@ class Signal:
         """Let time pass up to `now` (ns): raise or clear the alert if that has become due."""
         if self.due is not None and self.due <= now:
             if self.raw:
-                self.alert = Alert(self.rule, self.due, self.peak, detail=self.detail)
+                told = self.detail, self.peak_at
+                self.alert = Alert(self.rule, self.due, self.peak, None, *told)
                 self.log.append(self.alert)
             elif self.alert is not None:
                 self.alert.end = self.due
@@ -126,10 +135,10 @@ class Signal:
             self.due = None
         self.quiet = not self.raw and self.alert is None and self.due is None
 
-    def _rise(self, peak: float) -> None:
-        self.peak = peak
+    def _rise(self, peak: float, at: int) -> None:
+        self.peak, self.peak_at = peak, at
         if self.alert is not None:
-            self.alert.peak = peak
+            self.alert.peak, self.alert.worst_at = peak, at
 
 
 def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, int, bool]]:
@@ -168,7 +177,13 @@ def feed(
         if bad:
             if detail is not None and not signal.raw:
                 signal.detail = detail(first)
-            signal.set(int(times[first]), float(np.fmax.reduce(values[first:last])))
+            signal.set(int(times[first]), *_worst(times[first:last], values[first:last]))
         else:
             signal.clear(int(times[first]))
     signal.advance(int(times[-1]))
+
+
+def _worst(times: NDArray[np.int64], values: NDArray[Any]) -> tuple[float, int]:
+    """Return the largest value (NaN only if all are) and when it first came (ns)."""
+    worst = float(np.fmax.reduce(values))
+    return worst, int(times[np.argmax(values == worst)])
