@@ -12,8 +12,8 @@ from itertools import chain
 from typing import Any
 
 from ugv_acceptance.console.alert_cards import card_of, name_words
-from ugv_acceptance.console.headline import Headline, View, headline_of, view_of
-from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.headline import View, headline_of, view_of
+from ugv_acceptance.console.snapshot import InputRow, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as STAND_CLEAR_ADVICE
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, WARN
@@ -114,18 +114,6 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
             'mass_kg': snapshot.payload.mass,
             'cog_m': list(snapshot.payload.cog),
         },
-        **_former(snapshot, headline, view),
-    }
-
-
-def _former(snapshot: Snapshot, headline: Headline, view: View) -> Plain:
-    """Return the fields of the header before there were headline and cards."""
-    do = f'{headline.action.lower()} {headline.detail}'.strip()
-    return {
-        'cause': headline.cause or headline.what.lower(),
-        'advice': do,
-        'left': '' if view.dead else '; '.join(headline.notes),
-        'alerts': [_alert(row, snapshot.time) for group in view.groups for row in group.rows],
     }
 
 
@@ -196,24 +184,6 @@ def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
         return None, ''
     name = name_words(soon.subject)
     return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'
-
-
-def _alert(row: AlertRow, now: int) -> Plain:
-    return {
-        'key': row.key,
-        'code': row.code,
-        'subject': row.subject,
-        'level': LEVELS[row.level],
-        'word': level_words(row.level),
-        'state': row.state,
-        'active': row.end is None,
-        'unseen': row.unseen,
-        'text': row.text,
-        'advice': row.advice,
-        'age_s': round((now - row.start) / 1e9, 1),
-        'offers': list(row.offers),
-        'note': row.note,
-    }
 
 
 def _posture(snapshot: Snapshot, figure: Figure) -> Plain | None:

@@ -50,7 +50,7 @@ export class Views {
     path(this.trail); c.stroke();
     if (p.plumb) target(c, ...at(p.plumb), COLOURS[frame.level] ?? '#111');
     else label(c, 'the weight line does not meet the ground', width / 2, height - 8, 'center');
-    $('top').setAttribute('aria-label', `From above: ${frame.left}`);
+    $('top').setAttribute('aria-label', `From above: ${frame.headline.what} ${frame.headline.number}`);
   }
 
   worstEdge(c, at, frame, hello) {
