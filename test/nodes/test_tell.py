@@ -283,3 +283,22 @@ def test_what_cannot_be_told_is_said_before_anything_is_sent(
     """A wrong word, code, mass or place: what was expected, and what came."""
     with pytest.raises(BadConfig, match=reason):
         values_of(what, typed, **options)
+
+
+def test_tab_completes_what_may_follow() -> None:
+    """The shell is offered the kinds of ground, and the codes of alerts that begin so."""
+    for typed, offered in (
+        ('ground s', ['stairs']),
+        ('reset TIP_O', ['TIP_OVER']),
+    ):
+        asked = {'COMP_WORDS': f'ugv-acceptance tell {typed}', 'COMP_CWORD': '3'}
+        env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+        command = [sys.executable, '-c', f'import sys; sys.argv[0] = "ugv-acceptance"; {CODE}']
+        done = subprocess.run(
+            command,
+            env={**env, **asked, '_UGV_ACCEPTANCE_COMPLETE': 'complete_bash'},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == offered
