@@ -17,6 +17,7 @@ from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, LastKnown, Snapshot
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
@@ -118,8 +119,11 @@ class ShownRecording:
         if not track.known[k] or any(self._silent(w, when) for w in range(2)):
             told = replace(told, level=max([*active, STALE]), last=self._last(k))
             return replace(told, **self._ground(k, when, payload, known=False))
+        if has_tipped(track.angle[k]):
+            alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
         return replace(
             told,
+            alerts=alerts,
             level=max([*active, OK]),
             known=True,
             gravity=_numbers(track.gravity[k]),

@@ -33,6 +33,7 @@ from ugv_acceptance.console.snapshot import (
     Memory,
     Snapshot,
 )
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
@@ -237,6 +238,7 @@ class ConsoleNode(Node):
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
+        advice = STAND_CLEAR if self.session.advisory.tipped else advice
         own = self._own.get(row.key, row)
         return replace(row, text=own.text, advice=advice, worst=own.worst, peak=own.peak)
 
