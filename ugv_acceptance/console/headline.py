@@ -100,14 +100,16 @@ def view_of(snapshot: Snapshot, settings: Settings) -> View:
     groups = groups_of(snapshot.alerts)
     active = tuple(group for group in groups if group.active)
     worst = max([group.first.level for group in active], default=OK)
-    tipped = snapshot.known and has_tipped(snapshot.angle)
+    # Nobody measures how a robot without an IMU leans.
+    judged = snapshot.known and settings.judges_tilt
+    tipped = judged and has_tipped(snapshot.angle)
     level = max(snapshot.level, ERROR if tipped else OK, worst if worst >= ERROR else OK)
     level = level if snapshot.known else STALE
     asked = bool(settings.unknown) and snapshot.known and ERROR not in {level, worst}
     unanswered = asked and worst != STALE
     dead = level == STALE and not unanswered
     doubted = any(_contradicts(group.first) for group in active)
-    least = least_tilt(snapshot.angle)
+    least = least_tilt(snapshot.angle) if settings.judges_tilt else ('', math.nan)
     return View(
         snapshot,
         settings,
@@ -189,7 +191,7 @@ def _alert(view: View) -> Headline:
     row = view.active[0].first
     what, number = what_of(row, view.snapshot, view.settings)
     action, detail = order_of(row.advice)
-    notes = _notes(view)
+    notes = _notes(view, told=row.subject if number else '')
     if for_integrator(row) and row.level < ERROR:
         action, detail = TELL, row.advice
     elif for_integrator(row):
@@ -231,13 +233,18 @@ def _kept(view: View) -> Headline:
     return Headline(what, number, cause=kept if rest else '', notes=notes)
 
 
-def _notes(view: View) -> tuple[str, ...]:
-    return (margins_words(view), *view.snapshot.hints)
+def _notes(view: View, told: str = '') -> tuple[str, ...]:
+    words = margins_words(view, told)
+    return (words, *view.snapshot.hints) if words else view.snapshot.hints
 
 
-def margins_words(view: View) -> str:
-    """Return the smallest margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %"."""
+def margins_words(view: View, told: str = '') -> str:
+    """Return the smallest margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %".
+
+    Without that of a side or joint that was `told` already.
+    """
     snapshot, settings, (side, angle) = view.snapshot, view.settings, view.least
+    joint, share = _most(snapshot.torque, settings)
     if side:
         tilt = _bound_words(side, angle, snapshot.cautious, rough=snapshot.rough)
         tilt += f' ({CARRIED})' * (snapshot.carried and not snapshot.rough)
@@ -245,7 +252,11 @@ def margins_words(view: View) -> str:
         tilt = tilt_not_checked(settings)
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
-    return _with_joint(tilt, snapshot.torque, settings)
+    used = _joint_words(joint, share)
+    # Nobody reads the same number three times.
+    if told and told in {side, joint}:
+        return tilt if told == joint else used
+    return f'{tilt}, {used}' if used else tilt
 
 
 def _bound_words(side: str, angle: float, cautious: float = math.nan, *, rough: bool) -> str:
@@ -261,9 +272,8 @@ def _most(torque: Sequence[float], settings: Settings) -> tuple[str, float]:
     return most_used(torque, settings) if torque else ('', math.nan)
 
 
-def _with_joint(tilt: str, torque: Sequence[float], settings: Settings) -> str:
-    joint, share = _most(torque, settings)
-    return f'{tilt}, {name_words(joint)} {share_words(share)}' if joint else tilt
+def _joint_words(joint: str, share: float) -> str:
+    return f'{name_words(joint)} {share_words(share)}' if joint else ''
 
 
 def _last_words(view: View) -> str:
@@ -274,4 +284,5 @@ def _last_words(view: View) -> str:
     side, angle = least_tilt(last.angle)
     tilt = _bound_words(side, angle, rough=last.rough) if side else 'no tilt margin'
     ago = max(snapshot.time - last.time, 0) / 1e9
-    return f'last known {ago:.1f} s ago: {_with_joint(tilt, last.torque, view.settings)}'
+    used = _joint_words(*_most(last.torque, view.settings))
+    return f'last known {ago:.1f} s ago: {tilt}, {used}'.removesuffix(', ')
