@@ -129,6 +129,25 @@ def _dead(rng: Rng) -> tuple[Fault, str, str]:
     return fault, what, f'Stop; do not move; have the driver of the {what} started anew'
 
 
+def _blindly(speed: float) -> tuple[Choice, ...]:
+    """Return the wrong answers to a dead sensor, driving at `speed` (m/s)."""
+    return (
+        Choice(
+            'fold',
+            'Fold the arm first, then stop',
+            (*FOLD, Act('drive', 6.0)),
+            'without its sensors nobody knows what a motion does: stop, then do not move',
+        ),
+        Choice(
+            'slow',
+            'Drive on at half the speed, by sight',
+            (Act('drive', 0.0, amount=speed / 2.0),),
+            'slow is not safe: the ground gets steeper and nobody would be told',
+        ),
+        *_going_on('NO DATA is worse than DANGER: it may be tipping, and nobody is told'),
+    )
+
+
 def sensor(robot: Robot, rng: Rng) -> Case:
     """Draw a sensor that dies while the robot drives along a slope that gets steeper."""
     sign, side = side_of(rng)
@@ -144,21 +163,7 @@ def sensor(robot: Robot, rng: Rng) -> Case:
         Act('slope', 1.0, amount=tilt, other=low, rate=0.03),
         Act('fail', 4.0),
     )
-    wrong = (
-        Choice(
-            'fold',
-            'Fold the arm first, then stop',
-            (*FOLD, Act('drive', 6.0)),
-            'without its sensors nobody knows what a motion does: stop, then do not move',
-        ),
-        Choice(
-            'slow',
-            'Drive on at half the speed, by sight',
-            (Act('drive', 0.0, amount=speed / 2.0),),
-            'slow is not safe: the ground gets steeper and nobody would be told',
-        ),
-        *_going_on('NO DATA is worse than DANGER: it may be tipping, and nobody is told'),
-    )
+    wrong = _blindly(speed)
     return Case(
         f'The robot drives along a bank that falls to its {side} and gets steeper. Its arm with'
         f' {mass} kg points down the bank.',
@@ -218,6 +223,18 @@ def braking(_: Robot, rng: Rng) -> Case:
     )
 
 
+_MISLED = (
+    Choice(
+        'silence',
+        'Switch the monitor off: it is plainly wrong',
+        (Act('silence'),),
+        'a monitor that is off says nothing of the next edge either',
+        halts=False,
+    ),
+    *_going_on('while one alarm is wrong, nobody sees the next, which is right'),
+)
+
+
 def false_alarm(robot: Robot, rng: Rng) -> Case:
     """Draw a payload declared far too heavy: an alert that the robot itself contradicts."""
     sign, _ = side_of(rng)
@@ -235,16 +252,6 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
         Act('slope', 7.0, amount=tilt, other=low, rate=0.05),
         Act('joint_to', 7.0, 'turret_joint', low, rate=0.25),
     )
-    wrong = (
-        Choice(
-            'silence',
-            'Switch the monitor off: it is plainly wrong',
-            (Act('silence'),),
-            'a monitor that is off says nothing of the next edge either',
-            halts=False,
-        ),
-        *_going_on('while one alarm is wrong, nobody sees the next, which is right'),
-    )
     right = Choice(
         'look',
         'Stop, look into the gripper, declare what it really holds, acknowledge',
@@ -258,12 +265,35 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
         Setup(posture(shoulder, elbow), load=mass),
         course,
         Trouble(frozenset({'TIP_OVER', 'TORQUE_LIMIT'}), 3.0),
-        (ADVISED, right, *wrong),
+        (ADVISED, right, *_MISLED),
         (STOP, *FOLD),
         ('ended', 'heard'),
         'Treat an alert as true until you have looked; then correct what it was told.',
         patience=14.0,
     )
+
+
+_AFTER_A_FALL = (
+    Choice(
+        'help',
+        'Send somebody to pull it back onto its tracks',
+        (Act('near', 2.0), Act('pull', 4.0, amount=160.0, other=0.2), Act('pull', 7.0)),
+        'nobody goes near a robot that lies with its motors on: it can slide and strike',
+    ),
+    Choice(
+        'push',
+        'Push it up again with its arm',
+        (Act('joint_to', 1.0, 'shoulder_joint', radians(-30), rate=0.6),),
+        'lying on its arm, each motion makes it slide or roll somewhere else',
+    ),
+    Choice(
+        'drive',
+        'Drive out of it: one track still touches the ground',
+        (Act('drive', 1.0, amount=0.5),),
+        'on one track it does not drive, it turns and slides',
+    ),
+    Choice(GO_ON, ON, (), 'after a fall the task is over', halts=False),
+)
 
 
 def fall(robot: Robot, rng: Rng) -> Case:
@@ -278,27 +308,6 @@ def fall(robot: Robot, rng: Rng) -> Case:
         Act('joint_to', 14.0, 'shoulder_joint', radians(10), rate=0.5),
         Act('drive', 16.0, amount=0.3),
     )
-    wrong = (
-        Choice(
-            'help',
-            'Send somebody to pull it back onto its tracks',
-            (Act('near', 2.0), Act('pull', 4.0, amount=160.0, other=0.2), Act('pull', 7.0)),
-            'nobody goes near a robot that lies with its motors on: it can slide and strike',
-        ),
-        Choice(
-            'push',
-            'Push it up again with its arm',
-            (Act('joint_to', 1.0, 'shoulder_joint', radians(-30), rate=0.6),),
-            'lying on its arm, each motion makes it slide or roll somewhere else',
-        ),
-        Choice(
-            'drive',
-            'Drive out of it: one track still touches the ground',
-            (Act('drive', 1.0, amount=0.5),),
-            'on one track it does not drive, it turns and slides',
-        ),
-        Choice(GO_ON, ON, (), 'after a fall the task is over', halts=False),
-    )
     return Case(
         f'The robot hands {mass} kg over on a slope that falls to its {side}, and it goes wrong.'
         f' A colleague waits three metres away.',
@@ -306,7 +315,7 @@ def fall(robot: Robot, rng: Rng) -> Case:
         Setup(posture(shoulder, elbow), (tilt, low), mass),
         course,
         Trouble(after=2.0, lasting=1.0),
-        (ADVISED, *wrong),
+        (ADVISED, *_AFTER_A_FALL),
         (STOP, Act('switch_off', 1.0)),
         ('off', 'nobody_near', 'lay_still'),
         'After a fall: stand clear, do not move the arm, switch it off before anyone comes near.',

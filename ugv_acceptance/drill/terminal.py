@@ -36,7 +36,7 @@ Read it in this order; page, terminal and this drill say the same.
   LOWER THE ELBOW          what to do; nothing to do: nothing here
   TO TIPPING: RIGHT  3 deg which way it tips, and how many degrees are left
                            (right is the robot's own right)
-  4.2 s to tipping RIGHT   how long, if it goes on like this
+  4.2 s to tipping RIGHT   how long, if the motion continues
   below                    the margin to each side, and of each joint
 
 CAUTION   a margin is small: do what it says before you go on
