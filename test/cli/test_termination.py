@@ -141,6 +141,7 @@ TOLD_TO = {
     'foxglove': (('foxglove', '--port', '0'), says('Foxglove WebSocket'), DONE),
     'replay': (('replay', BAG, '--loop'), on_the_net, DONE),
     'demo': (('demo', '--rate', '0.2'), says('NO DATA'), BROKEN_OFF),
+    'tell': (('tell', 'reset', '--within', '600'), on_the_net, BROKEN_OFF),
     'doctor': (('doctor', '--seconds', '600'), on_the_net, BROKEN_OFF),
     # What was recorded until then is judged and filed: inconclusive.
     'run': (('run', '--sim'), on_the_net, dict.fromkeys(SIGNALS, 3)),

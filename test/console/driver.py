@@ -18,6 +18,9 @@ from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 # rad/s: to the monitor a joint that is elsewhere at once, and again, is one of two robots. That is
 # more than 0.1 rad from one message to the next, which comes right behind it on a busy machine.
 SPEED = 4.0
+NOISE = 1e-3  # m/s2
+# rad: an orientation of exactly nothing is what an IMU sends that has none.
+LEAN = 1e-4
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 
 
@@ -60,12 +63,14 @@ def main() -> None:
     rates = [int(x) for x in os.environ.get('DRIVER_RATES', '50 50').split()]
     due, count, q = time.monotonic(), 0, robot.q
     while listening.is_alive():
-        now, half = time.time_ns(), robot.roll / 2
+        now, half = time.time_ns(), (robot.roll + LEAN) / 2
         if count % (rates[1] // rates[0]) == 0:
             q = towards(robot.q, q, 1.0 / rates[0])
             joints.publish(joint_state_cdr(now, '', NAMES, q, (0.0,) * 4, (0.0,) * 4))
         if not robot.silent:
-            force = (0.0, 9.81 * math.sin(robot.roll), 9.81 * math.cos(robot.roll))
+            # A sensor that has moved and then repeats itself to the last digit counts as frozen.
+            noise = NOISE * (count % 7 - 3)
+            force = (noise, 9.81 * math.sin(robot.roll), 9.81 * math.cos(robot.roll))
             orientation = (math.sin(half), 0.0, 0.0, math.cos(half))
             imu.publish(imu_cdr(now, 'imu_link', orientation, (0.0, 0.0, 0.0), force))
         count += 1

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
 from ugv_acceptance.console.frame import describe_robot, frame_of
-from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
+from ugv_acceptance.console.snapshot import AlertRow, Countdown, InputRow, Snapshot
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
 from ugv_acceptance.evaluation.ground import CARRIED
+from ugv_acceptance.evaluation.settings import CONTACTS, LEVEL
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import STANDING
 from ugv_acceptance.monitoring.drawing import figure_of
@@ -76,22 +77,28 @@ def test_every_frame_is_strict_json(
 def test_what_is_not_known_is_no_data(level: int) -> None:
     """Where margins are not known the word is NO DATA, whatever level is claimed."""
     found = frame(replace(FINE, level=level, known=False))
-    assert (found['word'], found['left']) == ('NO DATA', '')
+    assert (found['word'], found['headline']['action']) == ('NO DATA', 'STOP')
 
 
-def test_without_data_nothing_is_said_to_be_left() -> None:
-    """A monitor that says NO DATA is believed, though the numbers seem to be known here."""
-    assert frame(replace(FINE, level=STALE))['left'] == ''
+@pytest.mark.parametrize('changes', [{'known': False}, {'level': STALE}])
+def test_without_data_no_number_is_one_of_now(changes: dict[str, Any]) -> None:
+    """NO DATA is believed though numbers seem to be there: dashes, no level, no countdown."""
+    soon = replace(FINE, countdown=Countdown(tips=True, subject='right', seconds=1.2), **changes)
+    found = frame(soon)
+    assert {row['words'] for row in found['tilt']} == {'-'}
+    assert {row['words'] for row in found['torque']} == {'-', 'no limit'}
+    assert {row['level'] for row in (*found['tilt'], *found['torque'])} == {''}
+    assert (found['worst_joint'], found['seconds'], found['seconds_to']) == (None, None, '')
+    assert 'deg' not in ' '.join(found['headline']['notes'])
 
 
 def test_a_fine_robot_is_ok() -> None:
-    """Nothing wrong: OK, and what is left in words."""
+    """Nothing wrong: OK, and the least margins in words."""
     found = frame(FINE)
-    assert (found['word'], found['cause'], found['advice']) == ('OK', 'all margins kept', '')
-    assert (
-        found['left']
-        == '22.9 degrees of tilt left to the right, shoulder_joint at 40% of its limit'
-    )
+    head = found['headline']
+    assert (found['word'], head['what'], head['number']) == ('OK', 'ALL MARGINS KEPT', '22 deg')
+    assert head['notes'] == ['22 deg to tipping: RIGHT, shoulder 40 %']
+    assert (head['action'], head['cause'], found['cards']) == ('', '', [])
 
 
 def test_degrees_stand_at_the_edge() -> None:
@@ -113,42 +120,101 @@ def test_tipping_comes_before_a_motor() -> None:
     """Of two alerts of one level, the one about tipping is the cause; the other is counted."""
     rows = (alert('TORQUE_LIMIT', 'elbow', start=9), alert())
     found = frame(replace(FINE, level=ERROR, alerts=rows))
-    assert (found['word'], found['cause']) == ('DANGER', 'TIP_OVER it is (and 1 more)')
-    assert found['advice'] == 'do that'
+    head = found['headline']
+    assert (found['word'], head['cause'], head['more']) == ('DANGER', 'TIP_OVER it is', 1)
+    assert head['action'] == 'DO THAT'
 
 
-def test_a_caution_under_its_danger_is_left_out() -> None:
-    """The warning of a limit whose error is active says nothing new."""
-    rows = (alert(key='w', level=WARN), alert(key='e'))
-    assert [row['key'] for row in frame(replace(FINE, alerts=rows))['alerts']] == ['e']
-
-
-def test_what_is_over_and_unseen_is_said() -> None:
-    """A failure that is over stays the cause until a person has dealt with it."""
-    row = alert(end=2, state='over, latched until reset', offers=('reset',))
-    found = frame(replace(FINE, level=WARN, alerts=(row,)))
-    assert found['cause'] == 'over, latched until reset: TIP_OVER it is'
-    assert found['advice'].startswith('reset it')
-
-
-def test_a_lesser_thing_that_is_over_leaves_ok() -> None:
-    """Where the monitor says OK, what is over stays in the list and is no cause."""
-    found = frame(replace(FINE, alerts=(alert(end=2, level=WARN),)))
-    assert (found['word'], found['cause']) == ('OK', 'all margins kept')
-    assert len(found['alerts']) == 1
-
-
-def test_hints_stand_with_what_is_left() -> None:
+def test_hints_stand_with_the_margins() -> None:
     """What else the operator should know follows the margins."""
-    found = frame(replace(FINE, hints=('it tips to the left in 3 s at this rate',)))
-    assert found['left'].endswith('; it tips to the left in 3 s at this rate')
+    hint = 'measured efforts suggest a payload of 3 kg'
+    assert frame(replace(FINE, hints=(hint,)))['headline']['notes'][1:] == [hint]
 
 
-def test_a_problem_comes_before_old_alerts() -> None:
-    """A silent monitor is the cause, not what it said before."""
-    silent = replace(FINE, level=STALE, known=False, problem='the monitor is silent')
-    found = frame(replace(silent, alerts=(alert(),)))
-    assert found['cause'] == 'the monitor is silent'
+@pytest.mark.parametrize(
+    ('degrees', 'words', 'level'),
+    [
+        (22.99, '22.9', 'OK'),
+        (10.04, '10.0', 'OK'),
+        (10.0, '10.0', 'WARN'),
+        (6.0, '6.0', 'WARN'),
+        (5.0, '5.0', 'ERROR'),
+        (-1.41, '-1.5', 'ERROR'),
+        (math.inf, 'no edge', 'OK'),
+        (math.nan, '-', ''),
+    ],
+)
+def test_the_tilt_left_has_words_and_a_level(degrees: float, words: str, level: str) -> None:
+    """One place says what stands in a box, cut and never rounded up, and in which colour."""
+    row = frame(replace(FINE, angle=(math.radians(degrees), 0.6, 0.6, 0.6)))['tilt'][0]
+    assert (row['words'], row['level']) == (words, level)
+
+
+@pytest.mark.parametrize(
+    ('share', 'words', 'level'),
+    [(0.43, '43 %', 'OK'), (0.996, '99 %', 'WARN'), (1.0, '100 %', 'ERROR'), (math.nan, '-', '')],
+)
+def test_a_torque_has_words_and_a_level(share: float, words: str, level: str) -> None:
+    """99.6 % is no 100 %, and CAUTION; a joint without a limit has no share and no colour."""
+    found = frame(replace(FINE, torque=(70.0, -50.0 * share, 5.0, 0.1)))
+    free, row, *_ = found['torque']
+    assert (row['words'], row['level']) == (words, level)
+    assert (free['words'], free['level']) == ('no limit', '')
+    # The elbow at 10 % where the shoulder is not known.
+    assert found['worst_joint'] == (2 if math.isnan(share) else 1)
+
+
+@pytest.mark.parametrize(
+    ('countdown', 'seconds', 'what'),
+    [
+        (Countdown(tips=True, subject='right', seconds=4.23), 4.2, 'tipping RIGHT'),
+        (Countdown(tips=False, subject='shoulder_joint', seconds=0.7), 0.7, 'shoulder limit'),
+        (Countdown(tips=True, subject='right', seconds=0.0), None, ''),
+        (None, None, ''),
+    ],
+)
+def test_the_time_to_a_limit_is_a_number(
+    countdown: Countdown | None, seconds: float | None, what: str
+) -> None:
+    """It counts to what is reached first, and is gone when that is reached."""
+    found = frame(replace(FINE, countdown=countdown))
+    assert (found['seconds'], found['seconds_to']) == (seconds, what)
+
+
+def test_nothing_counts_down_to_a_fall_that_is_over() -> None:
+    """A robot that has tipped has no time left, nor one whose IMU is contradicted."""
+    soon = replace(FINE, countdown=Countdown(tips=False, subject='elbow_joint', seconds=2.0))
+    assert frame(replace(soon, angle=(0.5, 0.5, -0.5, 0.5)))['seconds'] is None
+    doubt = alert('IMU_INCONSISTENT', 'imu')
+    assert frame(replace(soon, level=ERROR, alerts=(doubt,)))['seconds'] is None
+
+
+def test_what_is_assumed_stands_in_one_line() -> None:
+    """The ground that nobody entered, and what no verdict covers; nothing where all is known."""
+    unchecked = 'NOT CHECKED: torque of turret, flipper (no limit known)'
+    guessed = frame(replace(FINE, ground='flat (not entered)'))['assumed']
+    assert guessed == f'ground taken as flat; {unchecked}'
+    assert frame(replace(FINE, ground='flat'))['assumed'] == unchecked
+    stairs = frame(replace(FINE, ground='stairs', rough=True))['assumed']
+    assert stairs == f'ground: stairs; {unchecked}'
+    limits = replace(SETTINGS.limits, torque=(50.0,) * 4)
+    known = frame_of(replace(FINE, ground='flat'), replace(SETTINGS, limits=limits), FIGURE)
+    assert known['assumed'] == ''
+    bare = replace(SETTINGS, limits=limits, imu=replace(SETTINGS.imu, attitude=LEVEL))
+    assert frame_of(FINE, bare, FIGURE)['assumed'] == 'NOT CHECKED: tip-over (no IMU)'
+    keys = replace(SETTINGS, limits=limits, unknown=(CONTACTS, 'joints.elbow_joint.limit'))
+    asked = frame_of(FINE, keys, FIGURE)['assumed']
+    assert asked == (
+        'NOT CHECKED: tip-over (not in the configuration),'
+        ' torque of elbow (not in the configuration)'
+    )
+
+
+def test_lamps_say_what_records_and_since_when() -> None:
+    """The black box, the time since the start, and where the numbers come from."""
+    lamps = frame(replace(FINE, black_box='disk full', running=12.5, source='bag'))['lamps']
+    assert lamps == {'black_box': 'disk full', 'running_s': 12.5, 'source': 'bag'}
+    assert frame(FINE)['lamps'] == {'black_box': '', 'running_s': None, 'source': 'live'}
 
 
 def test_inputs_are_passed_on() -> None:
@@ -169,16 +235,18 @@ def test_on_stairs_the_degrees_are_an_upper_bound() -> None:
     stairs = replace(FINE, ground='stairs', rough=True, cautious=0.1)
     made = frame(stairs)
     assert made['ground'] == {'words': 'stairs', 'rough': True, 'cautious_deg': 5.729578}
-    assert 'not begun to tip' in made['cause']
-    assert 'at most 22.9 deg of tilt left (right, upper bound), 5.7 deg taken' in made['left']
+    assert made['headline']['number'] == '<= 22 deg'
+    assert {(row['words'], row['level']) for row in made['tilt']} >= {('<= 22.9', '')}
+    close = frame(replace(stairs, angle=(0.05, 0.6, 0.6, 0.6)))['tilt'][0]
+    assert (close['words'], close['level']) == ('<= 2.8', 'ERROR')
     flat = frame(replace(FINE, ground='flat'))
     assert flat['ground'] == {'words': 'flat', 'rough': False, 'cautious_deg': None}
-    assert flat['cause'] == 'all margins kept'
-    assert 'upper bound' not in flat['left']
+    assert flat['headline']['what'] == 'ALL MARGINS KEPT'
+    assert 'at most' not in flat['headline']['notes'][0]
 
 
 def test_raised_flippers_are_named_beside_the_tilt_left() -> None:
     """What carries the body on flat ground only is a word of its own, and no alert."""
-    assert CARRIED in frame(replace(FINE, carried=True))['left']
-    assert CARRIED not in frame(FINE)['left']
-    assert CARRIED not in frame(replace(FINE, carried=True, rough=True))['left']
+    assert CARRIED in frame(replace(FINE, carried=True))['headline']['notes'][0]
+    assert CARRIED not in frame(FINE)['headline']['notes'][0]
+    assert CARRIED not in frame(replace(FINE, carried=True, rough=True))['headline']['notes'][0]

@@ -1,10 +1,13 @@
 """Which messages a console evaluates for a picture: the newest ones, each once."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
+from ugv_acceptance.config import load
 from ugv_acceptance.console.latest_messages import (
     Heartbeat,
     Newest,
@@ -12,11 +15,14 @@ from ugv_acceptance.console.latest_messages import (
     hints_of,
     newest_attitude,
     newest_of_joints,
+    problem_of,
 )
-from ugv_acceptance.evaluation.settings import ImuInput
+from ugv_acceptance.evaluation.criteria.not_judged import unknown_words
+from ugv_acceptance.evaluation.settings import CONTACTS, ImuInput
 
 NOTHING = (0.0, 0.0, 0.0)
 LEVEL, LEANING = (0.0, 0.0, 0.0, 1.0), (0.6, 0.0, 0.0, 0.8)
+OPEN = replace(load().settings, unknown=(CONTACTS,))
 NOT_GIVEN = (-1.0,) + (0.0,) * 8
 
 
@@ -113,20 +119,28 @@ def test_silence_is_judged_by_the_period_heard() -> None:
     [
         ({}, ()),
         ({'tip_of': 'front'}, ()),
-        (
-            {'tip_in_s': '1.2', 'tip_of': 'front'},
-            ('the robot tips to the front in 1.2 s at this rate',),
-        ),
-        ({'tip_in_s': '1.2'}, ('the robot tips to the ? in 1.2 s at this rate',)),
+        ({'tip_in_s': '1.2', 'tip_of': 'front'}, ()),
         (
             {'payload_estimate_kg': '3.5', 'saturation_in_s': '0.7', 'saturation_of': 'elbow'},
-            (
-                'elbow saturates in 0.7 s at this rate',
-                'measured efforts suggest a payload of 3.5 kg',
-            ),
+            ('measured efforts suggest a payload of 3.5 kg',),
         ),
     ],
 )
 def test_hints_are_what_the_verdict_tells(values: dict[str, str], hints: tuple[str, ...]) -> None:
-    """The time to a limit and the load that is felt, of whatever it tells."""
+    """The load that is felt; the time to a limit is a number of its own, not said twice."""
     assert hints_of(values) == hints
+
+
+@pytest.mark.parametrize(
+    ('message', 'problem'),
+    [
+        ('waiting for imu: no margins yet', 'waiting for imu: no margins yet'),
+        ('stairs: it is not known yet; 6 deg to tipping; and more', 'stairs: it is not known yet'),
+        (f'{unknown_words(OPEN)}; 6 deg to tipping', ''),
+        ('', ''),
+    ],
+)
+def test_a_verdict_of_no_data_tells_no_margin(message: str, problem: str) -> None:
+    """The reason alone; none where only the configuration leaves something open."""
+    assert problem_of(message, {'left': '6 deg to tipping'}, OPEN) == problem
+    assert problem_of(message, {}, load().settings) == message

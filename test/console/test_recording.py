@@ -121,6 +121,52 @@ def test_a_gap_is_no_data() -> None:
     assert gap.snapshot_at(gap.bag.start_ns + 13_000_000_000).known
 
 
+def test_what_was_known_last_stays_through_a_gap() -> None:
+    """Anywhere in a gap, also after a jump into it, a recording knows the margins before it."""
+    gap = judged('packbot_gap')
+    start = gap.bag.start_ns
+    before = gap.snapshot_at(start + 8_000_000_000)
+    for seconds in (11.0, 9.0):
+        last = gap.snapshot_at(start + round(seconds * 1e9)).last
+        assert last is not None
+        assert 8.0 <= (last.time - start) / 1e9 < 8.5
+        assert last.angle == pytest.approx(before.angle, abs=0.1)
+        assert len(last.torque) == len(before.torque)
+    assert before.last is None
+    assert gap.snapshot_at(start).last is None
+
+
+def test_a_recording_says_how_long_it_has_run(fail: ShownRecording) -> None:
+    """Its time is that since its start, and its source is no live robot."""
+    shown = fail.snapshot_at(fail.bag.start_ns + 7_000_000_000)
+    assert (shown.running, shown.source) == (7.0, 'bag')
+
+
+def test_a_recording_counts_down(fail: ShownRecording) -> None:
+    """By the margins of the last second, as a live monitor does; nothing is counted in a gap."""
+    start = fail.bag.start_ns
+    soon = fail.snapshot_at(start + 24_500_000_000).countdown
+    assert soon is not None
+    assert (soon.tips, soon.subject) == (True, 'right')
+    # It is past its edge from 25.6 s on.
+    assert soon.seconds == pytest.approx(1.1, abs=0.4)
+    assert fail.snapshot_at(start + 20_000_000_000).countdown is None
+    gap = judged('packbot_gap')
+    for seconds in (9.5, 12.1):
+        assert gap.snapshot_at(gap.bag.start_ns + round(seconds * 1e9)).countdown is None
+
+
+def test_a_worst_value_has_its_own_time(fail: ShownRecording) -> None:
+    """The worst so far and when it came: not when the alert was raised, and none yet to come."""
+    start = fail.bag.start_ns
+    for seconds, latest in ((26.0, 26.0), (31.0, 28.2)):
+        rows = fail.snapshot_at(start + round(seconds * 1e9)).alerts
+        tip = next(row for row in rows if (row.code, row.level) == ('TIP_OVER', ERROR))
+        assert tip.worst is not None
+        assert latest - 0.2 <= (tip.worst - start) / 1e9 <= latest
+    assert math.degrees(tip.peak) == pytest.approx(35.0, abs=0.1)
+
+
 def recorded(folder: Path, *parts: tuple[str, float, float, float]) -> ShownRecording:
     """Return a recording of parts: (topic, Hz, from, to) in seconds."""
     types = {

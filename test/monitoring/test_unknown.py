@@ -67,5 +67,8 @@ def test_the_console_says_what_is_unknown(key: str) -> None:
     )  # fmt: skip
     frame = frame_of(seen, settings, figure_of(settings.robot))
     assert frame['level'] == 'STALE'
-    assert key in str(frame['cause'])
-    assert 'shoulder_joint' in str(frame['left']) or 'elbow_joint' in str(frame['left'])
+    headline = frame['headline']
+    assert key in headline['cause']
+    assert headline['action'] == 'COMPLETE THE CONFIGURATION'
+    assert 'shoulder ' in headline['notes'][0] or 'elbow ' in headline['notes'][0]
+    assert all(row['words'] != '-' for row in frame['torque'])

@@ -30,6 +30,7 @@ VERBS = (
     'monitor',
     'console',
     'watch',
+    'tell',
     'foxglove',
     'replay',
     'plan',

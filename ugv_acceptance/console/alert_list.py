@@ -4,6 +4,7 @@ A console that starts late has missed earlier messages: `also` adds the alerts t
 evaluation finds active.
 """
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -50,6 +51,8 @@ class AlertBook:
             state.unseen and not shelved,
             tuple(x for x in values.get('offers', '').split(',') if x),
             said or kept,
+            _whole(values.get('worst_ns')),
+            _number(values.get('peak')),
         )
 
     def row(self, key: object) -> AlertRow:
@@ -81,7 +84,17 @@ def row_of(alert: Alert, text: str, advice: str) -> AlertRow:
         text,
         advice,
         alert.start,
+        worst=alert.worst_at,
+        peak=float(alert.peak),
     )
+
+
+def _number(text: str | None) -> float:
+    """Return a number; NaN for any other text."""
+    try:
+        return float(text or '')
+    except ValueError:
+        return math.nan
 
 
 def _whole(text: str | None) -> int | None:

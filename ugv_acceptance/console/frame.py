@@ -6,27 +6,28 @@ say that it does not know. `describe_robot` gives what does not change from fram
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from ugv_acceptance.console.alert_cards import card_of, name_words
+from ugv_acceptance.console.headline import Headline, View, headline_of, view_of
 from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as STAND_CLEAR_ADVICE
 from ugv_acceptance.evaluation.alerts.messages import level_words
-from ugv_acceptance.evaluation.alerts.rules import urgency
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, STALE, WARN
-from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_words
-from ugv_acceptance.evaluation.ground import CARRIED, bound_words
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, WARN
+from ugv_acceptance.evaluation.criteria.not_judged import left_open, unlimited
+from ugv_acceptance.evaluation.ground import FLAT, ground_words
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
-from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
+from ugv_acceptance.evaluation.margin_words import share_words, tenths_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
-# What the page says where nothing is known.
-UNKNOWN = 'margins are not known'
-ANSWER = 'enter it in the configuration, then start the monitor again'
-WAIT = 'do not move the robot on these numbers; check the inputs'
+# What stands where a margin is not known.
+_DASH = '-'
 
 Plain = dict[str, Any]
 
@@ -56,38 +57,56 @@ def describe_robot(settings: Settings) -> Plain:
 
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
-    level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
-    unanswered = bool(settings.unknown) and snapshot.known and level != ERROR
-    level = STALE if unanswered else level
-    cause, advice = _cause(snapshot, level)
-    if unanswered and cause == UNKNOWN:
-        cause, advice = unknown_words(settings), ANSWER
-    cause = cause or kept_words(settings, rough=snapshot.rough)
+    view = view_of(snapshot, settings)
+    headline = headline_of(view)
+    seconds, seconds_to = _countdown(snapshot, view)
+    active, past = cards_of(view)
+    torque, worst = _torque(snapshot, settings, dead=view.dead)
     return {
         'time_s': snapshot.time / 1e9,
         'stamp_s': None if snapshot.stamp is None else snapshot.stamp / 1e9,
-        'level': LEVELS[level],
-        'word': level_words(level),
-        'cause': cause,
-        'advice': advice,
-        'left': '' if level == STALE and not unanswered else _left(snapshot, settings),
-        'alerts': [_alert(row, snapshot.time) for row in _by_urgency(snapshot.alerts)],
+        'level': LEVELS[view.level],
+        'word': level_words(view.level),
+        'headline': headline.plain(),
+        'seconds': seconds,
+        'seconds_to': seconds_to,
+        'cards': active,
+        'past': past,
+        'assumed': assumed_words(snapshot, settings),
+        'lamps': {
+            'black_box': snapshot.black_box,
+            'running_s': number(snapshot.running),
+            'source': snapshot.source,
+        },
         'q': numbers(snapshot.q),
         'posture': _posture(snapshot, figure),
         'attitude': _attitude(snapshot),
-        'tilt': _tilt(snapshot),
+        'tilt': _tilt(snapshot, settings, dead=view.dead),
         'state': STATES[snapshot.state],
         'ground': {
             'words': snapshot.ground,
             'rough': snapshot.rough,
             'cautious_deg': number(math.degrees(snapshot.cautious)),
         },
-        'torque': _torque(snapshot, settings),
+        'torque': torque,
+        'worst_joint': worst,
         'inputs': [_input(row) for row in snapshot.inputs],
         'payload': {
             'mass_kg': snapshot.payload.mass,
             'cog_m': list(snapshot.payload.cog),
         },
+        **_former(snapshot, headline, view),
+    }
+
+
+def _former(snapshot: Snapshot, headline: Headline, view: View) -> Plain:
+    """Return the fields of the header before there were headline and cards."""
+    do = f'{headline.action.lower()} {headline.detail}'.strip()
+    return {
+        'cause': headline.cause or headline.what.lower(),
+        'advice': do,
+        'left': '' if view.dead else '; '.join(headline.notes),
+        'alerts': [_alert(row, snapshot.time) for group in view.groups for row in group.rows],
     }
 
 
@@ -101,59 +120,63 @@ def numbers(values: Iterable[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def _left(snapshot: Snapshot, settings: Settings) -> str:
-    """Return the smallest margins in a few words; '' where they are not known."""
-    if not snapshot.known:
-        return ''
-    side, angle = least_tilt(snapshot.angle)
-    degrees = math.degrees(angle)
-    if side:
-        ways = (
-            f'{degrees:.1f} degrees of tilt left',
-            f'{-degrees:.1f} degrees past the tipping point',
-        )
-        tilt = f'{ways[degrees < 0]} to the {side}'
-        if snapshot.rough:
-            tilt = bound_words(side, angle, snapshot.cautious)
-        elif snapshot.carried:
-            tilt = f'{tilt}; {CARRIED}'
-    elif not settings.judges_tilt:
-        tilt = tilt_not_checked(settings)
-    else:
-        tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
-    return '; '.join([with_most_used(tilt, snapshot.torque, settings), *snapshot.hints])
+def cards_of(view: View) -> tuple[list[Plain], list[Plain]]:
+    """Return the cards of what is active, and of what is over.
 
-
-def _by_urgency(rows: Sequence[AlertRow]) -> list[AlertRow]:
-    """Return rows by urgency: active, severe, unseen and new first.
-
-    A contradiction of the IMU comes before tip-over, and tip-over before motors.
-
-    A caution is left out while the danger of the same code and subject is active.
+    What is over, and what was advised by numbers that are dead, gives no advice.
     """
-    worse = {(row.code, row.subject) for row in rows if row.level == ERROR and row.end is None}
-    rows = [row for row in rows if row.level != WARN or (row.code, row.subject) not in worse]
+    fallen = None if view.fallen is None else STAND_CLEAR_ADVICE
+    now = '' if view.dead else fallen
+    cards = [
+        card_of(group, view.snapshot, view.settings, now if group.active else '')
+        for group in view.groups
+    ]
+    return [card for card in cards if card['active']], [c for c in cards if not c['active']]
 
-    def key(row: AlertRow) -> tuple[object, ...]:
-        first = -urgency(row.code, row.level)
-        return (row.end is not None, -row.level, first, not row.unseen, -row.start, row.key)
 
-    return sorted(rows, key=key)
+def assumed_words(snapshot: Snapshot, settings: Settings) -> str:
+    """Return in one line what is taken for granted, and what is not checked; '' if nothing is."""
+    taken = f'ground taken as {FLAT}' if snapshot.ground == ground_words(None) else ''
+    if snapshot.ground and not taken and snapshot.rough:
+        taken = f'ground: {snapshot.ground}'
+    return '; '.join(words for words in (taken, _unchecked(_Same(settings))) if words)
 
 
-def _cause(snapshot: Snapshot, level: int) -> tuple[str, str]:
-    """Return what the level comes from, and what to do; '' where nothing is wrong."""
-    active = [row for row in _by_urgency(snapshot.alerts) if row.end is None]
-    over = [row for row in _by_urgency(snapshot.alerts) if row.end is not None]
-    if active and not (level == STALE and snapshot.problem):
-        more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
-        return active[0].text + more, active[0].advice
-    if level == STALE:
-        return snapshot.problem or UNKNOWN, WAIT
-    if over and level != OK:
-        do = 'reset it' if 'reset' in over[0].offers else 'acknowledge it'
-        return f'{over[0].state}: {over[0].text}', f'{do} when the robot stands well again'
-    return '', ''
+@dataclass(frozen=True, slots=True, eq=False)
+class _Same:
+    """Settings as a key of a cache: the same object, not an equal one, which takes long to see."""
+
+    settings: Settings
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and other.settings is self.settings
+
+    def __hash__(self) -> int:
+        return id(self.settings)
+
+
+@lru_cache(maxsize=2)
+def _unchecked(same: _Same) -> str:
+    """Return what no verdict on a robot covers, in one line; '' if all is covered."""
+    settings = same.settings
+    joints = ', '.join(name_words(name) for name in unlimited(settings))
+    found = [one.what for one in left_open(settings).not_checked]
+    found = [f'{name_words(what)} (not in the configuration)' for what in found]
+    found += ['tip-over (no IMU)'] * (not settings.hears_imu)
+    found += ['torques (no joint states)'] * (not settings.hears_joints)
+    found += [f'torque of {joints} (no limit known)'] * bool(joints)
+    return f'NOT CHECKED: {", ".join(found)}' if found else ''
+
+
+def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
+    """Return the seconds until the first margin is used up, and what happens then."""
+    soon = snapshot.countdown
+    if soon is None or view.dead or view.doubted or view.fallen is not None:
+        return None, ''
+    if not soon.seconds > 0.0:
+        return None, ''
+    name = name_words(soon.subject)
+    return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'
 
 
 def _alert(row: AlertRow, now: int) -> Plain:
@@ -221,14 +244,36 @@ def _attitude(snapshot: Snapshot) -> Plain | None:
     }
 
 
-def _tilt(snapshot: Snapshot) -> list[Plain]:
-    return [
-        {'side': side, 'left_deg': number(math.degrees(angle))}
-        for side, angle in zip(SIDES, snapshot.angle, strict=True)
-    ]
+def _tilt(snapshot: Snapshot, settings: Settings, *, dead: bool) -> list[Plain]:
+    """Return the tilt left to each side: in degrees, in words, and its level."""
+    rows = []
+    for side, angle in zip(SIDES, snapshot.angle, strict=True):
+        words, level = _DASH, ''
+        if angle == math.inf and not dead:
+            words, level = 'no edge', LEVELS[OK]
+        elif math.isfinite(angle) and not dead:
+            words = '<= ' * snapshot.rough + tenths_words(angle)
+            level = _tilt_level(angle, settings, rough=snapshot.rough)
+        rows.append(
+            {'side': side, 'left_deg': number(math.degrees(angle)), 'words': words, 'level': level}
+        )
+    return rows
 
 
-def _torque(snapshot: Snapshot, settings: Settings) -> list[Plain]:
+def _tilt_level(angle: float, settings: Settings, *, rough: bool) -> str:
+    """Return the level of a tilt left (rad); '' for an upper bound, which never says OK."""
+    limits = settings.limits
+    if angle <= limits.tip_error:
+        return LEVELS[ERROR]
+    if angle <= limits.tip_warn:
+        return LEVELS[WARN]
+    return '' if rough else LEVELS[OK]
+
+
+def _torque(
+    snapshot: Snapshot, settings: Settings, *, dead: bool
+) -> tuple[list[Plain], int | None]:
+    """Return the torque of each joint: numbers, words and level; and which uses most."""
     nothing = (math.nan,) * len(settings.robot.joint_names)
     rows = zip(
         settings.robot.joint_names,
@@ -237,16 +282,31 @@ def _torque(snapshot: Snapshot, settings: Settings) -> list[Plain]:
         settings.limits.torque,
         strict=True,
     )
-    return [
-        {
-            'joint': name,
-            'torque': number(tau),
-            'measured': number(effort),
-            'limit': number(limit),
-            'use': number(abs(tau) / limit),
-        }
-        for name, tau, effort, limit in rows
-    ]
+    found, worst, most = [], None, -1.0
+    for k, (name, tau, effort, limit) in enumerate(rows):
+        use = abs(tau) / limit
+        judged = not dead and limit < math.inf and math.isfinite(use)
+        if judged and use > most:
+            worst, most = k, use
+        found.append(
+            {
+                'joint': name,
+                'torque': number(tau),
+                'measured': number(effort),
+                'limit': number(limit),
+                'use': number(use),
+                'words': share_words(use) if judged else _DASH if limit < math.inf else 'no limit',
+                'level': _torque_level(use, settings) if judged else '',
+            }
+        )
+    return found, worst
+
+
+def _torque_level(use: float, settings: Settings) -> str:
+    limits = settings.limits
+    if use >= limits.torque_error:
+        return LEVELS[ERROR]
+    return LEVELS[WARN if use >= limits.torque_warn else OK]
 
 
 def _input(row: InputRow) -> Plain:

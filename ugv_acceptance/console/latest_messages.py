@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder
-from ugv_acceptance.evaluation.settings import ImuInput
-from ugv_acceptance.monitoring.trends import end_words
+from ugv_acceptance.evaluation.criteria.not_judged import unknown_words
+from ugv_acceptance.evaluation.settings import ImuInput, Settings
 
 # Chooses which of an input's messages are evaluated, in order of arrival; at least one came.
 Pick = Callable[[Sequence[bytes]], Sequence[bytes]]
@@ -107,14 +107,15 @@ def newest_attitude(imu: ImuInput) -> Pick:
 
 
 def hints_of(values: Mapping[str, str]) -> tuple[str, ...]:
-    """Return the hints in a verdict's values beside the alerts, in plain words."""
-    hints = []
-    for kind, tips in (('tip', True), ('saturation', False)):
-        seconds = values.get(f'{kind}_in_s')
-        if seconds is not None:
-            end = end_words(values.get(f'{kind}_of', '?'), seconds, tips=tips)
-            hints.append(f'{end} at this rate')
+    """Return the hints in a verdict's values beside alerts and countdown, in plain words."""
     mass = values.get('payload_estimate_kg')
-    if mass is not None:
-        hints.append(f'measured efforts suggest a payload of {mass} kg')
-    return tuple(hints)
+    return () if mass is None else (f'measured efforts suggest a payload of {mass} kg',)
+
+
+def problem_of(message: str, values: Mapping[str, str], settings: Settings) -> str:
+    """Return why a verdict of NO DATA knows nothing: its sentence without the margins behind it.
+
+    '' where it knows all there is, and only the configuration leaves something open.
+    """
+    why = message.partition(f'; {values.get("left")}')[0]
+    return '' if settings.unknown and why == unknown_words(settings) else why

@@ -16,7 +16,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
-from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, LastKnown, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
@@ -103,37 +103,58 @@ class ShownRecording:
         active = [row.level for row in alerts if row.end is None]
         k = self.track.row(when)
         payload = self.payloads[bisect_right(self.payloads, when, key=lambda p: p[0]) - 1][1]
+        running = (when - self.bag.start_ns) / 1e9
+        first = Snapshot(when, payload=payload, running=running, source='bag')
         if k < 0:
-            return Snapshot(when, STALE, 'nothing was received yet', payload=payload)
+            return replace(first, problem='nothing was received yet')
         track = self.track
-        known = bool(track.known[k]) and not any(self._silent(w, when) for w in range(2))
-        if known and has_tipped(track.angle[k]):
-            alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
-        nothing = Snapshot(when)
-        return Snapshot(
-            when,
-            max([*active, OK if known else STALE]),
-            '',
-            known,
-            _numbers(track.q[k]),
-            _numbers(track.effort[k]),
-            _numbers(track.gravity[k]) if known else nothing.gravity,  # type: ignore[arg-type]
-            _numbers(track.torque[k]) if known else (),
-            _numbers(track.angle[k]) if known else nothing.angle,
-            int(track.state[k]) if known else nothing.state,
-            payload,
-            alerts,
-            (*(self._input(w, k, when) for w in self._used()), self._payload_input(when)),
-            **self._ground(k, when, payload, known=known),
+        inputs = (*(self._input(w, k, when) for w in self._used()), self._payload_input(when))
+        told = replace(
+            first,
+            q=_numbers(track.q[k]),
+            effort=_numbers(track.effort[k]),
+            alerts=alerts,
+            inputs=inputs,
         )
+        if not track.known[k] or any(self._silent(w, when) for w in range(2)):
+            told = replace(told, level=max([*active, STALE]), last=self._last(k))
+            return replace(told, **self._ground(k, when, payload, known=False))
+        if has_tipped(track.angle[k]):
+            alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
+            told = replace(told, alerts=alerts)
+        return replace(
+            told,
+            level=max([*active, OK]),
+            known=True,
+            gravity=_numbers(track.gravity[k]),
+            torque=_numbers(track.torque[k]),
+            angle=_numbers(track.angle[k]),
+            state=int(track.state[k]),
+            countdown=track.countdown(self.settings, k),
+            **self._ground(k, when, payload, known=True),
+        )
+
+    def _last(self, k: int) -> LastKnown | None:
+        """Return the margins known last, up to row `k` of the track; None if none ever were."""
+        at, track = self.track.last_known(k), self.track
+        if at < 0:
+            return None
+        when = int(track.time[at])
+        angle, torque = _numbers(track.angle[at]), _numbers(track.torque[at])
+        return LastKnown(when, angle, torque, self._kind(when) != FLAT)
+
+    def _kind(self, when: int) -> str:
+        """Return what kind of ground it is at `when` (ns)."""
+        seconds = np.array([(when - self.bag.start_ns) / 1e9])
+        return KINDS[int(self.settings.ground.numbers_at(seconds)[0])]
 
     def _ground(self, k: int, when: int, payload: Payload, *, known: bool) -> dict[str, Any]:
         """Return what a snapshot says of the ground at `when` (ns), in row `k` of the track."""
         settings, track = self.settings, self.track
         ground = settings.ground
-        seconds = np.array([(when - self.bag.start_ns) / 1e9])
-        kind = KINDS[int(ground.numbers_at(seconds)[0])]
-        entered = ground.kind or any(w.start <= seconds[0] < w.end for w in ground.windows)
+        seconds = (when - self.bag.start_ns) / 1e9
+        kind = self._kind(when)
+        entered = ground.kind or any(w.start <= seconds < w.end for w in ground.windows)
         rough = kind != FLAT and settings.judges_tilt
         cautious = math.nan
         if rough and known:
@@ -163,7 +184,8 @@ class ShownRecording:
         rule = alert.rule
         over = alert.end is not None and alert.end <= when
         # As it was known then: the worst up to now, not what was yet to come.
-        alert = replace(alert, peak=self.track.worst_of(rule, alert.start, when, alert.peak))
+        peak, worst = self.track.worst_of(alert, when)
+        alert = replace(alert, peak=peak)
         return AlertRow(
             f'{rule.code}-{rule.subject}-{LEVELS[rule.level]}-{k}',
             rule.code,
@@ -174,6 +196,8 @@ class ShownRecording:
             self.evaluation.alerts[k].advice,
             alert.start,
             alert.end if over else None,
+            worst=worst,
+            peak=peak,
         )
 
     def _silent(self, which: int, when: int) -> bool:

@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts.state_machine import Rule
+from ugv_acceptance.console.snapshot import Countdown
+from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.trends import LEAST, SPAN, ahead_of
 from ugv_acceptance.type_aliases import Floats, Times
 
 # Time between rows (ns), and parts of a timeline.
@@ -43,20 +45,43 @@ class Track:
         """Return the index of the newest row at `when` (ns); -1 before the first."""
         return int(np.searchsorted(self.time, when, side='right')) - 1
 
-    def worst_of(self, rule: Rule, start: int, when: int, peak: float) -> float:
-        """Return an alert's worst value from its start to `when` (ns), at most its `peak`.
+    def worst_of(self, alert: Alert, when: int) -> tuple[float, int | None]:
+        """Return an alert's worst value up to `when` (ns) and when it came (ns; None: not known).
 
-        For values that are not in the track, the peak.
+        Of a value that is not in the track its worst of all times.
         """
-        rows = slice(max(self.row(start), 0), self.row(when) + 1)
+        rule, peak, at = alert.rule, alert.peak, alert.worst_at
+        if at is not None and at <= when:
+            return peak, at
+        rows = slice(max(self.row(alert.start), 0), self.row(when) + 1)
         if rule.code == 'TIP_OVER':
             values = -self.angle[rows, SIDES.index(rule.subject)]
         elif rule.code == 'TORQUE_LIMIT':
             values = np.abs(self.torque[rows, self.joints.index(rule.subject)])
         else:
-            return peak
-        known = values[np.isfinite(values)]
-        return min(peak, max(float(known.max()), rule.on)) if len(known) else peak
+            return peak, None
+        known = np.isfinite(values)
+        if not known.any():
+            return peak, None
+        k = int(np.argmax(np.where(known, values, -np.inf)))
+        return min(peak, max(float(values[k]), rule.on)), int(self.time[rows][k])
+
+    def last_known(self, k: int) -> int:
+        """Return the newest row up to row `k` whose margins are known; -1 if there is none."""
+        back = self.known[k::-1] if k >= 0 else self.known[:0]
+        return k - int(np.argmax(back)) if back.any() else -1
+
+    def countdown(self, settings: Settings, k: int) -> Countdown | None:
+        """Return the margin that is used up first at row `k`, by the last second before it."""
+        first = int(np.searchsorted(self.time, self.time[k] - SPAN, side='right'))
+        if k + 1 - first < LEAST or not self.known[first : k + 1].all():
+            return None
+        rows = slice(first, k + 1)
+        seconds = (self.time[rows] - self.time[k]) / 1e9
+        soon = ahead_of(settings, seconds, self.angle[rows], self.torque[rows])
+        if not soon:
+            return None
+        return Countdown(soon[0].subject in SIDES, soon[0].subject, soon[0].seconds)
 
 
 def rate_at(when: int, heard: Times, taken: Times, since: int = 0) -> float:

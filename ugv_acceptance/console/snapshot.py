@@ -1,7 +1,7 @@
 """The console's view of one moment, and the interface of live robot and recording."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from ugv_acceptance.evaluation.alerts.state_machine import STALE
@@ -21,7 +21,8 @@ class AlertRow:
     """One alert as shown: `state` in words, times in ns, `offers` the commands allowed on it.
 
     `key` is the same for the same alert in all snapshots. `unseen`: nobody acknowledged it. `worst`
-    (ns) is when the value in `text` came; None where it is not known.
+    (ns) is when the value in `text` came; None where it is not known. `peak` is that value, in SI
+    as the alert's rule has it (of TIP_OVER minus the tilt left, rad); NaN where it is not known.
     """
 
     key: str
@@ -37,6 +38,17 @@ class AlertRow:
     offers: tuple[str, ...] = ()
     note: str = ''
     worst: int | None = None
+    peak: float = math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class LastKnown:
+    """The margins that were known last, and when (ns); see Snapshot for what they are."""
+
+    time: int
+    angle: tuple[float, ...]
+    torque: tuple[float, ...]
+    rough: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +85,9 @@ class Snapshot:
     are an upper bound, and `cautious` (rad) is the cautious margin. `carried`: points below the
     tracks carry the robot. `countdown` is the margin used up first, None where none shrinks.
     `black_box` is 'on', 'off', or what is wrong with it ('': not known); `running` (s) how long the
-    monitor has been active, NaN where that is not known.
+    monitor has been active, NaN where that is not known; in a recording the time since its start.
+    `last` are the margins known last, where none are now; None where none ever were. `source` is
+    live, bag or drill.
     """
 
     time: int
@@ -98,6 +112,26 @@ class Snapshot:
     countdown: Countdown | None = None
     black_box: str = ''
     running: float = math.nan
+    last: LastKnown | None = None
+    source: str = 'live'
+
+
+@dataclass(slots=True)
+class Memory:
+    """Keeps the margins of a feed that were known last."""
+
+    last: LastKnown | None = None
+
+    def keep(self, snapshot: Snapshot) -> Snapshot:
+        """Return a snapshot that knows what was known last, and remember what it knows itself.
+
+        Numbers that come while an alert says that there are no data are none.
+        """
+        lost = any(row.level == STALE and row.end is None for row in snapshot.alerts)
+        if snapshot.known and not lost:
+            self.last = LastKnown(snapshot.time, snapshot.angle, snapshot.torque, snapshot.rough)
+            return snapshot
+        return snapshot if self.last is None else replace(snapshot, last=self.last)
 
 
 class Feed(Protocol):

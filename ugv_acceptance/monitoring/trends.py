@@ -13,6 +13,7 @@ from ugv_acceptance.evaluation.alerts.prediction import time_to
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.type_aliases import Floats
 
 # Rates come from samples of this spacing over this span (ns); at least this many are needed.
 SPACING, SPAN, LEAST = 50_000_000, 1_000_000_000, 8
@@ -107,18 +108,27 @@ class Trends:
         if len(recent) < LEAST:
             return ()
         time = np.array([m.time - now for m in recent]) / 1e9
-        limits = np.array(self.settings.limits.torque)
         tilt = np.array([m.stability.angle for m in recent], dtype=np.float64)
-        left = limits - np.abs([m.torque for m in recent])
-        least = (*[TILT_RATE] * len(SIDES), *(LOAD_RATE * limits).tolist())
-        names = (*SIDES, *self.settings.robot.joint_names)
-        found = []
-        for name, values, slowest in zip(names, np.hstack((tilt, left)).T, least, strict=True):
-            value, rate = _line(time, values)
-            if -rate >= slowest:
-                seconds = float(time_to(0.0, -value, -value - rate, 1.0))
-                found.append(Ahead(name, rate, seconds))
-        return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))
+        torque = np.array([m.torque for m in recent], dtype=np.float64)
+        return ahead_of(self.settings, time, tilt, torque)
+
+
+def ahead_of(settings: Settings, time: Floats, tilt: Floats, torque: Floats) -> tuple[Ahead, ...]:
+    """Return the margins used up within SOON at their rates over the samples, the soonest first.
+
+    `time` (n,) is in s, now being 0; `tilt` (n, 4) in rad, `torque` (n, j) in N m or N.
+    """
+    limits = np.array(settings.limits.torque)
+    left = limits - np.abs(torque)
+    least = (*[TILT_RATE] * len(SIDES), *(LOAD_RATE * limits).tolist())
+    names = (*SIDES, *settings.robot.joint_names)
+    found = []
+    for name, values, slowest in zip(names, np.hstack((tilt, left)).T, least, strict=True):
+        value, rate = _line(time, values)
+        if -rate >= slowest:
+            seconds = float(time_to(0.0, -value, -value - rate, 1.0))
+            found.append(Ahead(name, rate, seconds))
+    return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))
 
 
 def _line(time: 'np.ndarray', values: 'np.ndarray') -> tuple[float, float]:

@@ -15,31 +15,35 @@ from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import InertiaStamped
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
-from ugv_acceptance import BadSample
 from ugv_acceptance.config import Config
 from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
-from ugv_acceptance.console.hub import number_in
-from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.monitor_values import countdown_of, number_of
+from ugv_acceptance.console.snapshot import (
+    NO_LOAD,
+    NO_PAYLOAD,
+    AlertRow,
+    InputRow,
+    Memory,
+    Snapshot,
+)
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.messages import advice
-from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
-from ugv_acceptance.evaluation.inputs.payload import payload_from
+from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.console_operator import ConsoleOperator
 from ugv_acceptance.nodes.executor import Stop, ros
-from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, SHELVED
-from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
-from ugv_acceptance.nodes.monitor.subscriptions import Inputs, qos_of
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
+from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.operator_client import MONITOR
 
-MONITOR = 'acceptance_monitor'
 # Seconds without a verdict (it comes each second), and without margins while inputs arrive, until
 # the monitor counts as silent.
 VERDICT_SILENCE = 2.5
@@ -54,10 +58,10 @@ _LOOK = 0.5
 class ConsoleNode(Node):
     """A node without a thread: takes messages of robot and monitor when a snapshot is asked for."""
 
-    def __init__(self, config: Config) -> None:
-        super().__init__('acceptance_console')
+    def __init__(self, config: Config, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
+        super().__init__('acceptance_console', **node)
         self.config, self.settings = config, config.settings
-        self.book = AlertBook()
+        self.book, self.memory = AlertBook(), Memory()
         self.verdict: DiagnosticStatus | None = None
         self.said: dict[str, str] = {}
         self.heard, self.margins = hearing.Heartbeat(), hearing.Heartbeat()
@@ -78,16 +82,14 @@ class ConsoleNode(Node):
         self._due = self._look_due = 0.0
         self._own: dict[str, AlertRow] = {}
         self._rows: tuple[InputRow, ...] = ()
-        self._load: InertiaStamped | None = None
-        self._load_out: Any = None
         self._known_since: float | None = None
         self.create_subscription(DiagnosticStatus, f'{MONITOR}/verdict', self._on_verdict, LATCHED)
         self.create_subscription(DiagnosticArray, f'{MONITOR}/alerts', self._on_alerts, 50)
         self.create_subscription(
             JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
-        self._hand = self.create_publisher(DiagnosticStatus, f'{MONITOR}/operator', 10)
         self._executor, self._never = EventsExecutor(), Future()
+        self._operator = ConsoleOperator(self, self._executor, config, session, self.book)
         self._executor.add_node(self)
 
     def describe(self) -> dict[str, Any]:
@@ -116,57 +118,11 @@ class ConsoleNode(Node):
         if silent or now >= self._look_due:
             self._look_due = now + _LOOK
             self._look_around()
-        return self._look(now)
+        return self.memory.keep(self._look(now))
 
     def command(self, do: str, values: dict[str, Any]) -> str:
-        """Send the monitor a command about alerts, or declare a payload; BadSample for others."""
-        if do in DOINGS:
-            self._hand.publish(self._operation(do, values))
-            return f'asked the monitor: {do}'
-        if do == 'payload':
-            return self._declare(values)
-        raise BadSample(f'a live robot cannot do {do!r}')
-
-    def _operation(self, do: str, values: dict[str, Any]) -> DiagnosticStatus:
-        message = DiagnosticStatus(name=do, message=str(values.get('note') or '')[:200])
-        message.hardware_id = str(values.get('by') or 'console')[:40]
-        if values.get('key') is not None:
-            row = self.book.row(values['key'])
-            named = {'code': row.code, 'subject': row.subject, 'level': LEVELS[row.level]}
-            seconds = number_in(values, 'for_s') if 'for_s' in values else SHELVED
-            message.values = key_values(named | {'seconds': seconds})
-        return message
-
-    def _declare(self, values: dict[str, Any]) -> str:
-        cog = values.get('cog_m')
-        if not isinstance(cog, list) or len(cog) != 3:
-            raise BadSample(f'cog_m: expected three numbers, got {cog!r}')
-        numbers = dict(zip('xyz', cog, strict=True))
-        mass, com = number_in(values, 'mass_kg'), [number_in(numbers, k) for k in 'xyz']
-        link = self.settings.robot.payload_link or ''
-        if payload_from(self.settings.robot, mass, com, link) is None:
-            raise BadSample(f'expected a mass in kg from 0 on, in reach of {link}, got {mass}')
-        message = InertiaStamped()
-        message.header.frame_id = link
-        message.inertia.m = mass
-        message.inertia.com.x, message.inertia.com.y, message.inertia.com.z = com
-        self._carry(message)
-        return f'declared {mass:g} kg'
-
-    def _carry(self, message: InertiaStamped) -> None:
-        topic = self.config.topics.payload
-        if self._load_out is None:
-            self._load_out = self.create_publisher(
-                InertiaStamped, topic.name, qos_of(topic, topic.depth)
-            )
-        self._load = message
-        self._say_load()
-
-    def _say_load(self) -> None:
-        """Publish the declared load every second, so that a late subscriber receives it too."""
-        if self._load is not None:
-            self._load.header.stamp = self.get_clock().now().to_msg()
-            self._load_out.publish(self._load)
+        """Ask the monitor for what an operator wants; return its answer. BadSample: refused."""
+        return self._operator.command(do, values)
 
     def _beat(self, _: bytes) -> None:
         self.margins.beat(time.monotonic())
@@ -178,6 +134,7 @@ class ConsoleNode(Node):
         none = values.get('alerts_active') == values.get('alerts_unacknowledged') == '0'
         if none and 'code' not in values:
             self.book.clear()
+        self._operator.follow_load(self.said)
 
     def _on_alerts(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -193,7 +150,7 @@ class ConsoleNode(Node):
     def _every_second(self) -> None:
         self._inputs.look_around([])
         self.session.measure_rates()
-        self._say_load()
+        self._operator.say_load()
 
     def _look_around(self) -> None:
         """Advance the evaluation's time, and update active alerts and the state of the inputs."""
@@ -223,10 +180,12 @@ class ConsoleNode(Node):
         if arriving and self.margins.silent(now, MARGIN_SILENCE):
             return 'the monitor is silent although its inputs arrive'
         level = ord(self.verdict.level) if isinstance(self.verdict.level, bytes) else STALE
-        silent = level == STALE or margins is None
-        # An alert, if there is one, says better what is missing and what to do.
+        # A verdict from before margins were lost says that they are kept: it is no reason. If there
+        # is an alert, it says better what is missing and what to do.
         told = any(row.level == STALE and row.end is None for row in self.book.rows.values())
-        return self.verdict.message if silent and not told else ''
+        if told or level != STALE:
+            return ''
+        return hearing.problem_of(self.verdict.message, self.said, self.settings)
 
     def _look(self, now: float) -> Snapshot:
         evaluator, problem = self.session.evaluator, self._problem(now)
@@ -234,10 +193,12 @@ class ConsoleNode(Node):
         alerts = tuple(map(self._newest, self.book.also(self._own.values())))
         told = () if problem and self.verdict is None else alerts
         moment, rows = self.session.clock.now(), self._rows
+        lamps = self._lamps(now)
         if margins is None or problem or self.verdict is None:
             q = tuple(joints.q)
             load = evaluator.payload or NO_LOAD
-            return Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
+            known = Snapshot(moment, STALE, problem, q=q, payload=load, alerts=told, inputs=rows)
+            return replace(known, **lamps)
         return Snapshot(
             moment,
             self.verdict.level[0],
@@ -254,11 +215,22 @@ class ConsoleNode(Node):
             inputs=rows,
             hints=hearing.hints_of(self.said),
             stamp=margins.stamp,
-            ground=self.said.get('ground', ''),
             rough='trend' in self.said,
-            cautious=math.radians(float(self.said.get('cautious_deg', 'nan'))),
+            cautious=math.radians(number_of(self.said, 'cautious_deg')),
             carried='trend' not in self.said and evaluator.carried,
+            countdown=countdown_of(self.said, now - (self.heard.last or now)),
+            **lamps,
         )
+
+    def _lamps(self, now: float) -> dict[str, Any]:
+        """Return what the verdict tells beside the margins: of a monitor that is alive."""
+        if self.heard.last is None or now - self.heard.last > VERDICT_SILENCE:
+            return {}
+        return {
+            'ground': self.said.get('ground', ''),
+            'black_box': self.said.get('black_box', ''),
+            'running': number_of(self.said, 'active_s'),
+        }
 
     def _newest(self, row: AlertRow) -> AlertRow:
         """Return an active alert with its worst value until now and the newest advice."""
@@ -267,7 +239,8 @@ class ConsoleNode(Node):
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
         advice = STAND_CLEAR if self.session.advisory.tipped else advice
-        return replace(row, text=self._own.get(row.key, row).text, advice=advice)
+        own = self._own.get(row.key, row)
+        return replace(row, text=own.text, advice=advice, worst=own.worst, peak=own.peak)
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:
         count, now = self.session.counts[name], self.session.clock.now()

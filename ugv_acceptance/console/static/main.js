@@ -1,19 +1,25 @@
 // The page: one WebSocket, the newest frame drawn once a screen refresh, and a watchdog of its own.
-import { $, text, fixed, say } from './dom.js';
-import { showVerdict, showTilt, showTorques, showInputs, showLoad } from './panels.js';
+import { $, text } from './dom.js';
+import { Countdown, lost, showHeadline } from './headline.js';
+import { showStatus } from './status.js';
+import { showMargins, showTorques, showInputs, showLoad } from './panels.js';
 import { Alerts } from './alerts.js';
 import { Views } from './views.js';
 import { SafeMap } from './map.js';
 import { Strips } from './strips.js';
 import { Playback } from './playback.js';
 import { Sound } from './sound.js';
+import { Tell } from './tell.js';
+import { follow as followNight } from './night.js';
 
 const SILENCE = 450; // ms without a frame: what is shown may no longer be true; seen within 500
 const RETRY = 1000;
 
-const page = { hello: null, frame: null, fresh: false, last: -Infinity, socket: null, asked: 0, waiting: new Map() };
+const page = { hello: null, frame: null, known: null, knownAt: 0, fresh: false, last: -Infinity, socket: null, asked: 0, waiting: new Map() };
 const sound = new Sound();
+const countdown = new Countdown();
 const alerts = new Alerts(ask);
+const tell = new Tell(ask);
 const views = new Views();
 const map = new SafeMap(ask);
 const strips = new Strips();
@@ -41,7 +47,7 @@ function hello(message) {
   map.describe(message);
   alerts.describe(message);
   strips.describe(message);
-  $('load-form').hidden = message.source !== 'live' || !message.payload_link;
+  tell.describe(message);
 }
 
 const take = {
@@ -52,6 +58,7 @@ const take = {
     page.frame = message;
     page.fresh = true;
     page.last = performance.now();
+    if (message.level !== 'STALE') { page.known = message; page.knownAt = page.last; }
     strips.take(message);
     views.take(message);
     map.follow(message);
@@ -74,40 +81,30 @@ function connect() {
 }
 
 // Nothing came for too long: whatever the last frame said, there are no data.
-const lost = (age) => ({
-  level: 'STALE',
-  word: 'NO DATA',
-  cause: Number.isFinite(age) ? `the console server has sent nothing for ${fixed(age / 1000)} s` : 'no answer from the console server',
-  advice: 'stop the robot; check that the console runs and that the network is there',
-  left: '',
-  alerts: page.frame ? page.frame.alerts : [],
-});
-
 function draw() {
-  const age = performance.now() - page.last;
-  const silent = age > SILENCE;
-  if (page.fresh || silent) {
-    const shown = silent ? lost(age) : page.frame;
-    showVerdict(shown);
-    sound.follow(shown);
-    if (!silent && page.hello) {
-      page.fresh = false;
-      const frame = page.frame;
-      alerts.show(frame);
-      showInputs(frame);
-      showLoad(frame, page.hello);
-      playback.show(frame);
-      if (frame.level !== 'STALE') {
-        showTilt(frame, page.hello);
-        showTorques(frame, page.hello);
-        views.draw(frame, page.hello);
-        map.draw(frame);
-      }
-      strips.draw();
-      page.painted = frame.number;
-      page.paintedAt = Date.now();
-    }
+  const age = performance.now() - page.last, silent = age > SILENCE;
+  if (!page.fresh && !silent) return;
+  const { frame, hello } = page, shown = silent ? lost(page, age) : frame;
+  showHeadline(shown);
+  sound.follow(shown);
+  countdown.show(shown, hello?.source === 'live');
+  if (!hello || !frame) return;
+  alerts.show(shown);
+  showMargins(frame, hello, silent);
+  showTorques(frame, hello, silent);
+  if (silent) return;
+  page.fresh = false;
+  showStatus(frame);
+  showInputs(frame);
+  showLoad(frame, hello);
+  playback.show(frame);
+  if (frame.level !== 'STALE') {
+    views.draw(frame, hello);
+    map.draw(frame);
   }
+  strips.draw();
+  page.painted = frame.number;
+  page.paintedAt = Date.now();
 }
 
 function everyScreen() {
@@ -116,11 +113,7 @@ function everyScreen() {
 }
 
 $('arm').addEventListener('click', () => sound.toggle());
-$('load-form').addEventListener('submit', (event) => {
-  event.preventDefault();
-  const [mass_kg, x, y, z] = ['mass', 'x', 'y', 'z'].map((k) => Number($(`load-${k}`).value));
-  ask({ do: 'payload', mass_kg, cog_m: [x, y, z] }, say('load-answer'));
-});
+followNight();
 connect();
 everyScreen();
 // A page in the background is not drawn; its verdict still is looked after.

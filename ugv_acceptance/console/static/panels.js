@@ -1,80 +1,58 @@
-// The parts of the page that are text: verdict, tilt, torques, inputs, payload.
+// The parts of the page that are text: margins, torques, inputs, payload.
 import { $, text, element, fixed, nice } from './dom.js';
 
-const SIGNS = {
-  OK: ['M50 4a46 46 0 1 0 .01 0z', '#fff', '✓', '#0b6b2c'],
-  WARN: ['M50 6 98 92H2z', '#111', '!', '#ffc400'],
-  ERROR: ['M31 4h38l27 27v38l-27 27H31L4 69V31z', '#fff', '!', '#c00016'],
-  STALE: ['M8 8h84v84H8z', '#000', '?', '#d0d0d0'],
-};
-let spoken = '';
+const UNKNOWN = '-', DASH = '—'; // what a frame says, and is shown, where a number would be one of before
+let worst = null;
 
-export function showVerdict(shown) {
-  const level = shown.level;
-  document.body.dataset.level = level;
-  const [shape, fill, glyph, ink] = SIGNS[level];
-  if ($('sign-shape').getAttribute('d') !== shape) {
-    $('sign-shape').setAttribute('d', shape);
-    $('sign-shape').setAttribute('fill', fill);
-    $('sign-glyph').setAttribute('fill', ink);
-    text($('sign-glyph'), glyph);
-  }
-  text($('word'), shown.word);
-  text($('cause'), shown.cause);
-  text($('advice'), shown.advice);
-  text($('left'), shown.left);
-  $('verdict').classList.toggle('flash', shown.alerts.some((a) => a.unseen && a.level === 'ERROR'));
-  // Numbers change all the time; a screen reader is told when the kind of trouble does.
-  const first = shown.alerts.find((a) => a.active);
-  const say = `${shown.word} ${first ? first.code + first.subject : ''}`;
-  if (say !== spoken) {
-    spoken = say;
-    text($('spoken'), `${shown.word}. ${shown.cause}. ${shown.advice}`);
-  }
-}
-
-export function showTilt(frame, hello) {
-  for (const { side, left_deg } of frame.tilt) {
-    const box = document.querySelector(`.side-left[data-side="${side}"]`);
+// Tilt and worst joint, right under the header; `dead` where nothing comes that could say what is true now.
+export function showMargins(frame, hello, dead) {
+  for (const { side, words, level } of frame.tilt) {
+    const box = document.querySelector(`.side-left[data-side="${side}"]`), unknown = dead || words === UNKNOWN;
     // Where the ground is not flat the number is an upper bound: it never shows that all is well.
-    const bound = frame.ground.rough && left_deg !== null;
-    const shown = left_deg === null ? 'OK' : left_deg <= hello.tip_error_deg ? 'ERROR' : left_deg <= hello.tip_warn_deg ? 'WARN' : 'OK';
-    const level = bound && shown === 'OK' ? 'BOUND' : shown;
-    box.className = `side-left ${level}`;
+    box.className = `side-left ${unknown ? 'DEAD' : level || 'BOUND'}`;
     if (!box.firstChild) box.append(element('span', '', side), element('b'));
-    text(box.lastChild, left_deg === null ? 'no edge' : `${bound ? '≤ ' : ''}${fixed(left_deg)}°`);
+    text(box.lastChild, unknown ? DASH : /\d/.test(words) ? `${words.replace('<=', '≤')}°` : words);
   }
+  worst = frame.worst_joint ?? worst;
+  if (worst !== null) showTorque($('worst'), frame.torque[worst], hello.joints[worst].unit, dead);
+  text($('attitude'), dead || frame.level === 'STALE' ? '' : attitude(frame.attitude));
   const g = frame.ground, cautious = g.cautious_deg === null ? '' : `, ${fixed(g.cautious_deg)}° taken cautiously`;
-  text($('ground'), !g.words ? '' : g.rough ? `${g.words}: upper bound${cautious}` : `ground: ${g.words}`);
+  text($('ground'), g.rough ? `${g.words}: upper bound${cautious}` : '');
   text($('map-ground'), g.rough ? '(on flat ground only)' : '');
-  const a = frame.attitude;
-  const lean = (value, plus, minus) => `${fixed(Math.abs(value))}° ${value >= 0 ? plus : minus}`;
-  text($('attitude'), !a ? 'attitude not known' : a.slope_deg < 1 ? `level: slope ${fixed(a.slope_deg)}°` : `slope ${fixed(a.slope_deg)}°: ${lean(a.pitch_deg, 'nose down', 'nose up')}, ${lean(a.roll_deg, 'right side down', 'left side down')}`);
 }
 
-export function showTorques(frame, hello) {
+function attitude(a) {
+  if (!a) return 'attitude not known';
+  const lean = (value, plus, minus) => `${fixed(Math.abs(value))}° ${value >= 0 ? plus : minus}`;
+  if (a.slope_deg < 1) return `level: slope ${fixed(a.slope_deg)}°`;
+  return `slope ${fixed(a.slope_deg)}°: ${lean(a.pitch_deg, 'nose down', 'nose up')}, ${lean(a.roll_deg, 'right side down', 'left side down')}`;
+}
+
+export function showTorques(frame, hello, dead) {
   const box = $('torques');
   frame.torque.forEach((row, k) => {
-    if (!box.children[k]) {
-      const line = element('div', 'torque');
-      const track = element('div', 'track');
-      track.append(element('div', 'bar'), element('div', 'mark'), element('div', 'mark measured'));
-      line.append(element('span', '', nice(row.joint)), element('b'), track);
-      box.append(line);
-    }
-    const line = box.children[k], track = line.lastChild, unit = hello.joints[k].unit;
-    const use = row.use ?? 0, limited = row.limit !== null;
-    const level = !limited ? '' : use >= hello.torque_error ? 'ERROR' : use >= hello.torque_warn ? 'WARN' : 'OK';
-    line.className = `torque ${level}`;
-    const said = { ERROR: ' OVER', WARN: ' close', OK: '', '': '' }[level];
-    text(line.children[1], limited ? `${fixed(Math.abs(row.torque))} of ${fixed(row.limit, 0)} ${unit}: ${fixed(100 * use, 0)} %${said}` : `${fixed(row.torque)} ${unit}, no limit known`);
-    track.hidden = !limited;
-    // The bar's end is 125 % of the limit, the mark the limit itself.
-    track.children[0].style.width = `${Math.min(100, use * 80)}%`;
-    track.children[1].style.left = '80%';
-    track.children[2].hidden = row.measured === null || !limited;
-    if (limited) track.children[2].style.left = `${Math.min(99, (Math.abs(row.measured ?? 0) / row.limit) * 80)}%`;
+    showTorque(box.children[k] ?? box.appendChild(element('div')), row, hello.joints[k].unit, dead);
   });
+}
+
+function showTorque(line, row, unit, dead) {
+  if (!line.firstChild) {
+    const track = element('div', 'track');
+    track.append(element('div', 'bar'), element('div', 'mark'), element('div', 'mark measured'));
+    line.append(element('span'), element('b'), track);
+  }
+  const [name, said, track] = line.children, limited = row.limit !== null;
+  const unknown = dead || row.words === UNKNOWN || row.torque === null;
+  line.className = `torque ${unknown ? 'DEAD' : row.level}`;
+  text(name, nice(row.joint));
+  const numbers = limited ? `${fixed(Math.abs(row.torque))} of ${fixed(row.limit, 0)} ${unit}: ${row.words}` : `${fixed(row.torque)} ${unit}, no limit known`;
+  text(said, unknown ? DASH : numbers);
+  track.hidden = !limited;
+  // The bar's end is 125 % of the limit, the mark the limit itself.
+  track.children[0].style.width = `${unknown ? 0 : Math.min(100, (row.use ?? 0) * 80)}%`;
+  track.children[1].style.left = '80%';
+  track.children[2].hidden = unknown || row.measured === null || !limited;
+  if (limited) track.children[2].style.left = `${Math.min(99, (Math.abs(row.measured ?? 0) / row.limit) * 80)}%`;
 }
 
 export function showInputs(frame) {

@@ -1,4 +1,4 @@
-// One voice at a time. Browsers keep sound off until a person presses something: the button says so in red.
+// One voice at a time. Browsers keep sound off until a person presses something: the button says so.
 import { $, text } from './dom.js';
 
 // Level -> tones (Hz) and seconds between calls; an acknowledged alert is silent.
@@ -26,12 +26,12 @@ export class Sound {
     const on = this.audio !== null;
     document.body.dataset.sound = on ? state : 'off';
     $('arm').setAttribute('aria-pressed', String(on));
-    text($('arm'), on ? 'Sound is on: press to stop' : 'SOUND IS OFF: press to arm');
+    text($('arm'), on ? 'Sound is on: press to stop' : 'Sound is off: press to arm');
   }
 
   follow(shown) {
     if (!this.audio) return;
-    const unseen = shown.alerts.filter((a) => a.unseen && a.active).map((a) => a.level);
+    const unseen = shown.cards.filter((card) => card.unseen && card.active).map((card) => card.level);
     const level = shown.level === 'STALE' ? 'STALE' : ['ERROR', 'WARN'].find((x) => unseen.includes(x));
     if (!level) { this.next = 0; this.say('armed'); return; }
     this.say('sounding');

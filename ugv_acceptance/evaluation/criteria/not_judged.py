@@ -112,6 +112,17 @@ def untold_joints(settings: Settings, joints: Sequence[str]) -> Statement:
 
 def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
     """Yield the joints that carry torque (force where prismatic) and have no limit."""
+    found = [_with_size(settings.robot, *one) for one in unlimited(settings).items()]
+    if found:
+        why = 'no limit in the configuration, so it is not judged'
+        yield NotChecked(f'torque of {", ".join(found)}', why)
+
+
+def unlimited(settings: Settings) -> dict[str, float]:
+    """Return the joints that carry torque and have no limit: how much (N m; N; infinite: unknown).
+
+    Without those that are passive, and those whose limit the configuration says is unknown.
+    """
     robot, limits = settings.robot, settings.limits.torque
     names = [
         name
@@ -120,14 +131,9 @@ def not_judged_joints(settings: Settings) -> Iterator[NotChecked]:
         and name not in settings.passive
         and f'joints.{name}.limit' not in settings.unknown
     ]
-    if not names:
-        return
-    heavy = carried(robot) if len(robot.joint_names) <= MOST_JOINTS else {}
-    known = [(name, heavy.get(name, math.inf)) for name in names]
-    found = [_with_size(robot, name, size) for name, size in known if size > 0.0]
-    if found:
-        why = 'no limit in the configuration, so it is not judged'
-        yield NotChecked(f'torque of {", ".join(found)}', why)
+    few = names and len(robot.joint_names) <= MOST_JOINTS
+    heavy = carried(robot) if few else {}
+    return {name: heavy.get(name, math.inf) for name in names if heavy.get(name, math.inf) > 0.0}
 
 
 def _with_size(robot: Robot, name: str, size: float) -> str:

@@ -71,7 +71,8 @@ class BlackBox:
     Times in ns of receipt; `now` returns that of the message in hand. `on_problem` is called with
     the reason why a recording could not be made; the box then goes on keeping. `robot` is the
     description in force, the first message of every recording (empty: none). `saved` are the
-    recordings whose past is in the file. A thread writes, so that no message has to wait.
+    recordings whose past is in the file, `trouble` why the last one could not be made (empty: it
+    was made). A thread writes, so that no message has to wait.
     """
 
     folder: Path | None
@@ -81,12 +82,24 @@ class BlackBox:
     most: int = MOST
     robot: bytes = b''
     saved: list[Path] = field(default_factory=list)
+    trouble: str = ''
     _kept: deque[Kept] = field(default_factory=lambda: deque(maxlen=KEPT))
     _lasting: dict[str, bytes] = field(default_factory=dict)
     _queue: 'SimpleQueue[Kept | None] | None' = None
     _until: int = 0
     _threads: list[Thread] = field(default_factory=list)
     _problems: 'SimpleQueue[str]' = field(default_factory=SimpleQueue)
+
+    @property
+    def state(self) -> str:
+        """'on', 'off', or why a recording of the next critical alert is doubtful."""
+        if self.folder is None:
+            return 'off'
+        if self.trouble:
+            return f'the last recording failed: {self.trouble}'
+        if len(self._threads) >= self.most:
+            return f'full: {self.most} recordings were made; activate the monitor again'
+        return 'on'
 
     def tap(self, name: str, take: Take) -> Take:
         """Return `take` wrapped so that every message of a channel is kept before it is taken."""
@@ -170,8 +183,10 @@ class BlackBox:
                     writer.write(self.channels[name].topic, when, data)
                 writer.flush()
                 self.saved.append(path)
+                self.trouble = ''
                 self._follow(writer, queue)
         except (OSError, AcceptanceError) as error:
+            self.trouble = ' '.join(str(error).split())
             self._problems.put(str(error))
 
     def _follow(self, writer: BagWriter, queue: 'SimpleQueue[Kept | None]') -> None:

@@ -10,7 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -20,7 +19,7 @@ from rclpy.serialization import serialize_message
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from ugv_acceptance import AcceptanceError, BadConfig, BadSample
+from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.config import Config
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.alerts.alarms import Change
@@ -30,22 +29,21 @@ from ugv_acceptance.monitoring.diagnostics import (
     Status,
     alert_status,
     diagnostics_of,
-    guarded,
     unavailable,
     verdict_of,
 )
+from ugv_acceptance.monitoring.guarding import guarded
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
+from ugv_acceptance.nodes.monitor.lamps import Lamps
 from ugv_acceptance.nodes.monitor.operator_commands import (
-    HAND,
     all_reset,
     black_box_of,
     by_service,
-    hand_allowed,
-    operate,
 )
+from ugv_acceptance.nodes.monitor.operator_desk import INACTIVE, OperatorDesk
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.parameters import (
     LOAD,
@@ -61,7 +59,6 @@ from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, 
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 
 NAME = 'acceptance_monitor'
-INACTIVE = 'the monitor is not active'
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
@@ -82,6 +79,7 @@ class Monitor(LifecycleNode):
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
         self._box: BlackBox | None = None
+        self._lamps: Lamps | None = None
         self.own = OwnDescription(self, self._on_description)
         # Whether it is to bring itself up as soon as the robot tells its URDF.
         self._awaits = False
@@ -95,7 +93,9 @@ class Monitor(LifecycleNode):
         self.create_timer(1.0, guarded(self, self._every_second), clock=self.steady)
         self.create_service(Trigger, '~/acknowledge', self._acknowledge)
         self.create_service(Trigger, '~/reset', self._reset)
-        self.create_subscription(DiagnosticStatus, '~/operator', self._on_operator, 10)
+        self.desk = OperatorDesk(
+            self, lambda: self.session, lambda: self._inputs, self._tell, self.say
+        )
         self.say()
 
     # Lifecycle
@@ -194,6 +194,7 @@ class Monitor(LifecycleNode):
             raise BadConfig('expected a configured monitor')
         self.session = self._new_session(self._settings)
         self._box = black_box_of(self, self.config, self.session)
+        self._lamps = Lamps(self.session, self._box, self.session.clock.now())
         self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
         self._take_rates()
         tick = self._settings.delays.tick
@@ -276,7 +277,9 @@ class Monitor(LifecycleNode):
 
     def verdict(self) -> Status:
         """Return the present verdict: STALE in every state but active."""
-        return unavailable(self.problem) if self.session is None else verdict_of(self.session)
+        if self.session is None or self._lamps is None:
+            return unavailable(self.problem)
+        return self._lamps.on(verdict_of(self.session))
 
     def say(self) -> None:
         """Publish the verdict and the diagnostics."""
@@ -313,19 +316,6 @@ class Monitor(LifecycleNode):
             response.message = f'acknowledged {len(seen)} alerts'
             self.say()
         return response
-
-    def _on_operator(self, message: DiagnosticStatus) -> None:
-        """Carry out an operator's command with its name and note: docs/operator.md."""
-        try:
-            if self.session is None:
-                raise BadSample(INACTIVE)
-            if message.name == HAND:
-                self.set_parameters_atomically([Parameter(HAND, value=hand_allowed(message))])
-            else:
-                self._tell(operate(self.session, message))
-        except AcceptanceError as error:
-            self.get_logger().warning(f'operator: {error}')
-        self.say()
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self.session is not None, INACTIVE
