@@ -15,7 +15,7 @@ from ugv_acceptance.console.snapshot import AlertRow, LastKnown, Memory, Snapsho
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, TIPPED
 from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
-from ugv_acceptance.evaluation.settings import CONTACTS
+from ugv_acceptance.evaluation.settings import CONTACTS, PAYLOAD_LINK
 from ugv_acceptance.model.stability import SIDES, STANDING
 
 SETTINGS = load().settings
@@ -222,9 +222,9 @@ def test_numbers_beside_an_alert_of_no_data_are_not_remembered() -> None:
 
 def test_unknown_values_of_the_configuration_are_asked_for() -> None:
     """Margins that are known are told beside what keeps them from being OK: nothing is dead."""
-    head = said(tilted(23.0), unknown=(CONTACTS,))
+    head = said(tilted(23.0), unknown=(PAYLOAD_LINK,))
     assert (head.what, head.action) == ('NOT ALL IS CHECKED', 'COMPLETE THE CONFIGURATION')
-    assert 'the configuration does not know contacts' in head.cause
+    assert 'the configuration does not know payload.link' in head.cause
     assert head.notes[0].startswith('23 deg to tipping: RIGHT')
 
 

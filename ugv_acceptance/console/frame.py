@@ -23,7 +23,7 @@ from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.margin_words import share_words, tenths_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.solids import moving_bodies, solids_of
 from ugv_acceptance.model.stability import SIDES, STATES
 from ugv_acceptance.model.tree import tree_of
@@ -100,7 +100,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'q': numbers(snapshot.q),
         'posture': _posture(snapshot, figure),
         'attitude': _attitude(snapshot),
-        'tilt': _tilt(snapshot, settings, dead=view.dead),
+        'tilt': _tilt(snapshot, settings, dead=view.dead or not settings.judges_tilt),
         'state': STATES[snapshot.state],
         'ground': {
             'words': snapshot.ground,
@@ -119,7 +119,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
 
 def number(value: float) -> float | None:
     """Return a number rounded to six decimals; None where it is not finite."""
-    return round(float(value), 6) if math.isfinite(value) else None
+    return round(value, 6) if math.isfinite(value) else None
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:
@@ -211,14 +211,20 @@ def _drawn(figure: Figure, q: tuple[float, ...], payload: Payload) -> tuple[Skel
             }
             for limb in skeleton.limbs
         ],
-        'body': [_point(corner) for corner in skeleton.body],
-        'contacts': [_point(contact) for contact in skeleton.contacts],
-        'polygon': [_point(corner) for corner in skeleton.polygon],
+        'body': _points(skeleton.body),
+        'contacts': _points(skeleton.contacts),
+        'polygon': _points(skeleton.polygon),
         'cog': _point(skeleton.cog),
         'load': None if skeleton.load is None else _point(skeleton.load),
         # Rotation by rows, then origin.
         'places': [[*chain(*map(_point, turn)), *_point(at)] for turn, at in skeleton.places],
     }
+
+
+# The base and what it stands on keep their places while the arm moves.
+@lru_cache(maxsize=16)
+def _points(found: tuple[Vector, ...]) -> list[list[float]]:
+    return [_point(p) for p in found]
 
 
 def _point(p: Sequence[float]) -> list[float]:

@@ -100,14 +100,16 @@ def view_of(snapshot: Snapshot, settings: Settings) -> View:
     groups = groups_of(snapshot.alerts)
     active = tuple(group for group in groups if group.active)
     worst = max([group.first.level for group in active], default=OK)
-    tipped = snapshot.known and has_tipped(snapshot.angle)
+    # Nobody measures how a robot without an IMU leans.
+    judged = snapshot.known and settings.judges_tilt
+    tipped = judged and has_tipped(snapshot.angle)
     level = max(snapshot.level, ERROR if tipped else OK, worst if worst >= ERROR else OK)
     level = level if snapshot.known else STALE
     asked = bool(settings.unknown) and snapshot.known and ERROR not in {level, worst}
     unanswered = asked and worst != STALE
     dead = level == STALE and not unanswered
     doubted = any(_contradicts(group.first) for group in active)
-    least = least_tilt(snapshot.angle)
+    least = least_tilt(snapshot.angle) if settings.judges_tilt else ('', math.nan)
     return View(
         snapshot,
         settings,
