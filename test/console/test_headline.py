@@ -12,10 +12,10 @@ from ugv_acceptance.config import load
 from ugv_acceptance.console.headline import Headline, headline_of, view_of
 from ugv_acceptance.console.headline_words import order_of, what_of
 from ugv_acceptance.console.snapshot import AlertRow, LastKnown, Memory, Snapshot
-from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, TIPPED
 from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
-from ugv_acceptance.evaluation.settings import CONTACTS
+from ugv_acceptance.evaluation.settings import CONTACTS, PAYLOAD_LINK
 from ugv_acceptance.model.stability import SIDES, STANDING
 
 SETTINGS = load().settings
@@ -73,6 +73,9 @@ def test_before_the_edge_and_past_it(degrees: float, what: str, number: str) -> 
     assert head.action == 'LOWER THE ELBOW'
     assert head.detail == 'by 16 deg: 11 deg further from tipping to the right, in 0.5 s'
     assert head.cause == 'TIP_OVER it is'
+    # The number stands above, and is not said again.
+    assert head.notes == ('shoulder 43 %',)
+    assert head.margins.endswith('tipping: RIGHT, shoulder 43 %')
 
 
 @pytest.mark.parametrize(
@@ -89,6 +92,7 @@ def test_a_joint_is_named_with_its_share(newton_metres: float, what: str, number
     torque = (0.0, -newton_metres, 5.0, 0.1)
     head = said(tilted(40.0, level=ERROR, alerts=(alert,), torque=torque))
     assert (head.what, head.number) == (what, number)
+    assert head.notes == ('40 deg to tipping: RIGHT',)
 
 
 @pytest.mark.parametrize(
@@ -219,9 +223,9 @@ def test_numbers_beside_an_alert_of_no_data_are_not_remembered() -> None:
 
 def test_unknown_values_of_the_configuration_are_asked_for() -> None:
     """Margins that are known are told beside what keeps them from being OK: nothing is dead."""
-    head = said(tilted(23.0), unknown=(CONTACTS,))
+    head = said(tilted(23.0), unknown=(PAYLOAD_LINK,))
     assert (head.what, head.action) == ('NOT ALL IS CHECKED', 'COMPLETE THE CONFIGURATION')
-    assert 'the configuration does not know contacts' in head.cause
+    assert 'the configuration does not know payload.link' in head.cause
     assert head.notes[0].startswith('23 deg to tipping: RIGHT')
 
 
@@ -240,19 +244,20 @@ def test_after_a_fall_nobody_moves_anything() -> None:
     head = said(tilted(-35.0, level=ERROR, alerts=rows))
     assert (head.what, head.number, head.action) == ('IT HAS TIPPED RIGHT', '', 'STAND CLEAR')
     assert head.detail == 'do not move the arm; switch it off before anyone comes near'
-    assert (head.more, 'elbow' in words_of(head)) == (1, False)
+    assert (head.more, head.margins, 'elbow' in words_of(head)) == (1, '', False)
 
 
-def test_it_has_tipped_from_10_deg_past() -> None:
-    """A robot that sways a few degrees past its edge is still told how to come back."""
-    assert said(tilted(-10.1)).action == 'STAND CLEAR'
-    tip = row('TIP_OVER', 'right', advice=BRING, peak=math.radians(9.9))
-    assert said(tilted(-9.9, level=ERROR, alerts=(tip,))).action == 'LOWER THE ELBOW'
+def test_a_robot_that_sways_is_told_how_to_come_back() -> None:
+    """Up to where no robot comes back, past its edge, the advice is that for its margin."""
+    far = math.degrees(TIPPED)
+    assert said(tilted(-far - 0.1)).action == 'STAND CLEAR'
+    tip = row('TIP_OVER', 'right', advice=BRING, peak=TIPPED - 0.01)
+    assert said(tilted(0.1 - far, level=ERROR, alerts=(tip,))).action == 'LOWER THE ELBOW'
 
 
 def test_a_fall_is_a_danger_before_its_alert() -> None:
     """The word beside IT HAS TIPPED is never OK."""
-    assert view_of(tilted(-20.0), SETTINGS).level == ERROR
+    assert view_of(tilted(-25.0), SETTINGS).level == ERROR
 
 
 @pytest.mark.parametrize('end', [None, NOW - 1])
@@ -313,6 +318,14 @@ def test_on_stairs_no_number_says_that_all_is_well() -> None:
     assert (head.what, head.number) == ('NOT BEGUN TO TIP', '<= 23 deg')
     assert 'not known on this ground' in head.cause
     assert head.notes[0].startswith('at most 23 deg to tipping: RIGHT (upper bound, 5.7 deg taken')
+
+
+def test_on_stairs_a_bound_is_said_in_full() -> None:
+    """That a number is a bound, and what it is cautiously, stands beside its alert too."""
+    tip = row('TIP_OVER', 'right')
+    head = said(tilted(3.0, level=ERROR, alerts=(tip,), rough=True, cautious=0.02))
+    assert head.number == '<= 3 deg'
+    assert head.notes[0].startswith('at most 3 deg to tipping: RIGHT (upper bound, 1.1 deg taken')
 
 
 any_float = st.floats()

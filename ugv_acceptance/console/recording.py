@@ -121,9 +121,9 @@ class ShownRecording:
             return replace(told, **self._ground(k, when, payload, known=False))
         if has_tipped(track.angle[k]):
             alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
-            told = replace(told, alerts=alerts)
         return replace(
             told,
+            alerts=alerts,
             level=max([*active, OK]),
             known=True,
             gravity=_numbers(track.gravity[k]),

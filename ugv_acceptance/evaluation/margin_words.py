@@ -11,15 +11,13 @@ _FINE = 10.0
 # Half a unit in the last place of what a float makes of a decimal number.
 _SLACK = 1e-9
 # Decimals at most that tell a value from its limit.
-_DECIMALS = 4
-# What is not smaller (degrees, percent) is none that anybody measured.
-_MOST = 1e12
+_MOST = 4
 
 
 def degrees_words(angle: float) -> str:
     """Return an angle (rad) of tilt left, cut towards less: "6 deg", "5.9 deg"; '-': not known."""
     degrees = math.degrees(angle)
-    if not abs(degrees) < _MOST:
+    if not math.isfinite(degrees):
         return '-'
     if abs(degrees) >= _FINE:
         return f'{math.floor(degrees + _SLACK)} deg'
@@ -33,8 +31,8 @@ def excess_words(angle: float) -> str:
 
 def tenths_words(angle: float) -> str:
     """Return an angle (rad) in degrees for a box, cut: "6.0", "22.9"; '-': not known."""
-    degrees = math.degrees(angle)
-    return f'{math.floor(10.0 * degrees + _SLACK) / 10.0:.1f}' if abs(degrees) < _MOST else '-'
+    tenths = 10.0 * math.degrees(angle)
+    return f'{math.floor(tenths + _SLACK) / 10.0:.1f}' if math.isfinite(tenths) else '-'
 
 
 def tipping_words(side: str, angle: float) -> str:
@@ -46,8 +44,9 @@ def tipping_words(side: str, angle: float) -> str:
 
 def share_words(share: float, digits: int = 0) -> str:
     """Return a share of a limit in percent, cut: only 1 or more reads "100 %"; '-': not known."""
-    percent = 100.0 * share
-    return f'{_cut(percent, digits):.{digits}f} %' if abs(percent) < _MOST else '-'
+    if not math.isfinite(1e3 * share):
+        return '-'
+    return f'{_cut(100.0 * share, digits):.{digits}f} %'
 
 
 def percent_words(share: float) -> str:
@@ -57,7 +56,7 @@ def percent_words(share: float) -> str:
 
 def number_beside(value: float, limit: float, digits: int = 1) -> str:
     """Return a value, cut, with as many decimals more than `digits` as tell it from its limit."""
-    for more in range(digits, max(digits, _DECIMALS) + 1):
+    for more in range(digits, max(digits, _MOST) + 1):
         found = _cut(value, more)
         if (found > limit) == (value > limit) and (found < limit) == (value < limit):
             return f'{found:.{more}f}'
@@ -67,7 +66,7 @@ def number_beside(value: float, limit: float, digits: int = 1) -> str:
 def value_beside(value: float, limit: float) -> str:
     """Return a value of any size, cut to three digits, or as many as tell it from its limit."""
     size = abs(value) if math.isfinite(value) and value else 1.0
-    digits = min(max(0, 2 - math.floor(math.log10(size))), _DECIMALS)
+    digits = min(max(0, 2 - math.floor(math.log10(size))), _MOST)
     text = number_beside(value, limit, digits)
     return text.rstrip('0').rstrip('.') if '.' in text else text
 

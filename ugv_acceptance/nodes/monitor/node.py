@@ -32,11 +32,11 @@ from ugv_acceptance.monitoring.diagnostics import (
     unavailable,
     verdict_of,
 )
-from ugv_acceptance.monitoring.guarding import guarded
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
+from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
 from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,

@@ -1,4 +1,4 @@
-"""Keeps a monitor watching when work of its own timers fails."""
+"""Keeps a fault of our own code in a timer from ending the monitor."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
