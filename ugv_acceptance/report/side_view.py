@@ -150,7 +150,7 @@ def _scene(at: Standing, settings: Settings) -> _Scene:
 def _point(robot: Robot, places: Sequence[Place], link: str, xyz: Vector) -> Vector:
     body, at = in_body(tree_of(robot), link, xyz)
     (rotation, origin), point = places[body], np.array(plain(at))
-    return plain(np.array(rotation) @ point + np.array(origin))
+    return plain((np.array(rotation) @ point + np.array(origin)).tolist())
 
 
 def _bones(robot: Robot, places: Sequence[Place], drawn: set[str]) -> Iterable[_Shape]:
@@ -208,7 +208,9 @@ def _plumb(scene: _Scene, gravity: Vector) -> Vector:
     a, b, c = (np.array(p) for p in scene.feet[:3])
     normal, cog, down = np.cross(b - a, c - a), np.array(scene.cog), np.array(gravity)
     across = float(normal @ down)
-    return plain(cog + down * float(normal @ (a - cog)) / across) if across < 0.0 else scene.cog
+    if not across < 0.0:
+        return scene.cog
+    return plain((cog + down * float(normal @ (a - cog)) / across).tolist())
 
 
 def _section(feet: Sequence[Vector], at: Vector, view: _View) -> tuple[Vector, Vector]:
@@ -256,7 +258,7 @@ def _ground(far: Sequence[Flat], *, fallen: bool) -> Iterable[str]:
         below = f'{x1:.1f},{y1 + 9e4:.1f} {x0:.1f},{y0 + 9e4:.1f}'
         yield f'<polygon points="{x0:.1f},{y0:.1f} {x1:.1f},{y1:.1f} {below}" fill="#efe8dd"/>'
     dash = ' stroke-dasharray="8 6"' if fallen else ''
-    yield _line(*far, '#6b4a1f', 2.5, dash)
+    yield _line((x0, y0), (x1, y1), '#6b4a1f', 2.5, dash)
 
 
 def _shape(page: _Page, shape: _Shape) -> str:
