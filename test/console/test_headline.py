@@ -75,6 +75,7 @@ def test_before_the_edge_and_past_it(degrees: float, what: str, number: str) -> 
     assert head.cause == 'TIP_OVER it is'
     # The number stands above, and is not said again.
     assert head.notes == ('shoulder 43 %',)
+    assert head.margins.endswith('tipping: RIGHT, shoulder 43 %')
 
 
 @pytest.mark.parametrize(
@@ -243,7 +244,7 @@ def test_after_a_fall_nobody_moves_anything() -> None:
     head = said(tilted(-35.0, level=ERROR, alerts=rows))
     assert (head.what, head.number, head.action) == ('IT HAS TIPPED RIGHT', '', 'STAND CLEAR')
     assert head.detail == 'do not move the arm; switch it off before anyone comes near'
-    assert (head.more, 'elbow' in words_of(head)) == (1, False)
+    assert (head.more, head.margins, 'elbow' in words_of(head)) == (1, '', False)
 
 
 def test_a_robot_that_sways_is_told_how_to_come_back() -> None:
@@ -317,6 +318,14 @@ def test_on_stairs_no_number_says_that_all_is_well() -> None:
     assert (head.what, head.number) == ('NOT BEGUN TO TIP', '<= 23 deg')
     assert 'not known on this ground' in head.cause
     assert head.notes[0].startswith('at most 23 deg to tipping: RIGHT (upper bound, 5.7 deg taken')
+
+
+def test_on_stairs_a_bound_is_said_in_full() -> None:
+    """That a number is a bound, and what it is cautiously, stands beside its alert too."""
+    tip = row('TIP_OVER', 'right')
+    head = said(tilted(3.0, level=ERROR, alerts=(tip,), rough=True, cautious=0.02))
+    assert head.number == '<= 3 deg'
+    assert head.notes[0].startswith('at most 3 deg to tipping: RIGHT (upper bound, 1.1 deg taken')
 
 
 any_float = st.floats()

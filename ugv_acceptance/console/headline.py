@@ -44,7 +44,9 @@ class Headline:
     """What the header shows: `what` is wrong and its `number`, the `action` and its `detail`.
 
     `what` and `action` are short and in capitals. `cause` says in one sentence where it comes from;
-    `notes` are lines of less weight, the margins first; `more` the number of further active causes.
+    `notes` are lines of less weight, first the margins that are not said above; `more` the number
+    of further active causes. `margins` are the least tilt left and the joint most used, ''
+    where nothing is known or the robot has tipped.
     """
 
     what: str
@@ -54,6 +56,7 @@ class Headline:
     cause: str = ''
     notes: tuple[str, ...] = ()
     more: int = 0
+    margins: str = ''
 
     def plain(self) -> dict[str, Any]:
         """Return it as a part of the frame."""
@@ -65,7 +68,36 @@ class Headline:
             'cause': self.cause,
             'notes': list(self.notes),
             'more': self.more,
+            'margins': self.margins,
         }
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """The least `tilt` left in words, to which `side`; the `joint` most used, and its share."""
+
+    tilt: str
+    side: str
+    joint: str
+    share: float
+
+    @property
+    def used(self) -> str:
+        """The joint most used in words; '' if none has a limit."""
+        return f'{name_words(self.joint)} {share_words(self.share)}' if self.joint else ''
+
+    @property
+    def words(self) -> str:
+        """Both margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %"."""
+        used = self.used
+        return f'{self.tilt}, {used}' if used else self.tilt
+
+    def beside(self, told: str) -> tuple[str, ...]:
+        """Return the margins in words, without that of a side or a joint that was `told`."""
+        if not told or told not in {self.side, self.joint}:
+            return (self.words,)
+        rest = self.tilt if told == self.joint else self.used
+        return (rest,) if rest else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +182,12 @@ def headline_of(view: View) -> Headline:
         return _fallen(view, view.fallen)
     if view.dead:
         return _no_data(view)
+    margins = _margins(view)
     if view.active:
-        return _alert(view)
+        return _alert(view, margins)
     if view.level != OK:
-        return _waiting(view)
-    return _kept(view)
+        return _waiting(view, margins)
+    return _kept(view, margins)
 
 
 def _fallen(view: View, side: str) -> Headline:
@@ -187,11 +220,11 @@ def _why(view: View) -> str:
     return ': '.join(words for words in (blind[0].text, blind[0].advice) if words)
 
 
-def _alert(view: View) -> Headline:
-    row = view.active[0].first
-    what, number = what_of(row, view.snapshot, view.settings)
+def _alert(view: View, margins: Margins) -> Headline:
+    row, snapshot = view.active[0].first, view.snapshot
+    what, number = what_of(row, snapshot, view.settings)
     action, detail = order_of(row.advice)
-    notes = _notes(view, told=row.subject if number else '')
+    notes = (*margins.beside(row.subject if number else ''), *snapshot.hints)
     if for_integrator(row) and row.level < ERROR:
         action, detail = TELL, row.advice
     elif for_integrator(row):
@@ -201,50 +234,42 @@ def _alert(view: View) -> Headline:
         action, detail = STAND_CLEAR, LOOK.format(side=view.fallen.upper())
     if view.open:
         notes = (*notes, unknown_words(view.settings))
-    return Headline(what, number, action, detail, row.text, notes, len(view.active) - 1)
+    more = len(view.active) - 1
+    return Headline(what, number, action, detail, row.text, notes, more, margins.words)
 
 
-def _waiting(view: View) -> Headline:
+def _waiting(view: View, margins: Margins) -> Headline:
     """Return the headline where nothing is wrong now, but a person has to act before it is OK."""
-    notes = _notes(view)
+    what, action, detail, cause = 'NOT ALL IS WELL', '', '', UNTOLD
     if view.open:
-        words = unknown_words(view.settings)
-        return Headline('NOT ALL IS CHECKED', '', COMPLETE, ANSWER, words, notes)
-    if not view.groups:
-        return Headline('NOT ALL IS WELL', cause=UNTOLD, notes=notes)
-    row = view.groups[0].first
-    cause = f'{row.state}: {row.text}'
-    if 'reset' in row.offers:
-        detail = 'when the robot stands well again'
-        return Headline('OVER, NOT RESET', '', 'RESET IT', detail, cause, notes)
-    return Headline('OVER, NOT ACKNOWLEDGED', '', 'ACKNOWLEDGE IT', '', cause, notes)
+        what, action, detail = 'NOT ALL IS CHECKED', COMPLETE, ANSWER
+        cause = unknown_words(view.settings)
+    elif view.groups:
+        row = view.groups[0].first
+        what, action, cause = 'OVER, NOT ACKNOWLEDGED', 'ACKNOWLEDGE IT', f'{row.state}: {row.text}'
+        if 'reset' in row.offers:
+            what, action, detail = 'OVER, NOT RESET', 'RESET IT', 'when the robot stands well again'
+    notes = (margins.words, *view.snapshot.hints)
+    return Headline(what, '', action, detail, cause, notes, margins=margins.words)
 
 
-def _kept(view: View) -> Headline:
+def _kept(view: View, margins: Margins) -> Headline:
     """Return the headline where nothing is wrong: what is kept, and the least margin."""
     snapshot, settings, (side, angle) = view.snapshot, view.settings, view.least
     kept = kept_words(settings, rough=snapshot.rough)
-    words = degrees_words(angle) if side else share_words(_most(snapshot.torque, settings)[1])
+    words = degrees_words(angle) if side else share_words(margins.share)
     number = '' if words == '-' else words
     what, _, rest = kept.upper().partition(', ')
-    notes = _notes(view)
+    cause = kept if rest else ''
     if snapshot.rough and settings.judges_tilt:
-        return Headline('NOT BEGUN TO TIP', number and f'<= {number}', cause=kept, notes=notes)
-    return Headline(what, number, cause=kept if rest else '', notes=notes)
+        what, number, cause = 'NOT BEGUN TO TIP', number and f'<= {number}', kept
+    notes = (margins.words, *snapshot.hints)
+    return Headline(what, number, cause=cause, notes=notes, margins=margins.words)
 
 
-def _notes(view: View, told: str = '') -> tuple[str, ...]:
-    words = margins_words(view, told)
-    return (words, *view.snapshot.hints) if words else view.snapshot.hints
-
-
-def margins_words(view: View, told: str = '') -> str:
-    """Return the smallest margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %".
-
-    Without that of a side or joint that was `told` already.
-    """
+def _margins(view: View) -> Margins:
     snapshot, settings, (side, angle) = view.snapshot, view.settings, view.least
-    joint, share = _most(snapshot.torque, settings)
+    careful = snapshot.rough or snapshot.carried
     if side:
         tilt = _bound_words(side, angle, snapshot.cautious, rough=snapshot.rough)
         tilt += f' ({CARRIED})' * (snapshot.carried and not snapshot.rough)
@@ -252,11 +277,8 @@ def margins_words(view: View, told: str = '') -> str:
         tilt = tilt_not_checked(settings)
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
-    used = _joint_words(joint, share)
-    # Nobody reads the same number three times.
-    if told and told in {side, joint}:
-        return tilt if told == joint else used
-    return f'{tilt}, {used}' if used else tilt
+    # What is no plain number is said in full, also where its number stands above.
+    return Margins(tilt, '' if careful else side, *_most(snapshot.torque, settings))
 
 
 def _bound_words(side: str, angle: float, cautious: float = math.nan, *, rough: bool) -> str:
@@ -272,10 +294,6 @@ def _most(torque: Sequence[float], settings: Settings) -> tuple[str, float]:
     return most_used(torque, settings) if torque else ('', math.nan)
 
 
-def _joint_words(joint: str, share: float) -> str:
-    return f'{name_words(joint)} {share_words(share)}' if joint else ''
-
-
 def _last_words(view: View) -> str:
     """Return what was known last, and how long ago."""
     snapshot, last = view.snapshot, view.snapshot.last
@@ -284,5 +302,5 @@ def _last_words(view: View) -> str:
     side, angle = least_tilt(last.angle)
     tilt = _bound_words(side, angle, rough=last.rough) if side else 'no tilt margin'
     ago = max(snapshot.time - last.time, 0) / 1e9
-    used = _joint_words(*_most(last.torque, view.settings))
-    return f'last known {ago:.1f} s ago: {tilt}, {used}'.removesuffix(', ')
+    words = Margins(tilt, side, *_most(last.torque, view.settings)).words
+    return f'last known {ago:.1f} s ago: {words}'

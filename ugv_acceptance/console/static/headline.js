@@ -70,7 +70,7 @@ export function lost({ frame, known, knownAt }, age) {
       what: order.what,
       action: order.action,
       detail: order.detail,
-      notes: said ? [`last known ${seconds} s ago: ${said.notes[0] ?? said.what}`] : [],
+      notes: said ? [`last known ${seconds} s ago: ${said.margins || said.notes[0] || said.what}`] : [],
       cause: Number.isFinite(age)
         ? `the console server has sent nothing for ${fixed(age / 1000)} s: check that it runs and that the network is there`
         : 'no answer from the console server',
