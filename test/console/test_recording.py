@@ -16,6 +16,7 @@ from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
 from ugv_acceptance.console.recording import RecordingFeed, ShownRecording, shown_recording
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
 from ugv_acceptance.evaluation.live import LiveEvaluator
 
@@ -58,6 +59,19 @@ def test_frames_are_those_of_the_live_evaluator(fail: ShownRecording) -> None:
         assert shown.q == live.margins.q
         assert shown.payload == live.payload
     assert compared > 500
+
+
+def test_after_the_fall_every_alert_says_to_stand_clear(fail: ShownRecording) -> None:
+    """What is active while the robot lies there advises no motion; before that it does."""
+    said: dict[bool, set[str]] = {True: set(), False: set()}
+    for k in range(240, 290):
+        shown = fail.snapshot_at(fail.bag.start_ns + k * 100_000_000)
+        if shown.known:
+            active = {row.advice for row in shown.alerts if row.end is None}
+            said[has_tipped(shown.angle)] |= active
+    assert said[True] == {STAND_CLEAR}
+    assert STAND_CLEAR not in said[False]
+    assert any('elbow' in words for words in said[False])
 
 
 def messages(recording: ShownRecording) -> list[tuple[int, str, tuple[Any, ...]]]:

@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.config import load
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.alarms import State
 from ugv_acceptance.evaluation.alerts.messages import ALERTS, suspect_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.monitoring.diagnostics import verdict_of
+from ugv_acceptance.monitoring.diagnostics import alert_status, verdict_of
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.operator_commands import DOINGS, operate, operation_from
 
@@ -79,6 +80,28 @@ def test_advice_comes_without_holding_up_a_message() -> None:
     assert verdict.values['class'] in {'physical / effector', 'human / interaction'}
 
 
+def test_after_a_fall_the_verdict_and_every_alert_say_to_stand_clear() -> None:
+    """No motion of the arm and no load to set down, though both were advised before the fall."""
+    session = session_with()
+    wait_until(lambda: raised(session, 'TIP_OVER'), lambda: give(session, STRETCHED))
+    verdict_of(session)
+    wait_until(session.advisory.arrived, lambda: give(session, STRETCHED))
+    wait_until(
+        lambda: verdict_of(session).values.get('do') == STAND_CLEAR,
+        lambda: give(session, STRETCHED, 1.2),
+    )
+    give(session, STRETCHED, 1.2)
+    verdict, statuses = verdict_of(session), session.alarm_tracker.take()
+    said = [value for key, value in verdict.values.items() if key.startswith('advice_')]
+    assert (said, verdict.message.endswith(STAND_CLEAR)) == ([STAND_CLEAR], True)
+    assert len(statuses) > 1
+    assert {alert_status(c, session).values['do'] for c in statuses} == {STAND_CLEAR}
+    wait_until(
+        lambda: verdict_of(session).values.get('do', '') != STAND_CLEAR,
+        lambda: give(session, STRETCHED),
+    )
+
+
 def test_the_verdict_tells_the_margin_of_now() -> None:
     """A robot that was worse a moment ago is told the same as one that was not."""
     said = []
@@ -95,7 +118,7 @@ def test_the_verdict_tells_the_margin_of_now() -> None:
 def _tells(session: Session, q: tuple[float, ...]) -> bool:
     margins = session.evaluator.margins
     there = margins is not None and margins.q == q
-    return there and 'past its tipping point' in verdict_of(session).message
+    return there and 'past tipping: FRONT; DANGER' in verdict_of(session).message
 
 
 # Postures that load shoulder and elbow differently.
@@ -125,7 +148,7 @@ def test_a_robot_that_slides_before_it_tips_is_told() -> None:
     assert [a.rule.subject for a in raised(session, 'SLIDE')] == ['robot']
     assert not raised(session, 'TIP_OVER')
     said = verdict_of(session).message
-    assert 'the tracks will slide before the robot tips: 1.7 degrees of slope left' in said
+    assert 'the tracks will slide before the robot tips: 1.6 deg of slope left' in said
     assert 'drive straight up or down the slope to where it is less steep' in said
 
 
@@ -212,7 +235,7 @@ def test_a_tilt_that_grows_fast_is_urgent() -> None:
     wait_until(lambda: session.advisory.urgent(session.clock.now()), lean)
     verdict = verdict_of(session)
     assert verdict.values['tip_of'] == 'front'
-    assert 'the robot tips to the front in' in verdict.message
+    assert 'tips FRONT in' in verdict.message
 
 
 def message(name: str, /, **values: str) -> DiagnosticStatus:

@@ -26,6 +26,7 @@ from ugv_acceptance.config.untold import untold_of
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame, without_prefix
+from ugv_acceptance.evaluation.margin_words import percent_words
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, JointInput, Limits, Settings
 from ugv_acceptance.model.clearance import arm_links
@@ -111,13 +112,13 @@ def _check_ranges(build: Build, settings: Settings) -> None:
     if error > 1.0:
         build.warn(
             ('limits', 'torque_error'),
-            f'a joint counts as within its limit up to {error:.0%} of it',
+            f'a joint counts as within its limit up to {percent_words(error)} of it',
         )
     if tip <= 0.0:
         build.warn(
             ('limits', 'tip_error'),
             'a robot counts as standing until it is '
-            + (f'{-tip:g} degrees past its tipping point' if tip else 'past its tipping point'),
+            + (f'{-tip:g} deg past tipping' if tip else 'past tipping'),
         )
 
 

@@ -17,6 +17,7 @@ from ugv_acceptance.console.frame import number
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.recording_track import Track, TrackMaker, rate_at
 from ugv_acceptance.console.snapshot import NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import describe, level_words
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.ground import FLAT, KINDS, ground_words
@@ -106,6 +107,8 @@ class ShownRecording:
             return Snapshot(when, STALE, 'nothing was received yet', payload=payload)
         track = self.track
         known = bool(track.known[k]) and not any(self._silent(w, when) for w in range(2))
+        if known and has_tipped(track.angle[k]):
+            alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
         nothing = Snapshot(when)
         return Snapshot(
             when,

@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.effort.facts import JointMeaning
@@ -113,9 +114,20 @@ class Advisory:
         joints = () if self.efforts is None else self.efforts.joints
         return [joint for joint in joints if joint.opposed]
 
+    @property
+    def tipped(self) -> bool:
+        """Whether the robot has tipped over, by its newest margins."""
+        margins = self.evaluator.margins
+        return margins is not None and has_tipped(margins.stability.angle)  # type: ignore[arg-type]
+
     def do(self, alert: Alert) -> str:
-        """Return what to do about an alert: the computed advice for its margin, else general."""
+        """Return what to do about an alert: the computed advice for its margin, else general.
+
+        To stand clear is all that is said, about any alert, once the robot has tipped.
+        """
         rule = alert.rule
+        if self.tipped:
+            return STAND_CLEAR
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
         return advice(rule.code, self.evaluator.settings.robot)
@@ -153,8 +165,9 @@ class Advisory:
             values['slide_left_deg'] = round(math.degrees(left), 2)
         if self.estimate is not None:
             values['payload_estimate_kg'] = round(max(self.estimate.mass, 0.0), 2)
-        for k, found in enumerate(self.advice[:3]):
-            values[f'advice_{k + 1}'] = found.sentence
+        # What was computed before a fall may arrive after it.
+        told = [STAND_CLEAR] if self.tipped else [found.sentence for found in self.advice[:3]]
+        values |= {f'advice_{k + 1}': sentence for k, sentence in enumerate(told)}
         return values
 
     def slide(self) -> float:

@@ -28,6 +28,7 @@ from ugv_acceptance.console import latest_messages as hearing
 from ugv_acceptance.console.alert_list import AlertBook, row_of
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.snapshot import NO_LOAD, NO_PAYLOAD, AlertRow, InputRow, Snapshot
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.messages import advice
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, Alert
 from ugv_acceptance.evaluation.inputs.payload import payload_from
@@ -265,6 +266,7 @@ class ConsoleNode(Node):
             return row
         about = (self.said.get('code'), self.said.get('subject')) == (row.code, row.subject)
         advice = self.said.get('do', row.advice) if about else row.advice
+        advice = STAND_CLEAR if self.session.advisory.tipped else advice
         return replace(row, text=self._own.get(row.key, row).text, advice=advice)
 
     def _input(self, name: str, active: list[Alert]) -> InputRow:

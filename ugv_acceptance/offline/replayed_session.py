@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, advise
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.evaluation.effort.understanding import understand
@@ -61,6 +62,8 @@ class PastAdvisory(Advisory):
     def do(self, alert: Alert) -> str:
         """Return the advice for an alert now, else that of the moment when it was raised."""
         rule = alert.rule
+        if self.tipped:
+            return STAND_CLEAR
         if rule.code in COMPUTED and self.advice and self.advice[0].margin == rule.subject:
             return self.advice[0].sentence
         return self.told[moment_of(alert)]

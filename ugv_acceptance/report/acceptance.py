@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
+from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.report.error_rate import error_rate_line
 from ugv_acceptance.report.format import (
@@ -91,6 +92,7 @@ def acceptance_page(
         interval=interval_text,
         range=range_text,
         missing=missing_text,
+        share=lambda share: share_words(share, 1),
     )
     return environment.get_template('acceptance.html').render(
         result=result,
@@ -123,9 +125,9 @@ def _entered(result: Json, key: str) -> str | None:
 def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = run_chart(strips, result, settings)
     caption = (
-        'The whole run; each point is the worst value of a short interval. Solid line: limit; '
-        'dotted line: warning limit; dotted grey: no input. Bars are alerts: plain CAUTION, '
-        'hatched DANGER, dotted NO DATA.'
+        'The whole run; each point is the worst value of a short interval. Solid line: '
+        'DANGER begins; dotted line: CAUTION begins; dotted grey: no input. Bars are alerts: plain '
+        'CAUTION, hatched DANGER, dotted NO DATA; a triangle is when the worst value came.'
     )
     return Picture(svg_of(made, 'run'), caption) if made else None
 
@@ -158,7 +160,7 @@ def _spans(result: Json) -> list[tuple[str, float, float]]:
             continue
         end = duration if alert['end_s'] is None else alert['end_s']
         start, end = max(0.0, alert['start_s'] - AROUND), min(duration, end + AROUND)
-        title = f'{alert["start_s"]:.2f} s: {alert["message"]}'
+        title = f'{alert["start_s"]:.2f} s: {level_words(alert["level"])}, {alert["message"]}'
         if spans and start < spans[-1][2]:
             before = spans[-1]
             spans[-1] = (f'{before[0]}; {title}', before[1], max(before[2], end))

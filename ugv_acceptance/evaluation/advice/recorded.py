@@ -1,13 +1,15 @@
 """Advice for each alert of a recording, for the moment it was raised.
 
 Posture and gravity are kept for each alert while the recording is read; the search itself, which
-takes milliseconds, runs at the end for at most MOST alerts.
+takes milliseconds, runs at the end for at most MOST alerts. An alert raised before a fall keeps the
+advice of its moment; one raised after it, of whatever kind, only says to stand clear.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, advise_each
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
@@ -20,11 +22,15 @@ MOST = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Moment:
-    """Joint positions (j,), gravity (3,) m/s2 in `base_link`, receipt time of the joints (ns)."""
+    """Joint positions (j,), gravity (3,) m/s2 in `base_link`, receipt time of the joints (ns).
+
+    `tipped` says whether the robot had tipped over by then.
+    """
 
     q: Floats
     gravity: Floats
     heard: int
+    tipped: bool
 
 
 @dataclass(slots=True)
@@ -38,6 +44,7 @@ class AlertAdvice:
     log: list[Alert]
     payload_at: Callable[[int], Payload]
     _cases: list[tuple[Alert, _Moment]] = field(default_factory=list)
+    _fallen: list[Alert] = field(default_factory=list)
     _seen: int = 0
     _last: _Moment | None = None
 
@@ -45,14 +52,19 @@ class AlertAdvice:
         """Take the margins of the next part of the recording; its alerts must be in `log`."""
         for alert in self._fresh():
             k = int(rows.time.searchsorted(alert.start, side='right')) - 1
-            moment = _moment(rows, k) if k >= 0 else self._last
-            if moment is not None:
-                self._cases.append((alert, moment))
+            self._take(alert, _moment(rows, k) if k >= 0 else self._last)
         if len(rows.time):
             self._last = _moment(rows, len(rows.time) - 1)
 
+    def _take(self, alert: Alert, moment: _Moment | None) -> None:
+        """Keep an alert with the moment it was raised, if its advice depends on that."""
+        if moment is not None and moment.tipped:
+            self._fallen.append(alert)
+        elif moment is not None and alert.rule.code in COMPUTED:
+            self._cases.append((alert, moment))
+
     def _fresh(self) -> list[Alert]:
-        fresh = [alert for alert in self.log[self._seen :] if alert.rule.code in COMPUTED]
+        fresh = self.log[self._seen :]
         self._seen = len(self.log)
         return fresh
 
@@ -61,13 +73,13 @@ class AlertAdvice:
 
         For an alert raised after the last message the posture of that message is used.
         """
-        if self._last is not None:
-            self._cases.extend((alert, self._last) for alert in self._fresh())
+        for alert in self._fresh():
+            self._take(alert, self._last)
         order = sorted(self._cases, key=lambda case: (-case[0].rule.level, case[0].start))
         alike: dict[Payload, list[tuple[Alert, _Moment]]] = {}
         for alert, moment in order[:MOST]:
             alike.setdefault(self.payload_at(moment.heard), []).append((alert, moment))
-        found: dict[int, str] = {}
+        found = {id(alert): STAND_CLEAR for alert in self._fallen}
         for payload, cases in alike.items():
             q, gravity = ([getattr(m, name) for _, m in cases] for name in ('q', 'gravity'))
             of = [alert.rule.subject for alert, _ in cases]
@@ -83,4 +95,5 @@ class AlertAdvice:
 def _moment(rows: MarginRows, k: int) -> _Moment:
     j, i = int(rows.pairs.of_joints[k]), int(rows.pairs.of_imu[k])
     joints = rows.pairs.joints
-    return _Moment(joints.q[j].copy(), rows.pairs.imu.gravity[i].copy(), int(joints.time[j]))
+    q, gravity = joints.q[j].copy(), rows.pairs.imu.gravity[i].copy()
+    return _Moment(q, gravity, int(joints.time[j]), has_tipped(rows.angle[k]))
