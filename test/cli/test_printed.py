@@ -133,8 +133,9 @@ def test_a_worst_value_stands_beside_its_own_time() -> None:
     """Not beside the time at which its alert was raised, seconds earlier."""
     text = ' '.join(ugv('evaluate', FAIL, '-v').stdout.split())
     assert '24.71 s to the end CAUTION TIP_OVER 35 deg past tipping: RIGHT at 28.15 s' in text
-    assert '10.80 to 13.39 s DANGER TORQUE_LIMIT shoulder_joint 110 % of its limit at 12.21 s' in (
-        text
+    assert (
+        '10.80 s to 13.39 s DANGER TORQUE_LIMIT shoulder_joint 110 % of its limit at 12.21 s'
+        in (text)
     )
 
 

@@ -15,11 +15,11 @@ from ugv_acceptance.cli.completion import (
 )
 from ugv_acceptance.cli.options import Overwrite, PayloadMass, RobotFile
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
-from ugv_acceptance.type_aliases import Floats
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
     from ugv_acceptance.report.map_data import Scene
+    from ugv_acceptance.type_aliases import Floats
 
 
 def map(  # noqa: A001 - the verb's name; one parameter an option

@@ -17,7 +17,7 @@ from ugv_acceptance.cli.terminal_output import (
     table_of,
 )
 from ugv_acceptance.evaluation.alerts.messages import level_words
-from ugv_acceptance.evaluation.margin_words import share_words, tipping_words
+from ugv_acceptance.report.alert_lines import worst_words
 from ugv_acceptance.report.format import (
     carrying_lines,
     ground_line,
@@ -25,6 +25,7 @@ from ugv_acceptance.report.format import (
     missing_text,
     not_checked_lines,
     number_text,
+    seconds_text,
     short_name,
 )
 
@@ -39,10 +40,8 @@ _NAME = 24
 _FEW = 100
 # Said of an alert that rests only on a sensor found to be wrong.
 DOUBTFUL = ' (by a sensor that is contradicted: it decides nothing)'
-# A worst value so soon (s) after its alert has no time of its own.
-_LATER = 0.05
 # Where a sentence has said the most of it.
-_CLAUSE = re.compile(r'[:;,] | \(worst')
+_CLAUSE = re.compile(r'(?<!tipping)[:;,] ')
 # Levels of alerts, the least severe first.
 SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
 
@@ -159,7 +158,7 @@ def _print_alerts(result: Result, console: Console) -> None:
         return
     say(console, f'{counted(len(alerts), "alert")}:')
     for alert in alerts:
-        print_alert(alert, result, console)
+        print_alert(alert, console)
     most = max(SEVERITY.index(alert['level']) for alert in alerts)
     worst = {a['code']: a['advice'] for a in alerts if SEVERITY.index(a['level']) == most}
     if any(worst.values()):
@@ -221,31 +220,17 @@ def share_of(fraction: float) -> str:
     return f'{math.floor(1000.0 * fraction + 1e-9) / 10.0:g} %'
 
 
-def print_alert(alert: Result, result: Result, console: Console, *, short: bool = False) -> None:
+def print_alert(alert: Result, console: Console, *, short: bool = False) -> None:
     """Print an alert: when, level, code, and its worst value with its own time.
 
-    `short`: of a sentence that needs several lines only the first clause.
+    `short`: without its limit, and of a sentence that needs several lines the first clause.
     """
-    end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f} s'
-    start = f'{alert["start_s"]:.2f}' if alert['end_s'] is not None else f'{alert["start_s"]:.2f} s'
-    level = level_words(alert['level'])
-    head, text = f'{start} to {end}', _worst_words(alert, result)
+    head = f'{seconds_text(alert["start_s"])} to {seconds_text(alert["end_s"])}'
+    level, text = level_words(alert['level']), worst_words(alert) if short else alert['message']
     if short and len(f'    {head}  {level}  {alert["code"]}  {text}') > console.width:
         text = _CLAUSE.split(text, maxsplit=1)[0]
     text = escape(f'{alert["code"]}  {text}{DOUBTFUL if alert["doubtful"] else ""}')
     say(console, f'{head}  [{COLOURS[level]}]{level}[/]  {text}', 4, 8)
-
-
-def _worst_words(alert: Result, result: Result) -> str:
-    worst, code, subject = alert.get('worst_s'), alert['code'], alert['subject']
-    at = at_time(worst)
-    peak, joint = alert['peak'], result['torque'].get(subject)
-    if code == 'TIP_OVER' and peak is not None:
-        return f'{tipping_words(subject, math.radians(peak))}{at}'
-    if code == 'TORQUE_LIMIT' and peak is not None and joint and joint['limit']:
-        return f'{subject} {share_words(peak / joint["limit"])} of its limit{at}'
-    later = worst is not None and worst - alert['start_s'] >= _LATER
-    return f'{alert["message"]}{f" (worst{at})" if later else ""}'
 
 
 def counted(count: int, one: str, many: str = '') -> str:

@@ -157,7 +157,8 @@ def _least(result: Result, told: Sequence[Result]) -> list[str]:
 def _data_line(result: Result) -> str:
     coverage = result['coverage']
     part = f' ({share_of(coverage["fraction"])})' if coverage['fraction'] < _WHOLE else ''
-    return f'{coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s evaluated{part}'
+    text = f'{coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s evaluated{part}'
+    return text if result['alerts'] else f'{text}; no alerts'
 
 
 def _given_line(result: Result) -> str:
@@ -193,7 +194,6 @@ def _print_worst_alerts(result: Result, worst: Sequence[Result], console: Consol
     """Print how many alerts there were, and the worst, a line each."""
     alerts = result['alerts']
     if not alerts:
-        say(console, 'no alerts', 2)
         return
     level = level_words(worst[0]['level'])
     count = sum(alert['level'] == worst[0]['level'] for alert in alerts)
@@ -201,7 +201,7 @@ def _print_worst_alerts(result: Result, worst: Sequence[Result], console: Consol
     text = f'{counted(len(alerts), "alert")}, {of_them}[{COLOURS[level]}]{level}[/]'
     say(console, f'{text}; the worst:' if len(worst) < len(alerts) else f'{text}:', 2)
     for alert in worst:
-        print_alert(alert, result, console, short=True)
+        print_alert(alert, console, short=True)
 
 
 def _worst_of(alerts: Sequence[Result]) -> list[Result]:

@@ -49,7 +49,6 @@ def speed(
     import math
 
     import numpy as np
-    from rich.markup import escape
 
     from ugv_acceptance import BadConfig
     from ugv_acceptance.cli.robot_description import (
@@ -57,9 +56,7 @@ def speed(
         payload_from,
         warn,
     )
-    from ugv_acceptance.cli.terminal_output import console_of, say
     from ugv_acceptance.config import load
-    from ugv_acceptance.report.format import short_name
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
@@ -84,9 +81,21 @@ def speed(
         document |= {'speed_m_s': slides} if slides else {}
         typer.echo(json.dumps(document, indent=2))
         return
+    _print(robot, limits, f'{load_carried.mass:g} kg, {_model_words(reference, bound)}')
+
+
+def _model_words(reference: float, bound: float) -> str:
+    return f'error of the static model {reference:g} N m, F < {bound:.4f}'
+
+
+def _print(robot: 'Robot', limits: 'list[float]', given: str) -> None:
+    from rich.markup import escape
+
+    from ugv_acceptance.cli.terminal_output import console_of, say
+    from ugv_acceptance.report.format import short_name
+
     console = console_of()
-    of_model = f'error of the static model {reference:g} N m, F < {bound:.4f}'
-    say(console, escape(f'{robot.name}, {load_carried.mass:g} kg, {of_model}'))
+    say(console, escape(f'{robot.name}, {given}'))
     shown = [short_name(name, _NAME) for name in robot.joint_names]
     wide = max(24, *(len(name) + 1 for name in shown))
     for name, label, limit in zip(robot.joint_names, shown, limits, strict=True):
