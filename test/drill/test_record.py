@@ -10,6 +10,7 @@ from drill.drills import ALL, ONE_FAILED, drill, outcome
 
 from ugv_acceptance import AcceptanceError, __version__
 from ugv_acceptance.bag.atomic_files import write_json
+from ugv_acceptance.drill import situations
 from ugv_acceptance.drill.record import (
     SITUATIONS,
     is_edited,
@@ -36,6 +37,11 @@ def test_a_record_has_the_layout_of_its_schema(word: str, repository: Path) -> N
     assert schema['properties']['situations']['items']['properties']['situation']['enum'] == [
         *SITUATIONS
     ]
+
+
+def test_a_whole_drill_is_all_the_situations_there_are() -> None:
+    """What the record calls a whole drill is what the drill plays, in its order."""
+    assert tuple(situations.SITUATIONS) == SITUATIONS
 
 
 def test_a_drill_without_any_situation_is_no_pass() -> None:
