@@ -1,9 +1,9 @@
 """The monitor's verdict, alert messages and diagnostics as plain values, ready to be published."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
@@ -386,27 +386,3 @@ def _input(
         level = STALE
     text = '; '.join(session.faults.sentence(a, session.settings) for a in mine)
     return Status(level, f'Input {name}', text or f'{rate:.1f} Hz', values)
-
-
-class Watcher(Protocol):
-    """What `guarded` needs of a monitor node."""
-
-    session: Session | None
-
-    def get_logger(self) -> Any:  # noqa: ANN401 - rclpy's logger
-        """Return the node's logger."""
-
-
-def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
-    """Wrap a timer's work so that an exception in it is reported and the monitor goes on."""
-
-    def run() -> None:
-        try:
-            work()
-        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
-            text = f'{work.__name__}: fault of the monitor: {error!r}'
-            watcher.get_logger().error(text, throttle_duration_sec=5.0)
-            if watcher.session is not None:
-                watcher.session.fail(work.__name__, error)
-
-    return run
