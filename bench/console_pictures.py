@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'test'))
 
 from console.browser import Page, chromium  # noqa: E402 - the tests' helpers
-from console.servers import Live, live_console  # noqa: E402 - the same
+from console.servers import Live, calm, live_console  # noqa: E402 - the same
 
 OUT = ROOT / 'docs' / 'images'
 SCREENS = {'wide': (1280, 800, False), 'phone': (390, 844, True)}
@@ -30,12 +30,6 @@ POSTURES = {
 }
 LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE', 'fallen': 'ERROR'}
 COLOURS = 96
-# Acknowledges and resets what was: on a busy machine an input may be late while the robot comes up.
-HAND = (
-    'window.hand = setInterval(() => ["acknowledge", "reset"].forEach(x =>'
-    ' console_page.socket.send(JSON.stringify({do: x}))), 500); 0'
-)
-CALM = 'document.body.dataset.level === "OK" && !document.querySelector(".card")'
 # Hz of the joint states, and of the IMU.
 RATES = '50 100'
 # How a posture is reached: steps, in seconds.
@@ -71,10 +65,7 @@ def bring(robot: Live, page: Page, state: str, level: str) -> None:
     else:
         robot.say('speak')
         robot.pose(*POSTURES['ok'][:4], roll=0.0)
-        page.wait('!!window.console_page?.frame && console_page.frame.level !== "STALE"')
-        page.run(HAND)
-        page.wait(CALM)
-        page.run('clearInterval(hand)')
+        calm(page)
         go(robot, POSTURES[state])
     rates = [f'{hertz} Hz' for hertz in RATES.split()]
     if state == 'no_data':

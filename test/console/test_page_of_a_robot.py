@@ -5,7 +5,7 @@ import signal
 
 import pytest
 from console.browser import Page
-from console.servers import Live
+from console.servers import Live, calm
 
 FOLDED = (0.0, 2.0, -2.5, 2.0)
 STRETCHED = (0.0, 0.3, 0.2, 2.0)
@@ -19,28 +19,8 @@ def shown(page: Page, robot: Live) -> Page:
     """Return a page that shows a robot that stands well."""
     robot.pose(*FOLDED)
     page.open(robot.url)
-    calm(page, robot)
+    calm(page)
     return page
-
-
-def calm(page: Page, robot: Live) -> None:
-    """Bring the robot back, and acknowledge and reset what was."""
-    robot.pose(*FOLDED)
-    page.wait('!!window.console_page?.hello')
-    page.wait(f'{LEVEL} !== "STALE" && {LEVEL} !== "ERROR"')
-    hand = (
-        '["acknowledge", "reset"].forEach(x => console_page.socket.send(JSON.stringify({do: x})))'
-    )
-    page.run(f'window.hand = setInterval(() => {hand}, 300)')
-    none = '[...console_page.frame.cards, ...console_page.frame.past].length === 0'
-    page.wait(f'{LEVEL} === "OK" && {none}')
-    page.run('clearInterval(hand)')
-    # What the hand did last is done before this is answered: it must not reach into the test.
-    asked = 'JSON.stringify({do: "axes", x: axes[0], y: axes[1], number: -1})'
-    page.run(
-        'new Promise(done => { const axes = console_page.hello.axes;'
-        f' console_page.waiting.set(-1, done); console_page.socket.send({asked}); }}).then(() => 0)'
-    )
 
 
 def wait_for_both(page: Page, state: str) -> None:
