@@ -8,8 +8,8 @@ const TIPPED = -20; // degrees of tilt left: it no longer stands on the ground t
 
 // Which way a view looks: what is to the right on the screen, and its sides.
 export const VIEWS = [
-  { id: 'from-side', words: 'from its right side', across: (p) => p[0], sides: ['rear', 'front'] },
-  { id: 'from-rear', words: 'from behind', across: (p) => -p[1], sides: ['left', 'right'] },
+  { id: 'from-side', words: 'from its right side', across: (p) => p[0], deep: 1, sides: ['rear', 'front'] },
+  { id: 'from-rear', words: 'from behind', across: (p) => -p[1], deep: 0, sides: ['left', 'right'] },
 ];
 
 export class SideView {
@@ -95,11 +95,19 @@ function placed(solid, places) {
   return solid.points.map(([x, y, z]) => [0, 3, 6].map((k) => m[k] * x + m[k + 1] * y + m[k + 2] * z + m[9 + k / 3]));
 }
 
-// The two ends of what it stands on, left and right on the screen; of a robot that stands on nothing a line below its body.
+// The two ends of what it stands on, left and right on the screen, in a section through the plumb line; of a robot that stands on
+// nothing a line below its body.
 function support(p, view, flat) {
-  const feet = p.polygon.length ? p.polygon : [[p.body[0][0], p.body[0][1], p.body[0][2]], [p.body[1][0], p.body[1][1], p.body[0][2]]];
-  const order = [...feet].sort((a, b) => view.across(a) - view.across(b));
-  return [flat(order[0]), flat(order[order.length - 1])];
+  const body = [p.body[0], [p.body[1][0], p.body[1][1], p.body[0][2]]], feet = p.polygon.length ? p.polygon : body;
+  const deep = feet.map((q) => q[view.deep]), at = (p.plumb ?? p.cog)[view.deep], level = Math.min(Math.max(at, Math.min(...deep)), Math.max(...deep)), cuts = [];
+  feet.forEach((a, k) => {
+    const b = feet[(k + 1) % feet.length], start = a[view.deep] - level, end = b[view.deep] - level;
+    if (start === 0 && end === 0) cuts.push(a, b);
+    else if (start * end <= 0) cuts.push(a.map((x, i) => x + (start / (start - end)) * (b[i] - x)));
+  });
+  if (!p.polygon.length) cuts.splice(0, cuts.length, ...body);
+  cuts.sort((a, b) => view.across(a) - view.across(b));
+  return [flat(cuts[0]), flat(cuts[cuts.length - 1])];
 }
 
 function hull(points) {
