@@ -341,6 +341,23 @@ def test_what_is_no_result_is_refused(tmp_path: Path, text: str, words: str) -> 
     assert words in str(done.exception)
 
 
+@pytest.mark.parametrize(
+    ('name', 'failures', 'errors'),
+    [('packbot_pass', 0, 0), ('packbot_fail', 1, 0), ('packbot_gap', 0, 1)],
+)
+def test_junit_is_never_greener_than_the_verdict(
+    tmp_path: Path, name: str, failures: int, errors: int
+) -> None:
+    """A run whose only criterion is met, yet which a safeguard fails or doubts, is not green."""
+    little, report = tmp_path / 'little.yaml', tmp_path / 'r.xml'
+    demand = 'came: {data: coverage, at_least: 0.1}'
+    little.write_text(f'version: 1\nname: little\ncoverage: 0.1\ncriteria:\n  {demand}\n', 'utf-8')
+    done = run(EVALUATE, SHIPPED / name, '--criteria', little, '--junit', report)
+    assert done.exit_code == RUNS[name], done.output
+    suites = JUnitXml.fromfile(str(report))
+    assert (suites.failures, suites.errors) == (failures, errors)
+
+
 def test_a_proposed_file_is_met_by_its_own_run(tmp_path: Path) -> None:
     """--init-criteria writes what --criteria reads, and a worse run does not meet it."""
     proposed = tmp_path / 'site.yaml'

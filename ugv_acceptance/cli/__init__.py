@@ -42,6 +42,7 @@ VERBS = (
     'plan',
     'run',
     'simulate',
+    'drill',
     'model',
     'map',
     'paper',

@@ -1,7 +1,7 @@
 """`ugv-acceptance evaluate`: judges recorded runs and prints the verdict with its reasons."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,7 +15,12 @@ from ugv_acceptance.cli.options import (
     Verbose,
     dash,
 )
-from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
+from ugv_acceptance.cli.outputs import Input, Output, check_outputs, inputs_of
+from ugv_acceptance.type_aliases import Json
+
+if TYPE_CHECKING:
+    from ugv_acceptance.cli.evidence import Papers
+    from ugv_acceptance.config import Config
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 BAD_INPUT = 2
@@ -65,6 +70,10 @@ def evaluate(
         Path | None,
         typer.Option(help='Write the recording with margins, verdict and alerts beside it (MCAP).'),
     ] = None,
+    drill: Annotated[
+        list[Path] | None,
+        typer.Option(help="The record of an operator's drill, for the report; several allowed."),
+    ] = None,
     verbose: Verbose = False,
     overwrite: Overwrite = False,
 ) -> None:
@@ -81,40 +90,33 @@ def evaluate(
       ugv-acceptance evaluate run --criteria site.yaml --report r.html --junit r.xml
       ugv-acceptance evaluate run --annotate run_judged.mcap
       ugv-acceptance evaluate run --ground stairs=12s..40s
+      ugv-acceptance evaluate run --drill ada.json --report r.html
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_json
     from ugv_acceptance.cli import output_kinds as kinds
-    from ugv_acceptance.cli.evidence import Papers, evaluate_files, write_junit
+    from ugv_acceptance.cli.evidence import Papers, write_junit
     from ugv_acceptance.cli.ground_option import ground_from
     from ugv_acceptance.cli.result_text import print_results
-    from ugv_acceptance.cli.terminal_output import complain, result_console, while_read, wrote
+    from ugv_acceptance.cli.terminal_output import result_console, while_read, wrote
     from ugv_acceptance.config import description_topic, load
     from ugv_acceptance.config.files import find
     from ugv_acceptance.config.identity import file_of, identity_from
+    from ugv_acceptance.drill.record import training_record
 
-    under = ground_from(ground)
-    papers = Papers(report, pdf, csv_file, parquet, criteria, init_criteria, annotate, under)
+    under, drilled = ground_from(ground), tuple(training_record(path) for path in drill or ())
+    papers = Papers(
+        report, pdf, csv_file, parquet, criteria, init_criteria, annotate, under, drilled
+    )
     groups = recordings(bags)
     told = description_topic(config, urdf=urdf) is not None
     robot = find(config) if config and told else load(config, urdf=urdf)
     of_all = [Output('--json', json_file, kinds.RESULT), Output('--junit', junit, kinds.JUNIT)]
     inputs = inputs_of(robot, bags, criteria=criteria, identity=file_of(identity))
+    inputs += [Input('the record of a drill', path) for path in drill or ()]
     check_outputs([*of_all, *papers.outputs(len(groups))], inputs, overwrite=overwrite)
     entered = identity_from(identity)
-    results: list[dict[str, Any]] = []
-    codes: list[int] = []
-    for paths in groups:
-        try:
-            result = evaluate_files(
-                paths, robot, papers, compare_effort=compare_effort, identity=entered
-            ).result
-        except AcceptanceError as error:
-            complain(str(error))
-            result = {'verdict': 'BAD INPUT', 'reasons': [str(error)], 'bag': {'path': paths}}
-            codes.append(BAD_INPUT)
-        else:
-            codes.append(EXIT[result['verdict']])
-        results.append(result)
+    judged = [_judged(one, robot, papers, compare_effort, entered) for one in groups]
+    results, codes = [result for result, _ in judged], [code for _, code in judged]
     if json_file is not None:
         write_json(json_file, results[0] if len(results) == 1 else results)
     if junit is not None:
@@ -123,6 +125,28 @@ def evaluate(
         print_results(results, result_console(json_file, csv_file, junit), verbose=verbose)
     wrote(json_file, junit)
     raise typer.Exit(worst(codes))
+
+
+def _judged(
+    paths: list[Path],
+    robot: 'Config | Path',
+    papers: 'Papers',
+    compare_effort: bool,
+    identity: dict[str, str],
+) -> tuple[Json, int]:
+    """Return the result of one recording and its exit code; of one that cannot be read, why."""
+    from ugv_acceptance.cli.evidence import evaluate_files
+    from ugv_acceptance.cli.terminal_output import complain
+
+    try:
+        result = evaluate_files(
+            paths, robot, papers, compare_effort=compare_effort, identity=identity
+        ).result
+    except AcceptanceError as error:
+        complain(str(error))
+        why = {'verdict': 'BAD INPUT', 'reasons': [str(error)], 'bag': {'path': paths}}
+        return why, BAD_INPUT
+    return result, EXIT[result['verdict']]
 
 
 def worst(codes: list[int]) -> int:

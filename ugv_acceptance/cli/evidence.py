@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ugv_acceptance.evaluation.ground import Ground
     from ugv_acceptance.evaluation.settings import Settings
     from ugv_acceptance.offline.evaluation import Evaluation
+    from ugv_acceptance.offline.training import TrainingRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class Papers:
     """The output files that the user asked for, and the criteria a recording is judged by.
 
     `ground` is what the ground of the recording was, None: as configuration and criteria say.
+    `training` are the records of the operators' drills.
     """
 
     report: Path | None = None
@@ -34,6 +36,7 @@ class Papers:
     init_criteria: Path | None = None
     annotate: Path | None = None
     ground: 'Ground | None' = None
+    training: 'tuple[TrainingRecord, ...]' = ()
 
     @property
     def paged(self) -> bool:
@@ -98,7 +101,9 @@ def evaluate_files(
             criteria=papers.criteria,
             ground=papers.ground,
             identity=identity,
-            options=Options(tuple(takers), progress, detail, compare_effort),
+            options=Options(
+                tuple(takers), progress, detail, compare_effort, training=papers.training
+            ),
         )
     wrote(papers.csv, papers.parquet)
     if papers.annotate is not None:

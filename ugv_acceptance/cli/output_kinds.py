@@ -184,6 +184,8 @@ CRITERIA = Kind(
 # A recording, even one with our judgement in it, is replaced only where that is asked for.
 ANNOTATED = Kind('MCAP', ('.mcap',), lambda _: False, 'and may be a recording')
 PLAN = Kind('YAML', _YAML, _unedited('# A test plan made by'), 'and is not a plan, or was edited')
+# The record of a drill is somebody's proof: another drill does not replace it unasked.
+DRILL_RECORD = Kind('JSON', ('.json',), lambda _: False, 'and may be the record of a drill')
 CARD = Kind('HTML', _HTML, _starts(_PAGE % b'Operator card'), 'and is not an operator card')
 CONFIGURATION = Kind('YAML', _YAML, lambda _: False, 'and may be a configuration')
 DESCRIPTION = Kind('URDF', ('.urdf',), lambda _: False, 'and may be a description')

@@ -43,6 +43,7 @@ from ugv_acceptance.report.format import (
     missing_text,
     origin_line,
 )
+from ugv_acceptance.report.training import training_lines
 
 __all__ = ['print_result', 'print_results', 'while_read']
 
@@ -85,7 +86,7 @@ def _print_result(result: Result, console: Console, *, verbose: bool) -> None:
     most = ALL if verbose else _REASONS
     say_list(console, result['reasons'], most, f'reasons {LISTED}', 2)
     given = (origin_line(result), assumed_line(result)) if verbose else (_given_line(result),)
-    say_list(console, given, ALL, '', 2)
+    say_list(console, [*given, *training_lines(result)], ALL, '', 2)
     _print_marked(console, 'doubt', doubts_of(result), ALL if verbose else _DOUBTS)
     _print_marked(console, 'warning', _warnings(result), ALL if verbose else _WARNINGS)
     (print_details if verbose else _print_short)(result, console)

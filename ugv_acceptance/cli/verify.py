@@ -38,6 +38,9 @@ def verify(
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help='The URDF, if it was moved.')] = None,
     criteria: Annotated[Path | None, typer.Option(help='The criteria, if they were moved.')] = None,
+    drill: Annotated[
+        list[Path] | None, typer.Option(help='The records of drills, if they were moved.')
+    ] = None,
 ) -> None:
     """Verify a result: everything is computed again; hashes, verdicts and numbers are compared.
 
@@ -49,7 +52,7 @@ def verify(
       ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     told = read_result(result_file)
-    found = again(told, result_file.parent, bag, config, urdf, criteria)
+    found = again(told, result_file.parent, bag, config, urdf, criteria, drill)
     differences = compare(told, found)
     with while_read():
         print_comparison(differences, result_file, told['verdict'])
@@ -115,11 +118,13 @@ def again(
     config: Path | None,
     urdf: Path | None,
     criteria: Path | None,
+    drill: list[Path] | None = None,
 ) -> Json:
     """Return the result computed again from the files it names, beside it, or as given."""
     import json
 
     from ugv_acceptance.bag.recording import open_recording
+    from ugv_acceptance.drill.record import training_record
     from ugv_acceptance.offline.evaluate import evaluate
     from ugv_acceptance.offline.judge import Options
     from ugv_acceptance.offline.own_robot import robot_of
@@ -136,13 +141,17 @@ def again(
     loaded = robot_of(opened, at, urdf=model)
     if criteria is None and named is not None:
         criteria = _near(named, folder, '--criteria')
-    options = Options(compare_effort='effort' in told)
+    entered = told.get('identity')
+    drills = drill or [_near(path, folder, '--drill') for path in _drills(told)]
+    records = tuple(training_record(path) for path in drills)
+    options = Options(compare_effort='effort' in told, training=records)
     result = evaluate(
         opened,
         config=loaded,
         criteria=criteria,
         payload=payload_of(told),
         ground=ground_of(told),
+        identity=entered if isinstance(entered, dict) else None,
         options=options,
     )
     found: Json = json.loads(result.to_json())
@@ -155,6 +164,14 @@ def again(
     if 'urdf_sha256' not in told['robot']:
         _without_description(found)
     return found
+
+
+def _drills(told: Json) -> list[str]:
+    """Return the files of the drills' records that a result names."""
+    try:
+        return [str(one['file']) for one in told.get('operator_training', {}).get('records', ())]
+    except (AttributeError, KeyError, TypeError) as error:
+        raise AcceptanceError(f'operator_training: expected records with files: {error}') from None
 
 
 def _without_description(found: Json) -> None:
@@ -208,7 +225,7 @@ _FREE |= {('software',), ('identity',), ('robot', 'warnings')}
 
 def compare(told: Any, found: Any, path: tuple[str, ...] = ()) -> list[str]:  # noqa: ANN401 - JSON
     """Return one line for each difference between two results; hashes come first."""
-    if path in _FREE:
+    if path in _FREE or (path[:1] == ('operator_training',) and path[-1] == 'file'):
         return []
     where = '.'.join(path) or 'result'
     if isinstance(told, dict) and isinstance(found, dict):

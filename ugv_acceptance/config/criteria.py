@@ -128,6 +128,7 @@ class CriteriaFile(Section):
     waive: dict[str, Reason] = Field(default={})
     ground: CriteriaGroundSection = CriteriaGroundSection()
     hand_may_touch: Annotated[tuple[tuple[float, float], ...], BeforeValidator(_windows)] = ()
+    operator_training: Literal['this_robot', 'any_robot'] | None = None
     criteria: dict[str, CriterionSection]
 
 
@@ -206,6 +207,7 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
         file.ground.kind,
         tuple(GroundWindow(w.kind, *w.between) for w in file.ground.windows),
         file.hand_may_touch,
+        file.operator_training,
     )
 
 

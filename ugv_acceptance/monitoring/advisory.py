@@ -5,7 +5,7 @@ Advice takes some hundredths of a second, so that it is computed in a thread of 
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
@@ -32,7 +32,7 @@ class Advisory:
 
     `efforts` is what the joints' efforts mean and say, None before the robot has rested; `estimate`
     is the payload that they suggest, if it differs from the declared one. `on_problem(text)` writes
-    to the log.
+    to the log. `pool` computes: a thread, unless simulated time has to wait for it.
     """
 
     evaluator: LiveEvaluator
@@ -44,7 +44,7 @@ class Advisory:
     rests: LiveRests = field(init=False)
     _made: int = 0
     _told: int = 0
-    _pool: ThreadPoolExecutor = field(
+    pool: Executor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
     )
     _asked: 'Future[tuple[Advice, ...]] | None' = None
@@ -60,7 +60,7 @@ class Advisory:
             self.advice = ()
         elif self._asked is None and now - self._made >= FRESH:
             case = evaluator.settings, margins.q, margins.gravity, evaluator.payload
-            self._asked, self._made = self._pool.submit(advise, *case), now
+            self._asked, self._made = self.pool.submit(advise, *case), now
 
     def arrived(self) -> bool:
         """Collect advice whose computation has finished; return whether its subjects changed."""
@@ -75,7 +75,7 @@ class Advisory:
 
     def close(self) -> None:
         """Stop: end the thread that computes advice."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self.pool.shutdown(wait=False, cancel_futures=True)
 
     def feel(self) -> None:
         """Remember the efforts at rest and judge them now and then; to be called once a second."""
@@ -99,7 +99,7 @@ class Advisory:
     def _judge(self) -> None:
         """Judge the efforts remembered so far, in the thread for advice."""
         case = self.evaluator.settings, (), self.rests.rests()
-        self._judging = self._pool.submit(understand, *case)
+        self._judging = self.pool.submit(understand, *case)
 
     def felt(self, found: Understanding) -> None:
         """Take what the efforts mean and say; in motion the payload suggested before stays."""

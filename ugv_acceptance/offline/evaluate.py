@@ -36,6 +36,7 @@ from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
 from ugv_acceptance.offline.not_read import not_read
 from ugv_acceptance.offline.own_robot import check_default, description_statement, robot_of
+from ugv_acceptance.offline.training import with_training
 from ugv_acceptance.type_aliases import Json
 
 
@@ -70,7 +71,7 @@ def evaluate(
     identity
         What a person enters for the report: operator, robot_serial, place, ...
     options
-        How the recording is read, and what else is done with its margins.
+        How the recording is read, what else is done with its margins, records of drills.
 
     Raises
     ------
@@ -105,6 +106,8 @@ def evaluate(
     result, judgement = judge(opened, settings, demanded, sources, options, told)
     result |= _both_loads(opened, judgement, demanded, sources, result, told)
     result |= _circumstances(opened, robot, identity)
+    required = demanded.operator_training if demanded is not None else None
+    result |= with_training(result, options.training, required, opened.start_ns)
     unread = [not_checked_json(one) for one in not_read(opened, robot)]
     result['not_checked'] = [*result['not_checked'], *unread]
     result['load'] = load_of(judgement.measurement.payloads, opened.start_ns)
@@ -112,8 +115,7 @@ def evaluate(
         carried = settings.robot.payload
         result['declared_payload'] = {'mass_kg': carried.mass, 'cog_m': list(carried.cog)}
     if ground is not None:
-        windows = [{'kind': w.kind, 'start_s': w.start, 'end_s': w.end} for w in ground.windows]
-        result['declared_ground'] = {'kind': ground.kind, 'windows': windows}
+        result['declared_ground'] = _declared(ground)
     add_acknowledgements(result, opened.bag)
     if options.compare_effort:
         result['effort'] = effort.result(opened.start_ns)
@@ -174,6 +176,11 @@ def _on_ground(settings: Settings, criteria: CriteriaSet | None, given: Ground |
     if given is not None:
         ground = with_ground(ground, given.kind, given.windows)
     return replace(settings, ground=ground)
+
+
+def _declared(ground: Ground) -> Json:
+    windows = [{'kind': w.kind, 'start_s': w.start, 'end_s': w.end} for w in ground.windows]
+    return {'kind': ground.kind, 'windows': windows}
 
 
 def _criteria(criteria: CriteriaSet | Path | str | None, settings: Settings) -> CriteriaSet | None:

@@ -39,6 +39,7 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.offline.evaluation import Judgement
 from ugv_acceptance.offline.recorded_transforms import with_transforms
+from ugv_acceptance.offline.training import TrainingRecord
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
@@ -58,7 +59,8 @@ class Options:
     Each of `takers` is called with the margins of every part of the recording in order; they hold
     moments, energies and ZMP if `detail` asks for them. `progress` is called with the log time (ns)
     reached. With `compare_effort` the result compares measured efforts at rest. `readers` is the
-    number of threads that read, by default two if there is more than one core.
+    number of threads that read, by default two if there is more than one core. `training` are
+    records of operators' drills: they change a verdict only where the criteria require one.
     """
 
     takers: tuple[Taker, ...] = ()
@@ -66,6 +68,7 @@ class Options:
     detail: bool = False
     compare_effort: bool = False
     readers: int | None = None
+    training: tuple[TrainingRecord, ...] = ()
 
 
 DEFAULTS = Options()

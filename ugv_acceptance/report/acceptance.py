@@ -33,6 +33,7 @@ from ugv_acceptance.report.format import (
 from ugv_acceptance.report.regions import svg_of
 from ugv_acceptance.report.run_charts import gravity_of, positions_of, run_chart, track_map
 from ugv_acceptance.report.side_view import Standing, side_view
+from ugv_acceptance.report.training import training_line, training_rows
 from ugv_acceptance.type_aliases import Json
 
 
@@ -91,6 +92,8 @@ def acceptance_page(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
     environment.filters.update(
+        training=training_line,
+        drilled=training_rows,
         number=number_text,
         seconds=seconds_text,
         level=level_words,

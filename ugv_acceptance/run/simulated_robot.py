@@ -20,6 +20,7 @@ from ugv_acceptance.simulation.drive_by_wire import RemoteRobot
 from ugv_acceptance.simulation.faults import Fault
 from ugv_acceptance.simulation.poses import stowed_of
 from ugv_acceptance.simulation.scenario import Scenario, noise_of
+from ugv_acceptance.simulation.shape import Block
 from ugv_acceptance.simulation.stretches import Rows, Sensors, stride_of
 
 # Source ('joint_states' or 'imu') and serialised content of a message.
@@ -31,7 +32,8 @@ class VirtualRobot:
     """A simulated robot with sensors, driver and faults; `step` simulates one IMU period.
 
     `home` are positions (rad) at the start in the order of the configuration, none: stowed. Stamps
-    begin at `epoch` (ns). Raises BadConfig where rates or positions do not fit.
+    begin at `epoch` (ns); `blocks` lie on the ground. Raises BadConfig where rates or positions do
+    not fit.
     """
 
     config: Config
@@ -41,6 +43,7 @@ class VirtualRobot:
     joint_rate: float = 100.0
     imu_rate: float = 200.0
     epoch: int = EPOCH
+    blocks: tuple[Block, ...] = ()
     tick: float = field(init=False)
     remote: RemoteRobot = field(init=False)
     _driver: Driver = field(init=False)
@@ -51,7 +54,8 @@ class VirtualRobot:
     _sensors: Sensors = field(init=False)
 
     def __post_init__(self) -> None:
-        robot, build = self.config.settings.robot, build_of(self.config)
+        robot = self.config.settings.robot
+        build = replace(build_of(self.config), blocks=self.blocks)
         check_drives(robot)
         rates = Scenario('live', 1.0, joint_rate=self.joint_rate, imu_rate=self.imu_rate)
         self._stride = stride_of(rates, build)
@@ -87,6 +91,10 @@ class VirtualRobot:
         `rate` is the peak in rad/s. A robot that has turned is put onto the ramp as a person would.
         """
         self.remote.tilt(tilt, heading + self._yaw(), rate)
+
+    def suffer(self, faults: tuple[Fault, ...]) -> None:
+        """Have these faults of sensors and messages from now on instead of those before."""
+        self._driver.corruption.faults = faults
 
     def pull(self, force: float, height: float) -> None:
         """Pull backwards with a force (N) at a hitch, `height` (m) above the middle of the base."""

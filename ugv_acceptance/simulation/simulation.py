@@ -217,6 +217,10 @@ class Simulation:
             data.actuator_force[vehicle.motor],
         )
 
+    def targets(self) -> Floats:
+        """Return where the joints are to be now (j,): rad, m. An arm that sinks is elsewhere."""
+        return np.array([move.at(self.time)[0] for move in self._moves])
+
     def imu(self) -> tuple[Floats, Floats, Floats]:
         """Return the IMU's orientation (4,) x y z w, rate (3,) rad/s, specific force (3,) m/s2.
 

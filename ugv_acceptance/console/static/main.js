@@ -8,6 +8,7 @@ import { Views } from './views.js';
 import { SafeMap } from './map.js';
 import { Strips } from './strips.js';
 import { Playback } from './playback.js';
+import { Drill } from './drill.js';
 import { Sound } from './sound.js';
 import { Tell } from './tell.js';
 import { follow as followNight } from './night.js';
@@ -24,6 +25,7 @@ const views = new Views();
 const map = new SafeMap(ask);
 const strips = new Strips();
 const playback = new Playback(ask);
+const drill = new Drill(ask);
 window.console_page = page; // for tests: what is known, nothing to be changed
 
 function ask(values, then) {
@@ -87,7 +89,7 @@ function draw() {
   const { frame, hello } = page, shown = silent ? lost(page, age) : frame;
   showHeadline(shown);
   sound.follow(shown);
-  countdown.show(shown, hello?.source === 'live');
+  countdown.show(shown, hello?.source !== 'bag');
   if (!hello || !frame) return;
   alerts.show(shown);
   showMargins(frame, hello, silent);
@@ -98,6 +100,7 @@ function draw() {
   showInputs(frame);
   showLoad(frame, hello);
   playback.show(frame);
+  drill.show(frame);
   if (frame.level !== 'STALE') {
     views.draw(frame, hello);
     map.draw(frame);

@@ -18,6 +18,8 @@ PASS, FAIL, INCONCLUSIVE = 'PASS', 'FAIL', 'INCONCLUSIVE'
 RSS, WORST_CASE, IGNORED = 'rss', 'worst_case', 'ignored'
 # Rules by which criteria may judge tip-over on ground that is not flat.
 TREND, CAUTIOUS = 'trend', 'cautious'
+# Drills that show a trained operator: on this robot's configuration, or on any.
+THIS_ROBOT, ANY_ROBOT = 'this_robot', 'any_robot'
 # Share of a window that must be evaluated for a PASS.
 LEAST_COVERAGE = 0.95
 # A shorter recording (s) cannot show that an input is silent or that an IMU contradicts itself.
@@ -135,7 +137,8 @@ class CriteriaSet:
     safeguards that are not to hold, with the reason. `ground` is the rule accepted on ground that
     is not flat, None: none is. `ground_kind` and `ground_windows` say what the ground of a
     recording is, as in ground.Ground; None and none: they say nothing. `hand_may_touch` are the
-    windows in which the arm may touch the ground.
+    windows in which the arm may touch the ground. `operator_training` is THIS_ROBOT or ANY_ROBOT
+    where an operator must have passed a drill, on this robot's configuration or on any.
     """
 
     name: str
@@ -150,6 +153,7 @@ class CriteriaSet:
     ground_kind: str | None = None
     ground_windows: tuple[GroundWindow, ...] = ()
     hand_may_touch: tuple[Window, ...] = ()
+    operator_training: str | None = None
 
     def uncertainty_of(self, criterion: Criterion) -> str:
         """Return how uncertainties are combined for a criterion: RSS, WORST_CASE or IGNORED."""
