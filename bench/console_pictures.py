@@ -1,7 +1,8 @@
-"""Pictures of the console in four states, wide and on a phone: `python -m bench.console_pictures`.
+"""Pictures of the console in its states, wide and on a phone: `python -m bench.console_pictures`.
 
-A real monitor watches a driver that stands still, stretches its arm and falls silent; a real
-Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small enough to be kept.
+A real monitor watches a driver that stands still, stretches its arm, falls silent and falls over; a
+real Chromium looks at the page. Writes docs/images/console_STATE_SCREEN.png, small enough to be
+kept, and the danger once more by night.
 """
 
 import io
@@ -16,23 +17,19 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'test'))
 
 from console.browser import Page, chromium  # noqa: E402 - the tests' helpers
-from console.servers import Live, live_console  # noqa: E402 - the same
+from console.servers import Live, calm, live_console  # noqa: E402 - the same
 
 OUT = ROOT / 'docs' / 'images'
-SCREENS = {'wide': (1280, 860, False), 'phone': (360, 740, True)}
+SCREENS = {'wide': (1280, 800, False), 'phone': (390, 844, True)}
 # Turret, shoulder, elbow, flippers (rad), and roll.
 POSTURES = {
     'ok': (0.0, 2.0, -2.5, 2.0, 0.0),
     'warning': (-1.57, 1.3, -1.9, 2.0, 0.2),
     'critical': (-1.57, 1.2, -1.6, 2.0, 0.2),
+    'fallen': (-1.57, 1.2, -1.6, 2.0, 0.9),
 }
-LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE'}
+LEVELS = {'ok': 'OK', 'warning': 'WARN', 'critical': 'ERROR', 'no_data': 'STALE', 'fallen': 'ERROR'}
 COLOURS = 96
-# On a busy machine an input may have been late while the robot came up.
-CALM = (
-    '(console_page.frame.alerts.length && console_page.socket.send(JSON.stringify({do:'
-    ' "acknowledge", key: null}))), console_page.frame.alerts.length === 0'
-)
 # Hz of the joint states, and of the IMU.
 RATES = '50 100'
 # How a posture is reached: steps, in seconds.
@@ -54,9 +51,11 @@ def main() -> None:
                 page.resize(width, height, touch=touch)
                 page.run('scrollTo(0, 0); new Promise(done => setTimeout(done, 700))')
                 page.wait(f'document.body.dataset.level === "{level}"')
-                if state == 'ok':
-                    page.wait(CALM)
                 save(page.picture(), OUT / f'console_{state}_{screen}.png')
+                if (state, screen) == ('critical', 'wide'):
+                    page.click('#night')
+                    save(page.picture(), OUT / 'console_critical_night.png')
+                    page.click('#night')
 
 
 def bring(robot: Live, page: Page, state: str, level: str) -> None:
@@ -64,10 +63,9 @@ def bring(robot: Live, page: Page, state: str, level: str) -> None:
     if state == 'no_data':
         robot.say('silent')
     else:
+        robot.say('speak')
         robot.pose(*POSTURES['ok'][:4], roll=0.0)
-        page.wait('!!window.console_page?.frame && console_page.frame.level !== "STALE"')
-        page.run('console_page.socket.send(JSON.stringify({do: "acknowledge", key: null}))')
-        page.wait('console_page.frame.level === "OK"')
+        calm(page)
         go(robot, POSTURES[state])
     rates = [f'{hertz} Hz' for hertz in RATES.split()]
     if state == 'no_data':

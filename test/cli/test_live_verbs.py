@@ -33,7 +33,7 @@ def test_the_demo_shows_live_alerts_and_the_verdict(repository: Path) -> None:
     process = start('demo', '--rate', '3', '--bag', str(repository / 'bags' / 'packbot_fail'))
     text, errors = process.communicate(timeout=120)
     assert process.returncode == 0, text + errors
-    assert re.search(r'DANGER\s+raised: .* degrees of tilt left', text)
+    assert re.search(r'DANGER\s+raised: .* (to|past) tipping: ', text)
     assert 'FAIL is the right verdict' in text
 
 

@@ -155,6 +155,11 @@ class Page:
         self.call('Input.dispatchKeyEvent', **down, **key)
         self.call('Input.dispatchKeyEvent', type='keyUp', **key)
 
+    def type(self, letter: str) -> None:
+        """Type a letter or a digit."""
+        self.call('Input.dispatchKeyEvent', type='keyDown', key=letter, text=letter)
+        self.call('Input.dispatchKeyEvent', type='keyUp', key=letter)
+
     def picture(self) -> bytes:
         """Return the screen as PNG."""
         return base64.b64decode(self.call('Page.captureScreenshot', format='png')['data'])

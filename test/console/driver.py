@@ -19,6 +19,8 @@ from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 # more than 0.1 rad from one message to the next, which comes right behind it on a busy machine.
 SPEED = 4.0
 NOISE = 1e-3  # m/s2
+# rad: an orientation of exactly nothing is what an IMU sends that has none.
+LEAN = 1e-4
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 
 
@@ -61,7 +63,7 @@ def main() -> None:
     rates = [int(x) for x in os.environ.get('DRIVER_RATES', '50 50').split()]
     due, count, q = time.monotonic(), 0, robot.q
     while listening.is_alive():
-        now, half = time.time_ns(), robot.roll / 2
+        now, half = time.time_ns(), (robot.roll + LEAN) / 2
         if count % (rates[1] // rates[0]) == 0:
             q = towards(robot.q, q, 1.0 / rates[0])
             joints.publish(joint_state_cdr(now, '', NAMES, q, (0.0,) * 4, (0.0,) * 4))

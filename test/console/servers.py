@@ -10,9 +10,27 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from console.browser import Page
+
 HERE = Path(__file__).parent
 COMMAND = [sys.executable, '-u', '-c', 'from ugv_acceptance.cli import main; main()']
 Process = subprocess.Popen[str]
+# A hand that acknowledges and resets, each time after it was answered.
+HAND = """
+window.calming = true;
+window.calmed = (async () => {
+  const tell = words => new Promise(done => {
+    const number = ++console_page.asked;
+    console_page.waiting.set(number, done);
+    console_page.socket.send(JSON.stringify({do: words, number}));
+  });
+  while (calming) {
+    await tell('acknowledge');
+    await tell('reset');
+    await new Promise(done => setTimeout(done, 300));
+  }
+})(); 0
+"""
 
 
 @contextmanager
@@ -105,3 +123,14 @@ def live_console() -> Iterator[Live]:
         )
         url, process = stack.enter_context(console(domain=domain))
         yield Live(url, domain, driver, monitor, process)
+
+
+def calm(page: Page) -> None:
+    """Acknowledge and reset in the page what was, until all is well and no card is left."""
+    page.wait(
+        '!!window.console_page?.frame && !["STALE", "ERROR"].includes(document.body.dataset.level)'
+    )
+    page.run(HAND)
+    page.wait('document.body.dataset.level === "OK" && !document.querySelector(".card")')
+    # What the hand did last must not reach into what follows.
+    page.run('calming = false; calmed')

@@ -210,6 +210,16 @@ def test_what_is_assumed_stands_in_one_line() -> None:
     )
 
 
+def test_without_an_imu_no_tilt_is_told() -> None:
+    """The degrees of a base that was declared level are nobody's measurement."""
+    bare = replace(SETTINGS, imu=replace(SETTINGS.imu, attitude=LEVEL))
+    found = frame_of(replace(FINE, angle=(-0.5, 0.5, 0.5, 0.5)), bare, FIGURE)
+    assert {(row['words'], row['level']) for row in found['tilt']} == {('-', '')}
+    head = found['headline']
+    assert (head['what'], head['number']) == ('ALL TORQUE MARGINS KEPT', '40 %')
+    assert head['notes'][0].startswith('tip-over not checked')
+
+
 def test_lamps_say_what_records_and_since_when() -> None:
     """The black box, the time since the start, and where the numbers come from."""
     lamps = frame(replace(FINE, black_box='disk full', running=12.5, source='bag'))['lamps']

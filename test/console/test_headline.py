@@ -12,7 +12,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.console.headline import Headline, headline_of, view_of
 from ugv_acceptance.console.headline_words import order_of, what_of
 from ugv_acceptance.console.snapshot import AlertRow, LastKnown, Memory, Snapshot
-from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, TIPPED
 from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.evaluation.settings import CONTACTS
@@ -40,7 +40,7 @@ def row(code: str, subject: str, level: int = ERROR, **changes: Any) -> AlertRow
 
 def said(snapshot: Snapshot, **settings: Any) -> Headline:
     """Return the headline of a snapshot of the PackBot."""
-    return headline_of(snapshot, replace(SETTINGS, **settings))
+    return headline_of(view_of(snapshot, replace(SETTINGS, **settings)))
 
 
 def words_of(headline: Headline) -> str:
@@ -73,6 +73,8 @@ def test_before_the_edge_and_past_it(degrees: float, what: str, number: str) -> 
     assert head.action == 'LOWER THE ELBOW'
     assert head.detail == 'by 16 deg: 11 deg further from tipping to the right, in 0.5 s'
     assert head.cause == 'TIP_OVER it is'
+    # The number stands above, and is not said again.
+    assert head.notes == ('shoulder 43 %',)
 
 
 @pytest.mark.parametrize(
@@ -89,6 +91,7 @@ def test_a_joint_is_named_with_its_share(newton_metres: float, what: str, number
     torque = (0.0, -newton_metres, 5.0, 0.1)
     head = said(tilted(40.0, level=ERROR, alerts=(alert,), torque=torque))
     assert (head.what, head.number) == (what, number)
+    assert head.notes == ('40 deg to tipping: RIGHT',)
 
 
 @pytest.mark.parametrize(
@@ -243,16 +246,17 @@ def test_after_a_fall_nobody_moves_anything() -> None:
     assert (head.more, 'elbow' in words_of(head)) == (1, False)
 
 
-def test_it_has_tipped_from_10_deg_past() -> None:
-    """A robot that sways a few degrees past its edge is still told how to come back."""
-    assert said(tilted(-10.1)).action == 'STAND CLEAR'
-    tip = row('TIP_OVER', 'right', advice=BRING, peak=math.radians(9.9))
-    assert said(tilted(-9.9, level=ERROR, alerts=(tip,))).action == 'LOWER THE ELBOW'
+def test_a_robot_that_sways_is_told_how_to_come_back() -> None:
+    """Up to where no robot comes back, past its edge, the advice is that for its margin."""
+    far = math.degrees(TIPPED)
+    assert said(tilted(-far - 0.1)).action == 'STAND CLEAR'
+    tip = row('TIP_OVER', 'right', advice=BRING, peak=TIPPED - 0.01)
+    assert said(tilted(0.1 - far, level=ERROR, alerts=(tip,))).action == 'LOWER THE ELBOW'
 
 
 def test_a_fall_is_a_danger_before_its_alert() -> None:
     """The word beside IT HAS TIPPED is never OK."""
-    assert view_of(tilted(-20.0), SETTINGS).level == ERROR
+    assert view_of(tilted(-25.0), SETTINGS).level == ERROR
 
 
 @pytest.mark.parametrize('end', [None, NOW - 1])

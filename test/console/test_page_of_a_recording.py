@@ -25,9 +25,10 @@ CONTRAST = """
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
   const words = document.querySelector(selector), style = getComputedStyle(words);
+  const ground = x => getComputedStyle(x).backgroundColor;
   let behind = words;
-  while (getComputedStyle(behind).backgroundColor === 'rgba(0, 0, 0, 0)') behind = behind.parentElement;
-  const [low, high] = [light(style.color), light(getComputedStyle(behind).backgroundColor)].sort((a, b) => a - b);
+  while (ground(behind) === 'rgba(0, 0, 0, 0)') behind = behind.parentElement;
+  const [low, high] = [light(style.color), light(ground(behind))].sort((a, b) => a - b);
   return (high + 0.05) / (low + 0.05);
 })
 """
@@ -100,6 +101,20 @@ def test_the_header_says_what_and_largest_what_to_do(shown: Page) -> None:
     assert max(sizes)[1] == 'action'
     cause = shown.text('#cause').partition(' (and ')[0]
     assert shown.text('#verdict').count(cause) == 1
+
+
+def test_a_screen_reader_is_told_when_the_trouble_is_another(shown: Page) -> None:
+    """What is spoken changes with the kind of trouble, and not with its numbers."""
+    spoken = []
+    for seconds in (24.9, DANGER, DANGER + 0.1):
+        seek(shown, seconds)
+        shown.wait(f'{LEVEL} !== "STALE"')
+        spoken.append((shown.text('#spoken'), shown.text('#number')))
+    (caution, _), danger, later = spoken
+    assert shown.run('spoken.getAttribute("aria-live")') == 'assertive'
+    assert danger[0].startswith('DANGER. TIPPING RIGHT. LOWER THE ELBOW. ')
+    assert danger[0] == later[0] != caution
+    assert danger[1] != later[1]
 
 
 def test_one_event_is_one_card_with_what_to_do(shown: Page) -> None:

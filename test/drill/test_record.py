@@ -54,6 +54,15 @@ def test_a_record_is_read_as_it_was_written(word: str, tmp_path: Path) -> None:
     assert not is_edited(found)
 
 
+@pytest.mark.parametrize('name', ['', '  ', 'Ada\nBob', '\x1b[31mAda', '\ud800'])
+def test_no_name_makes_a_record_that_cannot_be_read(name: str, tmp_path: Path) -> None:
+    """Whatever somebody enters as the operator, the record is read again, and prints no escape."""
+    write_json(tmp_path / 'record.json', record_json(drill(*ALL, operator=name)))
+    record = read_record(tmp_path / 'record.json')
+    assert not is_edited(record)
+    assert all(line.isprintable() for line in record_lines(record))
+
+
 def test_a_record_laid_out_anew_is_no_edited_one(tmp_path: Path) -> None:
     """Other spaces, another order, or `24` for `24.0`, as other tools write, change nothing."""
     record = record_json(KINDS['passed'])

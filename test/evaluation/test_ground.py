@@ -110,7 +110,7 @@ def test_a_robot_that_begins_to_tip_on_stairs_is_told_once() -> None:
     assert levels == [WARN, ERROR]
     said = next(a for a in evaluator.watch.log if a.rule.code == 'TIP_TREND')
     text = describe(said, evaluator.settings)
-    assert text.startswith('the robot begins to tip: the tilt left to the right shrinks by 2')
+    assert text.startswith('the robot begins to tip: RIGHT, by 2')
     assert 's until nothing is left' in text
 
 

@@ -57,6 +57,6 @@ def test_a_joint_without_limit_or_number_is_not_the_most_used() -> None:
     settings = limited(math.inf, 10.0, 10.0, 10.0)
     assert most_used((99.0, 5.0, 5.0, math.nan), settings) == (NAMES[1], 0.5)
     assert with_most_used('tilt', (99.0, 5.0, 5.0, 0.0), settings) == (
-        f'tilt, {NAMES[1]} at 50% of its limit'
+        f'tilt, {NAMES[1]} 50 % of its limit'
     )
     assert with_most_used('tilt', (1.0,) * 4, limited(*[math.inf] * 4)) == 'tilt'

@@ -226,7 +226,7 @@ def test_a_robot_slides_before_it_tips_where_friction_says_so() -> None:
         assert len(slides) == wanted
         for alert in slides:
             assert math.degrees(-alert.peak) == pytest.approx(1.7, abs=0.01)
-            assert describe(alert, told).endswith(': 1.7 degrees of slope left')
+            assert describe(alert, told).endswith(': 1.6 deg of slope left')
 
 
 def test_a_payload_counts_from_the_next_joint_state_on() -> None:

@@ -159,9 +159,9 @@ def test_a_robot_past_tipping_is_said_to_be() -> None:
     told = settings()
     rule = Rule('TIP_OVER', 'right', ERROR, -math.radians(5), -math.radians(6), 0, 0)
     past = describe(Alert(rule, T0, math.radians(35.0)), told)
-    assert past.startswith('the robot is 35.0 degrees past its tipping point to the right')
+    assert past.startswith('35 deg past tipping: RIGHT')
     left = describe(Alert(rule, T0, -math.radians(4.0)), told)
-    assert left.startswith('4.0 degrees of tilt left before the robot tips to the right')
+    assert left.startswith('4 deg to tipping: RIGHT')
 
 
 def test_a_force_is_told_in_newtons() -> None:

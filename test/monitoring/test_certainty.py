@@ -15,6 +15,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert
 from ugv_acceptance.evaluation.criteria.uncertainty import Source, combined, effects_of
+from ugv_acceptance.evaluation.margin_words import excess_words, tipping_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.diagnostics import verdict_of
@@ -89,8 +90,8 @@ def test_a_margin_kept_by_less_than_its_uncertainty_is_a_caution() -> None:
     left, bound = left_and_bound(robot, 'front')
     sentence = robot.session.faults.sentence(alert, SETTINGS)
     assert alert.rule.level == WARN
-    assert f'+/- {math.degrees(bound):.1f} degrees' in sentence
-    assert f'{math.degrees(left) + 5.0:.1f} degrees of tilt left to the front' in sentence
+    assert f'+/- {excess_words(bound)}' in sentence
+    assert tipping_words('front', left + math.radians(5.0)) in sentence
 
 
 def test_it_ends_when_the_margin_is_large_again() -> None:

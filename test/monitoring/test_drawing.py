@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from robots import DOWN, centre, feet, paper_arm, places, tracked
 
+from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload, Vector
-from ugv_acceptance.monitoring.drawing import Skeleton, figure_of, skeleton_of
+from ugv_acceptance.model.solids import places_of
+from ugv_acceptance.monitoring.drawing import Figure, Skeleton, figure_of, skeleton_of
 
 ROBOT = tracked()
 FIGURE = figure_of(ROBOT)
@@ -78,3 +81,27 @@ def test_a_robot_that_stands_nowhere_is_drawn_without_polygon() -> None:
     assert found is not None
     assert len(found.limbs) == 2
     assert (found.polygon, found.plumb) == ((), None)
+
+
+@given(turns, turns, turns, turns)
+def test_solids_are_drawn_where_their_bodies_are(a: float, b: float, c: float, d: float) -> None:
+    """The figure's places are those of the model, in the order of its bodies."""
+    robot = load('packbot').settings.robot
+    figure = figure_of_packbot()
+    q = (a, b, c, d)
+    found = skeleton_of(figure, q, DOWN, LOAD)
+    assert found is not None
+    every = places_of(robot, q)
+    assert len(found.places) == len(figure.bodies) == 4
+    for (turn, at), body in zip(found.places, figure.bodies, strict=True):
+        np.testing.assert_allclose(turn, every[body][0], atol=1e-12)
+        np.testing.assert_allclose(at, every[body][1], atol=1e-12)
+    joints = {limb.joint: figure.shape_of(limb.joint) for limb in found.limbs}
+    assert joints == {'flipper_joint': True, 'shoulder_joint': True, 'elbow_joint': True}
+    assert not FIGURE.shape_of('elbow')
+
+
+@cache
+def figure_of_packbot() -> Figure:
+    """Return PackBot's drawing."""
+    return figure_of(load('packbot').settings.robot)

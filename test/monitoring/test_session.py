@@ -23,9 +23,10 @@ from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Untold
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker
-from ugv_acceptance.monitoring.diagnostics import diagnostics_of, guarded, verdict_of
+from ugv_acceptance.monitoring.diagnostics import diagnostics_of, verdict_of
 from ugv_acceptance.monitoring.receipt_clock import RESHIFT, ReceiptClock, StampShift
 from ugv_acceptance.monitoring.session import Session
+from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.parameters import (
     changed,
     check_locked,

@@ -159,6 +159,7 @@ def test_a_folder_that_cannot_be_written_is_said_and_survived(tmp_path: Path) ->
     box.close()
     assert len(problems) == 1
     assert 'black box' in problems[0]
+    assert box.state.startswith('the last recording failed: ')
 
 
 def test_an_alert_that_comes_and_goes_does_not_fill_the_disk(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def test_what_is_shown_is_what_was_sent(live: Live, console: ConsoleNode, roll: 
         live.until(lambda: console.snapshot() and taken(console) == robot.sent)
         log.append((time.monotonic(), dict(robot.sent)))
         due = max(due + FRAME, time.monotonic())
-        time.sleep(due - time.monotonic())
+        time.sleep(max(due - time.monotonic(), 0.0))
     shown = rows(console)
     for name in INPUTS:
         least, most = really(log, name)

@@ -30,7 +30,7 @@ def test_an_operator_permits_the_hand_to_touch(live: Live) -> None:
     live.until(lambda: 'torque not judged' in driver.verdicts[-1].message, down)
     live.until(
         lambda: (
-            'deg of tilt left' in driver.verdicts[-1].message
+            'deg to tipping: ' in driver.verdicts[-1].message
             and {'hand_may_touch', 'True'}
             <= {x for v in driver.verdicts[-1].values for x in (v.key, v.value)}
         ),

@@ -22,7 +22,7 @@ def test_a_monitor_with_both_inputs_says_ok(live: Live) -> None:
     """Both inputs and a safe posture: the verdict is OK and says what is left."""
     _, driver = live.running()
     live.until(lambda: OK in levels(driver), driver.send)
-    assert 'tilt left' in driver.verdicts[-1].message
+    assert ' to tipping: ' in driver.verdicts[-1].message
 
 
 @pytest.mark.parametrize('present', ['none', 'joints', 'imu'])

@@ -137,16 +137,14 @@ def test_an_alarm_is_acknowledged_then_reset_and_neither_before_its_time(site: S
     """Each step is answered in a line; what cannot be done is refused with the reason."""
     site.pose = STRETCHED
     site.until(lambda: site.driver.verdicts[-1].level[0] == ERROR and site.states('TIP_OVER'))
-    code, out, refusal = site.tell('shelve', 'NO_SUPPORT')
-    assert (code, out) == (1, '')
-    assert refusal.startswith(
-        "refused: shelve: no alert 'NO_SUPPORT' is active or waits; there is "
-    )
     site.pose = FOLDED
     site.until(lambda: site.driver.verdicts[-1].message.startswith('over now'))
-    code, _, refusal = site.tell('reset')
-    assert code == 1
-    assert 'TIP_OVER front (DANGER) is over, not acknowledged: acknowledge first' in refusal
+    code, out, refusal = site.tell('reset')
+    assert (code, out) == (1, '')
+    assert (
+        'refused: reset: TIP_OVER front (DANGER) is over, not acknowledged: acknowledge first'
+        in refusal
+    )
     code, said, _ = site.tell('acknowledge', 'tip_over', '--by', 'Ada', '--note', 'stands well')
     assert code == 0
     assert 'TIP_OVER front (DANGER), over, latched until reset' in said
@@ -207,14 +205,11 @@ def test_a_refusal_is_answered(site: Site, do: str, values: dict[str, str], reas
 
 def test_a_command_that_comes_again_is_done_once(site: Site) -> None:
     """A client that heard no answer sends its command again, under its id: it counts once."""
-    log = session_of(site.monitor).evaluator
-    for kind in ('uneven', 'flat'):
+    for kind in ('uneven', 'flat', 'uneven'):
         site.driver.operate('ground', 'Ada', kind=kind, id=kind)
-        site.until(lambda kind=kind: log.settings.ground.kind == kind)
-    site.driver.operate('ground', 'Ada', kind='uneven', id='uneven')
-    site.driver.operate('ground', 'Ada', kind='stairs', id='last')
-    site.until(lambda: log.settings.ground.kind != 'flat')
-    assert log.settings.ground.kind == 'stairs'
+    site.driver.operate('hand_may_touch', 'Ada', allowed='true')
+    site.until(lambda: site.monitor.get_parameter('hand_may_touch').value)
+    assert site.monitor.get_parameter('ground.kind').value == 'flat'
 
 
 def test_a_console_says_what_the_monitor_answered(site: Site) -> None:
@@ -222,7 +217,7 @@ def test_a_console_says_what_the_monitor_answered(site: Site) -> None:
     with console_of(site) as console:
         site.until(lambda: console.snapshot().known)
         said = served(site, lambda: console.command('ground', {'kind': 'flat', 'by': 'Ada'}))
-        assert said == 'ground is now flat; before: stairs'
+        assert said == 'ground is now flat; before: flat'
         site.pose = STRETCHED
         site.until(lambda: console.snapshot() and len(keys(console, 'TIP_OVER')) == 2)
         asked = {'keys': [*keys(console, 'TIP_OVER'), 'of-another-time'], 'note': 'seen'}
@@ -286,3 +281,22 @@ def test_what_cannot_be_told_is_said_before_anything_is_sent(
     """A wrong word, code, mass or place: what was expected, and what came."""
     with pytest.raises(BadConfig, match=reason):
         values_of(what, typed, **options)
+
+
+def test_tab_completes_what_may_follow() -> None:
+    """The shell is offered the kinds of ground, and the codes of alerts that begin so."""
+    for typed, offered in (
+        ('ground s', ['stairs']),
+        ('reset TIP_O', ['TIP_OVER']),
+    ):
+        asked = {'COMP_WORDS': f'ugv-acceptance tell {typed}', 'COMP_CWORD': '3'}
+        env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+        command = [sys.executable, '-c', f'import sys; sys.argv[0] = "ugv-acceptance"; {CODE}']
+        done = subprocess.run(
+            command,
+            env={**env, **asked, '_UGV_ACCEPTANCE_COMPLETE': 'complete_bash'},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == offered

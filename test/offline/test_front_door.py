@@ -237,7 +237,7 @@ def test_the_example_scripts_run(repository: Path, name: str) -> None:
         [sys.executable, script], cwd=repository, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert 'tipping point to the right' in done.stdout or 'tips to the right' in done.stdout
+    assert re.search('(to|past) tipping: RIGHT', done.stdout)
 
 
 def test_the_page_for_python_is_true(

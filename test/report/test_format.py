@@ -27,7 +27,11 @@ def of_data(quantity: str, unit: str, **bounds: float | None) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ('measured', 'limit', 'worst'),
     [
-        (of_data('coverage', '', least=0.95), 'at least 95.0%', f'joint_states 50.0%, imu {DASH}'),
+        (
+            of_data('coverage', '', least=0.95),
+            'at least 95.0 %',
+            f'joint_states 50.0 %, imu {DASH}',
+        ),
         (of_data('longest_gap', 's', most=0.2), 'at most 0.2 s', f'joint_states 0.5 s, imu {DASH}'),
         (
             of_data('rate', 'Hz', least=90.0, most=110.0),
@@ -46,7 +50,7 @@ def test_what_is_demanded_of_the_data_stands_beside_what_was_measured(
 
 @pytest.mark.parametrize(
     ('messages', 'rate', 'text'),
-    [(1580, 100.0, '21% missing'), (1990, 100.0, ''), (2400, 100.0, ''), (3, None, '')],
+    [(1580, 100.0, '21 % missing'), (1990, 100.0, ''), (2400, 100.0, ''), (3, None, '')],
 )
 def test_messages_that_are_missing_by_their_rate_are_told(
     messages: int, rate: float | None, text: str

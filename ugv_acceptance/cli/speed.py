@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import poses_like
 from ugv_acceptance.cli.options import PayloadMass, RobotFile
 
 if TYPE_CHECKING:
@@ -11,12 +12,17 @@ if TYPE_CHECKING:
     from ugv_acceptance.type_aliases import Floats
 
 
+# Letters of a joint's name, for a table of 80 columns.
+_NAME = 58
+
+
 def speed(
     config: RobotFile = None,
     posture: Annotated[
         str,
         typer.Option(
-            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
+            help='Posture held while each joint turns: joint=30deg,...; by default all postures.',
+            autocompletion=poses_like,
         ),
     ] = '',
     payload: PayloadMass = '',
@@ -43,6 +49,7 @@ def speed(
     import math
 
     import numpy as np
+    from rich.markup import escape
 
     from ugv_acceptance import BadConfig
     from ugv_acceptance.cli.robot_description import (
@@ -50,7 +57,9 @@ def speed(
         payload_from,
         warn,
     )
+    from ugv_acceptance.cli.terminal_output import console_of, say
     from ugv_acceptance.config import load
+    from ugv_acceptance.report.format import short_name
     from ugv_acceptance.studies.validity import critical_value, speed_limit
 
     robot = load(config).settings.robot
@@ -75,13 +84,13 @@ def speed(
         document |= {'speed_m_s': slides} if slides else {}
         typer.echo(json.dumps(document, indent=2))
         return
-    typer.echo(
-        f'{robot.name}, {load_carried.mass:g} kg, '
-        f'error of the static model {reference:g} N m, F < {bound:.4f}'
-    )
-    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
-    for name, limit in zip(robot.joint_names, limits, strict=True):
-        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
+    console = console_of()
+    of_model = f'error of the static model {reference:g} N m, F < {bound:.4f}'
+    say(console, escape(f'{robot.name}, {load_carried.mass:g} kg, {of_model}'))
+    shown = [short_name(name, _NAME) for name in robot.joint_names]
+    wide = max(24, *(len(name) + 1 for name in shown))
+    for name, label, limit in zip(robot.joint_names, shown, limits, strict=True):
+        console.print(escape(f'  {label:{wide}}{_speed(robot, name, limit)}'), soft_wrap=True)
 
 
 def _check(robot: 'Robot') -> None:

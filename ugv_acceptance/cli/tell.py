@@ -118,7 +118,9 @@ def values_of(what: str, words: list[str], length: str = '', at: str = '') -> di
         raise BadConfig(f'tell {what}: expected {names}, got {" ".join(words) or "nothing"}')
     if what == 'payload':
         found = {'mass_kg': repr(quantity(words[0], 'mass', 'tell payload'))}
-        return found | ({'cog_m': _place(at)} if at else {})
+        from ugv_acceptance.console.typed import place_from
+
+        return found | ({'cog_m': ','.join(map(repr, place_from(at, '--at')))} if at else {})
     if what == 'ground':
         return {'kind': _one_of(KINDS, words[0], 'tell ground')}
     if what == 'hand':
@@ -136,13 +138,6 @@ def seconds_of(text: str) -> float:
     if number == text.strip():
         return quantity(text, 'time', '--for')
     return 60.0 * quantity(f'{number} s', 'time', '--for')
-
-
-def _place(text: str) -> str:
-    places = text.split(',')
-    if len(places) != 3:
-        raise BadConfig(f'--at: expected three lengths such as 10cm,0,0, got {text!r}')
-    return ','.join(repr(quantity(place, 'length', '--at')) for place in places)
 
 
 def _one_of(known: tuple[str, ...], word: str, what: str) -> str:

@@ -12,6 +12,7 @@ import typer
 
 from ugv_acceptance import BadConfig, pip_install
 from ugv_acceptance.cli.options import CONTEXT, ros_arguments
+from ugv_acceptance.cli.tell import login_name
 from ugv_acceptance.cli.termination import asked_to_end
 
 if TYPE_CHECKING:
@@ -50,8 +51,12 @@ def watch(
     bag: Recording = None,
     config: RobotFile = None,
     urdf: Urdf = None,
+    by: Annotated[str, typer.Option(help='Who is at the keys; without it, the login name.')] = '',
 ) -> None:
     """Show verdict, alerts and margins in the terminal, in the words of the console. q leaves.
+
+    Of a live robot a acknowledges (all, or the card chosen by its number), s shelves, u unshelves,
+    r resets, p tells the load, g the ground, n your name and a note.
 
     Without a terminal, a line is printed whenever something changes, at most one a second.
 
@@ -73,7 +78,12 @@ def watch(
         else:
             from ugv_acceptance.console.terminal import Terminal
 
-            Terminal(feed, asked).run()
+            Terminal(feed, asked, by or login_name(), plain=not shows_unicode()).run()
+
+
+def shows_unicode() -> bool:
+    """Return whether the terminal takes more than ASCII."""
+    return 'utf' in (sys.stdout.encoding or '').lower()
 
 
 def need(*libraries: str) -> None:

@@ -1,7 +1,7 @@
 """Combines a validated YAML file and a URDF into the settings of an evaluation."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, TypeVar
@@ -23,13 +23,15 @@ from ugv_acceptance.config.schema import JointSection
 from ugv_acceptance.config.units import shown
 from ugv_acceptance.config.unknown import known_of
 from ugv_acceptance.config.untold import untold_of
+from ugv_acceptance.config.urdf import Urdf
 from ugv_acceptance.config.wheels import on_axles
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.inputs.frames import same_frame, without_prefix
+from ugv_acceptance.evaluation.margin_words import percent_words
 from ugv_acceptance.evaluation.permitted_limits import refused, relaxed
 from ugv_acceptance.evaluation.settings import Delays, JointInput, Limits, Settings
 from ugv_acceptance.model.clearance import arm_links
-from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Payload, Robot
+from ugv_acceptance.model.robot import Contact, Joint, Law, Link, Payload, Robot, Shape
 
 __all__ = ['Build', 'assumed_numbers', 'checked', 'sentence_of', 'settings_from']
 T = TypeVar('T')
@@ -111,13 +113,13 @@ def _check_ranges(build: Build, settings: Settings) -> None:
     if error > 1.0:
         build.warn(
             ('limits', 'torque_error'),
-            f'a joint counts as within its limit up to {error:.0%} of it',
+            f'a joint counts as within its limit up to {percent_words(error)} of it',
         )
     if tip <= 0.0:
         build.warn(
             ('limits', 'tip_error'),
             'a robot counts as standing until it is '
-            + (f'{-tip:g} degrees past its tipping point' if tip else 'past its tipping point'),
+            + (f'{-tip:g} deg past tipping' if tip else 'past tipping'),
         )
 
 
@@ -234,7 +236,16 @@ def _robot(build: Build, sections: dict[str, JointSection]) -> Robot:
     joints = [robot.joint(name) for name in measured]
     robot = replace(robot, poses=tuple(poses_from(file.poses, joints, build.refuse)))
     arm = arm_links(robot)
-    return replace(robot, shapes=tuple(s for s in build.urdf.shapes if s.link in arm))
+    shapes = tuple(s for s in build.urdf.shapes if s.link in arm)
+    return replace(robot, shapes=shapes, drawn=tuple(_drawn(build.urdf, shapes)))
+
+
+def _drawn(urdf: Urdf, taken: Sequence[Shape]) -> Iterator[Shape]:
+    """Yield what only pictures need: what was not taken, or else how a link is to look."""
+    read = [shape for shape in urdf.shapes if shape.size is not None]
+    solid = {shape.link for shape in read}
+    yield from (shape for shape in read if shape not in taken)
+    yield from (s for s in urdf.visuals if s.size is not None and s.link not in solid)
 
 
 def _laws(build: Build, sections: dict[str, JointSection]) -> Iterable[Law]:

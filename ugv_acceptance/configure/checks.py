@@ -18,6 +18,7 @@ from ugv_acceptance.configure.outlines import FAR, away_from, outlines_of, reach
 from ugv_acceptance.configure.questions import Question
 from ugv_acceptance.configure.sources import MeshFinder
 from ugv_acceptance.evaluation.inputs.frames import place_of
+from ugv_acceptance.evaluation.margin_words import tipping_words
 from ugv_acceptance.evaluation.settings import AUTO, UNKNOWN, Settings
 from ugv_acceptance.model.mechanics import mechanics_of, posture_once
 from ugv_acceptance.model.robot import ZERO, Matrix, Robot, Vector
@@ -143,8 +144,7 @@ def _balance(robot: Robot, posture: Mapping[str, float]) -> str:
         return f'{len(robot.contacts)} points'
     known = [(float(a), side) for a, side in zip(margins.angle, SIDES, strict=True)]
     least, side = min((a, side) for a, side in known if math.isfinite(a))
-    degrees = math.degrees(least)
-    return f'{len(robot.contacts)} points; level, {degrees:.1f} deg of tilt left to the {side}'
+    return f'{len(robot.contacts)} points; level, {tipping_words(side, least)}'
 
 
 def _told(settings: Settings, evidence: Evidence | None) -> Check:

@@ -5,8 +5,9 @@ person acknowledges as one; two sides, or two joints, are never one.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from ugv_acceptance.console.snapshot import AlertRow, Snapshot
@@ -71,7 +72,7 @@ CAUSES = {
 OFFERS = ('acknowledge', 'shelve', 'unshelve', 'reset')
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Group:
     """The alerts of one cause that are active, or those that are over, the most urgent first."""
 
@@ -112,7 +113,9 @@ def cause_of(row: AlertRow) -> tuple[str, str]:
     return kind, row.subject
 
 
-def groups_of(rows: Iterable[AlertRow]) -> tuple[Group, ...]:
+# Most frames have the alerts of the one before.
+@lru_cache(maxsize=4)
+def groups_of(rows: tuple[AlertRow, ...]) -> tuple[Group, ...]:
     """Return alerts by cause, active and over apart: active, severe, unseen and new first.
 
     What is over and asks nobody for anything is left out while its cause is there again.
@@ -139,10 +142,20 @@ def title_of(group: Group) -> str:
 
 def card_of(group: Group, snapshot: Snapshot, settings: Settings, advice: str | None) -> Plain:
     """Return a group as a card of the frame; `advice` replaces that of the alert."""
+    card = _lasting(group).copy()
+    card['worst'] = worst_words(group.rows, snapshot, settings)
+    card['age_s'] = round((snapshot.time - min(row.start for row in group.rows)) / 1e9, 1)
+    if advice is not None:
+        card['advice'] = advice
+    return card
+
+
+@lru_cache(maxsize=64)
+def _lasting(group: Group) -> Plain:
+    """Return what of a card does not change with time."""
     first, called = group.first, group.called
-    over = '' if group.active else '-over'
     return {
-        'key': f'{group.kind}-{group.subject}{over}',
+        'key': f'{group.kind}-{group.subject}{"" if group.active else "-over"}',
         'keys': [row.key for row in group.rows],
         'code': first.code,
         'subject': first.subject,
@@ -150,10 +163,8 @@ def card_of(group: Group, snapshot: Snapshot, settings: Settings, advice: str | 
         'word': level_words(first.level),
         'title': title_of(group),
         'text': first.text,
-        'advice': first.advice if advice is None else advice,
-        'worst': worst_words(group.rows, snapshot, settings),
+        'advice': first.advice,
         'state': called.state,
-        'age_s': round((snapshot.time - min(row.start for row in group.rows)) / 1e9, 1),
         'active': group.active,
         'unseen': called.unseen,
         'offers': offers_of(group.rows),
@@ -183,12 +194,11 @@ def parts_of(rows: Sequence[AlertRow]) -> list[str]:
 
 def worst_words(rows: Sequence[AlertRow], snapshot: Snapshot, settings: Settings) -> str:
     """Return the worst value of a card's alerts beside its time: "35 deg past at 28.1 s"."""
-    sizes = {'TIP_OVER': _tilt_words, 'TORQUE_LIMIT': _share_words}
-    known = [row for row in rows if row.code in sizes and not math.isnan(row.peak)]
+    known = [row for row in rows if row.code in _SIZES and not math.isnan(row.peak)]
     if not known:
         return ''
     row = max(known, key=lambda row: row.peak)
-    words = sizes[row.code](row, settings)
+    words = _SIZES[row.code](row, settings)
     return f'{words} {_when(row.worst, snapshot)}'.rstrip() if words else ''
 
 
@@ -203,6 +213,9 @@ def _share_words(row: AlertRow, settings: Settings) -> str:
         return ''
     share = row.peak / settings.limits.torque[names.index(row.subject)]
     return share_words(share) if share > 0.0 else ''
+
+
+_SIZES = {'TIP_OVER': _tilt_words, 'TORQUE_LIMIT': _share_words}
 
 
 def _when(at: int | None, snapshot: Snapshot) -> str:

@@ -8,11 +8,12 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 from ugv_acceptance.console.alert_cards import card_of, name_words
-from ugv_acceptance.console.headline import Headline, View, headline_of, view_of
-from ugv_acceptance.console.snapshot import AlertRow, InputRow, Snapshot
+from ugv_acceptance.console.headline import View, headline_of, view_of
+from ugv_acceptance.console.snapshot import InputRow, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as STAND_CLEAR_ADVICE
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, OK, WARN
@@ -22,8 +23,10 @@ from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.margin_words import share_words, tenths_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import roll_pitch
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Vector
+from ugv_acceptance.model.solids import moving_bodies, solids_of
 from ugv_acceptance.model.stability import SIDES, STATES
+from ugv_acceptance.model.tree import tree_of
 from ugv_acceptance.monitoring.drawing import Figure, Skeleton, plumb_of, skeleton_of
 
 # What stands where a margin is not known.
@@ -52,15 +55,31 @@ def describe_robot(settings: Settings) -> Plain:
             }
             for name, limit in zip(robot.joint_names, limits.torque, strict=True)
         ],
+        'solids': _solids(settings),
     }
+
+
+def _solids(settings: Settings) -> list[Plain]:
+    """Return the shapes to draw: `place` is a number in a posture's `places`, null on the base."""
+    tree, solids = tree_of(settings.robot), solids_of(settings.robot)
+    bodies = moving_bodies(solids)
+    return [
+        {
+            'joint': tree.bodies[solid.body].joint,
+            'place': bodies.index(solid.body) if solid.body else None,
+            'radius_m': solid.radius,
+            'points': [_point(point) for point in solid.points],
+        }
+        for solid in solids
+    ]
 
 
 def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
     """Return the frame of a snapshot; `figure` is the drawing of the settings' robot."""
     view = view_of(snapshot, settings)
-    headline = headline_of(snapshot, settings, view)
+    headline = headline_of(view)
     seconds, seconds_to = _countdown(snapshot, view)
-    active, past = cards_of(view, snapshot, settings)
+    active, past = cards_of(view)
     torque, worst = _torque(snapshot, settings, dead=view.dead)
     return {
         'time_s': snapshot.time / 1e9,
@@ -81,7 +100,7 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
         'q': numbers(snapshot.q),
         'posture': _posture(snapshot, figure),
         'attitude': _attitude(snapshot),
-        'tilt': _tilt(snapshot, settings, dead=view.dead),
+        'tilt': _tilt(snapshot, settings, dead=view.dead or not settings.judges_tilt),
         'state': STATES[snapshot.state],
         'ground': {
             'words': snapshot.ground,
@@ -95,24 +114,12 @@ def frame_of(snapshot: Snapshot, settings: Settings, figure: Figure) -> Plain:
             'mass_kg': snapshot.payload.mass,
             'cog_m': list(snapshot.payload.cog),
         },
-        **_former(snapshot, headline, view),
-    }
-
-
-def _former(snapshot: Snapshot, headline: Headline, view: View) -> Plain:
-    """Return the fields of the header before there were headline and cards."""
-    do = f'{headline.action.lower()} {headline.detail}'.strip()
-    return {
-        'cause': headline.cause or headline.what.lower(),
-        'advice': do,
-        'left': '' if view.dead else '; '.join(headline.notes),
-        'alerts': [_alert(row, snapshot.time) for group in view.groups for row in group.rows],
     }
 
 
 def number(value: float) -> float | None:
     """Return a number rounded to six decimals; None where it is not finite."""
-    return round(float(value), 6) if math.isfinite(value) else None
+    return round(value, 6) if math.isfinite(value) else None
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:
@@ -120,7 +127,7 @@ def numbers(values: Iterable[float]) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[Plain], list[Plain]]:
+def cards_of(view: View) -> tuple[list[Plain], list[Plain]]:
     """Return the cards of what is active, and of what is over.
 
     What is over, and what was advised by numbers that are dead, gives no advice.
@@ -128,7 +135,8 @@ def cards_of(view: View, snapshot: Snapshot, settings: Settings) -> tuple[list[P
     fallen = None if view.fallen is None else STAND_CLEAR_ADVICE
     now = '' if view.dead else fallen
     cards = [
-        card_of(group, snapshot, settings, now if group.active else '') for group in view.groups
+        card_of(group, view.snapshot, view.settings, now if group.active else '')
+        for group in view.groups
     ]
     return [card for card in cards if card['active']], [c for c in cards if not c['active']]
 
@@ -178,24 +186,6 @@ def _countdown(snapshot: Snapshot, view: View) -> tuple[float | None, str]:
     return round(soon.seconds, 1), f'tipping {name.upper()}' if soon.tips else f'{name} limit'
 
 
-def _alert(row: AlertRow, now: int) -> Plain:
-    return {
-        'key': row.key,
-        'code': row.code,
-        'subject': row.subject,
-        'level': LEVELS[row.level],
-        'word': level_words(row.level),
-        'state': row.state,
-        'active': row.end is None,
-        'unseen': row.unseen,
-        'text': row.text,
-        'advice': row.advice,
-        'age_s': round((now - row.start) / 1e9, 1),
-        'offers': list(row.offers),
-        'note': row.note,
-    }
-
-
 def _posture(snapshot: Snapshot, figure: Figure) -> Plain | None:
     drawn = _drawn(figure, snapshot.q, snapshot.payload)
     if drawn is None:
@@ -213,15 +203,28 @@ def _drawn(figure: Figure, q: tuple[float, ...], payload: Payload) -> tuple[Skel
         return None
     return skeleton, {
         'limbs': [
-            {'joint': limb.joint, 'from': _point(limb.start), 'to': _point(limb.end)}
+            {
+                'joint': limb.joint,
+                'from': _point(limb.start),
+                'to': _point(limb.end),
+                'bare': not figure.shape_of(limb.joint),
+            }
             for limb in skeleton.limbs
         ],
-        'body': [_point(corner) for corner in skeleton.body],
-        'contacts': [_point(contact) for contact in skeleton.contacts],
-        'polygon': [_point(corner) for corner in skeleton.polygon],
+        'body': _points(skeleton.body),
+        'contacts': _points(skeleton.contacts),
+        'polygon': _points(skeleton.polygon),
         'cog': _point(skeleton.cog),
         'load': None if skeleton.load is None else _point(skeleton.load),
+        # Rotation by rows, then origin.
+        'places': [[*chain(*map(_point, turn)), *_point(at)] for turn, at in skeleton.places],
     }
+
+
+# The base and what it stands on keep their places while the arm moves.
+@lru_cache(maxsize=16)
+def _points(found: tuple[Vector, ...]) -> list[list[float]]:
+    return [_point(p) for p in found]
 
 
 def _point(p: Sequence[float]) -> list[float]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from ugv_acceptance.console.alert_cards import TIPPING, Group, groups_of, name_words
 from ugv_acceptance.console.headline_words import blinds, for_integrator, order_of, what_of
-from ugv_acceptance.console.snapshot import Snapshot
+from ugv_acceptance.console.snapshot import AlertRow, Snapshot
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR as TIPPED_ADVICE
 from ugv_acceptance.evaluation.advice.tipped import TIPPED, has_tipped
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE
@@ -27,6 +27,8 @@ from ugv_acceptance.model.stability import STATES
 UNKNOWN = 'margins are not known'
 UNTOLD = 'the monitor has not told this console why'
 DO_NOT = 'do not move on these numbers'
+IN_DOUBT = 'what is known now is in doubt'
+DOUBTFUL = 'the margins are not to be trusted'
 COMPLETE, ANSWER = 'COMPLETE THE CONFIGURATION', 'then start the monitor again'
 # What is said of a robot that has tipped.
 TIPPED_WHAT = 'IT HAS TIPPED'
@@ -68,46 +70,70 @@ class Headline:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is decided before anything is worded: the level shown, and what stands behind it.
+    """What is decided on a snapshot before anything is worded.
 
-    `open`: only what the configuration leaves unknown keeps the level from OK. `dead`: nothing that
-    is shown may be taken for the present. `doubted`: the IMU contradicts itself or gravity.
-    `fallen` is the side it has tipped to (None: it has not).
+    `level` is the one shown. `open`: only what the configuration leaves unknown keeps it from OK.
+    `dead`: nothing that is shown may be taken for the present. `doubted`: the IMU contradicts
+    itself or gravity. `fallen` is the side it has tipped to (None: it has not). `groups` are the
+    alerts by cause, and `active` those of them that are there now, each most urgent first; `least`
+    is the side of the least tilt left, and how much (rad), as of `least_tilt`.
     """
 
+    snapshot: Snapshot
+    settings: Settings
     level: int
     open: bool
     dead: bool
     doubted: bool
     fallen: str | None
     groups: tuple[Group, ...]
+    active: tuple[Group, ...]
+    least: tuple[str, float]
 
 
 def view_of(snapshot: Snapshot, settings: Settings) -> View:
-    """Return what of a snapshot is to be shown."""
-    groups = groups_of(snapshot.alerts)
-    active = [group.first for group in groups if group.active]
-    level = snapshot.level if snapshot.known else max(snapshot.level, STALE)
-    lost = any(row.level == STALE for row in active)
-    unanswered = bool(settings.unknown) and snapshot.known and level != ERROR and not lost
-    dead = level == STALE and not unanswered
-    if unanswered:
-        level = STALE
-    elif not dead and snapshot.known and has_tipped(snapshot.angle):
-        # The alert comes a moment later.
-        level = max(level, ERROR)
-    doubted = any(row.level == ERROR and row.code.startswith('IMU_') for row in active)
-    return View(level, unanswered, dead, doubted, fallen_to(snapshot), groups)
+    """Return what of a snapshot is to be shown.
 
-
-def fallen_to(snapshot: Snapshot) -> str | None:
-    """Return the side to which the robot has tipped; None if it has not.
-
-    It is said while the numbers say so, while the alert of it waits for a person, and while there
-    are no numbers and the last said so.
+    The level is the monitor's verdict, but never better than a danger that is active, or than the
+    numbers of a robot that has tipped: their alerts come a moment before the verdict, or after.
     """
-    if snapshot.known and has_tipped(snapshot.angle):
-        return least_tilt(snapshot.angle)[0]
+    groups = groups_of(snapshot.alerts)
+    active = tuple(group for group in groups if group.active)
+    worst = max([group.first.level for group in active], default=OK)
+    # Nobody measures how a robot without an IMU leans.
+    judged = snapshot.known and settings.judges_tilt
+    tipped = judged and has_tipped(snapshot.angle)
+    level = max(snapshot.level, ERROR if tipped else OK, worst if worst >= ERROR else OK)
+    level = level if snapshot.known else STALE
+    asked = bool(settings.unknown) and snapshot.known and ERROR not in {level, worst}
+    unanswered = asked and worst != STALE
+    dead = level == STALE and not unanswered
+    doubted = any(_contradicts(group.first) for group in active)
+    least = least_tilt(snapshot.angle) if settings.judges_tilt else ('', math.nan)
+    return View(
+        snapshot,
+        settings,
+        STALE if unanswered else level,
+        unanswered,
+        dead,
+        doubted,
+        least[0] if tipped else _fell_to(snapshot),
+        groups,
+        active,
+        least,
+    )
+
+
+def _contradicts(row: AlertRow) -> bool:
+    return row.level == ERROR and row.code.startswith('IMU_')
+
+
+def _fell_to(snapshot: Snapshot) -> str | None:
+    """Return the side to which a robot has tipped before; None if it has not.
+
+    It is said while the alert of it waits for a person, and while there are no numbers and the last
+    said so.
+    """
     for row in snapshot.alerts:
         if row.code == 'TIP_OVER' and row.level == ERROR and row.peak >= TIPPED:
             return row.subject
@@ -117,74 +143,72 @@ def fallen_to(snapshot: Snapshot) -> str | None:
     return None
 
 
-def headline_of(snapshot: Snapshot, settings: Settings, view: View | None = None) -> Headline:
-    """Return the headline of a snapshot."""
-    view = view or view_of(snapshot, settings)
-    active = [group for group in view.groups if group.active]
+def headline_of(view: View) -> Headline:
+    """Return the headline of what is to be shown."""
     # A tip-over drawn from an IMU that is contradicted may be none.
     if view.fallen is not None and (view.dead or not view.doubted):
-        return _fallen(active, snapshot, settings, view)
+        return _fallen(view, view.fallen)
     if view.dead:
-        return _no_data(active, snapshot, settings)
-    if active:
-        return _alert(active, snapshot, settings, view)
+        return _no_data(view)
+    if view.active:
+        return _alert(view)
     if view.level != OK:
-        return _waiting(snapshot, settings, view)
-    return _kept(snapshot, settings)
+        return _waiting(view)
+    return _kept(view)
 
 
-def _fallen(
-    active: Sequence[Group], snapshot: Snapshot, settings: Settings, view: View
-) -> Headline:
-    others = [group for group in active if group.kind != TIPPING]
-    notes, cause, detail = (), '', TIPPED_DETAIL
+def _fallen(view: View, side: str) -> Headline:
+    notes: tuple[str, ...] = ()
     if view.dead:
-        notes, cause = (_last_words(snapshot, settings),), _why(active, snapshot)
-    elif not has_tipped(snapshot.angle):
+        notes = (_last_words(view),)
+    elif not has_tipped(view.snapshot.angle):
         notes = (STANDS,)
-    what = f'{TIPPED_WHAT} {(view.fallen or "").upper()}'.rstrip()
-    return Headline(what, '', STAND_CLEAR, detail, cause, notes, len(others))
+    what = f'{TIPPED_WHAT} {side.upper()}'.rstrip()
+    cause = _why(view) if view.dead else ''
+    others = [group for group in view.active if group.kind != TIPPING]
+    return Headline(what, '', STAND_CLEAR, TIPPED_DETAIL, cause, notes, len(others))
 
 
-def _no_data(active: Sequence[Group], snapshot: Snapshot, settings: Settings) -> Headline:
-    told = not snapshot.problem and any(blinds(group.first) for group in active)
-    notes, cause = (_last_words(snapshot, settings),), _why(active, snapshot)
+def _no_data(view: View) -> Headline:
+    active = view.active
+    told = not view.snapshot.problem and any(blinds(group.first) for group in active)
+    notes, cause = (_last_words(view),), _why(view)
     return Headline('NO DATA', '', 'STOP', DO_NOT, cause, notes, len(active) - told)
 
 
-def _why(active: Sequence[Group], snapshot: Snapshot) -> str:
+def _why(view: View) -> str:
     """Return why there are no data, for the integrator: what is silent, and what to check.
 
     No alert that was raised by margins says why there are none.
     """
-    blind = [group.first for group in active if blinds(group.first)]
-    if snapshot.problem or not blind:
-        return snapshot.problem or UNKNOWN
+    problem, blind = view.snapshot.problem, [g.first for g in view.active if blinds(g.first)]
+    if problem or not blind:
+        return problem or UNKNOWN
     return ': '.join(words for words in (blind[0].text, blind[0].advice) if words)
 
 
-def _alert(active: Sequence[Group], snapshot: Snapshot, settings: Settings, view: View) -> Headline:
-    row = active[0].first
-    what, number = what_of(row, snapshot, settings)
+def _alert(view: View) -> Headline:
+    row = view.active[0].first
+    what, number = what_of(row, view.snapshot, view.settings)
     action, detail = order_of(row.advice)
-    notes = _notes(snapshot, settings)
-    if for_integrator(row):
-        action, detail = ('STOP', DO_NOT) if row.level >= ERROR else (TELL, row.advice)
-        if row.level >= ERROR:
-            told = f'for the integrator: {row.advice}' if row.advice else ''
-            notes = tuple(note for note in ('the margins are not to be trusted', told) if note)
+    notes = _notes(view, told=row.subject if number else '')
+    if for_integrator(row) and row.level < ERROR:
+        action, detail = TELL, row.advice
+    elif for_integrator(row):
+        action, detail = 'STOP', DO_NOT
+        notes = (DOUBTFUL, f'for the integrator: {row.advice}')
     if view.fallen is not None:
         action, detail = STAND_CLEAR, LOOK.format(side=view.fallen.upper())
     if view.open:
-        notes = (*notes, unknown_words(settings))
-    return Headline(what, number, action, detail, row.text, notes, len(active) - 1)
+        notes = (*notes, unknown_words(view.settings))
+    return Headline(what, number, action, detail, row.text, notes, len(view.active) - 1)
 
 
-def _waiting(snapshot: Snapshot, settings: Settings, view: View) -> Headline:
+def _waiting(view: View) -> Headline:
     """Return the headline where nothing is wrong now, but a person has to act before it is OK."""
-    notes = _notes(snapshot, settings)
+    notes = _notes(view)
     if view.open:
-        words = unknown_words(settings)
+        words = unknown_words(view.settings)
         return Headline('NOT ALL IS CHECKED', '', COMPLETE, ANSWER, words, notes)
     if not view.groups:
         return Headline('NOT ALL IS WELL', cause=UNTOLD, notes=notes)
@@ -196,28 +220,31 @@ def _waiting(snapshot: Snapshot, settings: Settings, view: View) -> Headline:
     return Headline('OVER, NOT ACKNOWLEDGED', '', 'ACKNOWLEDGE IT', '', cause, notes)
 
 
-def _kept(snapshot: Snapshot, settings: Settings) -> Headline:
-    """Return the headline where nothing is wrong: what is kept, and the least tilt left."""
-    side, angle = least_tilt(snapshot.angle)
+def _kept(view: View) -> Headline:
+    """Return the headline where nothing is wrong: what is kept, and the least margin."""
+    snapshot, settings, (side, angle) = view.snapshot, view.settings, view.least
     kept = kept_words(settings, rough=snapshot.rough)
-    share = most_used(snapshot.torque, settings)[1] if snapshot.torque else math.nan
-    number, cause = degrees_words(angle) if side else share_words(share), ''
-    number = '' if number == '-' else number
+    words = degrees_words(angle) if side else share_words(_most(snapshot.torque, settings)[1])
+    number = '' if words == '-' else words
     what, _, rest = kept.upper().partition(', ')
+    notes = _notes(view)
     if snapshot.rough and settings.judges_tilt:
-        what, cause, number = 'NOT BEGUN TO TIP', kept, f'<= {number}' if number else ''
-    elif rest:
-        cause = kept
-    return Headline(what, number, '', '', cause, _notes(snapshot, settings))
+        return Headline('NOT BEGUN TO TIP', number and f'<= {number}', cause=kept, notes=notes)
+    return Headline(what, number, cause=kept if rest else '', notes=notes)
 
 
-def _notes(snapshot: Snapshot, settings: Settings) -> tuple[str, ...]:
-    return (margins_words(snapshot, settings), *snapshot.hints)
+def _notes(view: View, told: str = '') -> tuple[str, ...]:
+    words = margins_words(view, told)
+    return (words, *view.snapshot.hints) if words else view.snapshot.hints
 
 
-def margins_words(snapshot: Snapshot, settings: Settings) -> str:
-    """Return the smallest margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %"."""
-    side, angle = least_tilt(snapshot.angle)
+def margins_words(view: View, told: str = '') -> str:
+    """Return the smallest margins in a few words: "6 deg to tipping: RIGHT, shoulder 43 %".
+
+    Without that of a side or joint that was `told` already.
+    """
+    snapshot, settings, (side, angle) = view.snapshot, view.settings, view.least
+    joint, share = _most(snapshot.torque, settings)
     if side:
         tilt = _bound_words(side, angle, snapshot.cautious, rough=snapshot.rough)
         tilt += f' ({CARRIED})' * (snapshot.carried and not snapshot.rough)
@@ -225,7 +252,11 @@ def margins_words(snapshot: Snapshot, settings: Settings) -> str:
         tilt = tilt_not_checked(settings)
     else:
         tilt = f'no tilt margin ({STATES[snapshot.state].replace("_", " ")})'
-    return _with_joint(tilt, snapshot.torque, settings)
+    used = _joint_words(joint, share)
+    # Nobody reads the same number three times.
+    if told and told in {side, joint}:
+        return tilt if told == joint else used
+    return f'{tilt}, {used}' if used else tilt
 
 
 def _bound_words(side: str, angle: float, cautious: float = math.nan, *, rough: bool) -> str:
@@ -237,19 +268,21 @@ def _bound_words(side: str, angle: float, cautious: float = math.nan, *, rough: 
     return f'at most {words} (upper bound{careful})'
 
 
-def _with_joint(tilt: str, torque: Sequence[float], settings: Settings) -> str:
-    joint, share = most_used(torque, settings) if torque else ('', math.nan)
-    return f'{tilt}, {name_words(joint)} {share_words(share)}' if joint else tilt
+def _most(torque: Sequence[float], settings: Settings) -> tuple[str, float]:
+    return most_used(torque, settings) if torque else ('', math.nan)
 
 
-def _last_words(snapshot: Snapshot, settings: Settings) -> str:
+def _joint_words(joint: str, share: float) -> str:
+    return f'{name_words(joint)} {share_words(share)}' if joint else ''
+
+
+def _last_words(view: View) -> str:
     """Return what was known last, and how long ago."""
-    last = snapshot.last
-    if last is None and snapshot.known:
-        return 'what is known now is in doubt'
+    snapshot, last = view.snapshot, view.snapshot.last
     if last is None:
-        return 'nothing was known before'
+        return IN_DOUBT if snapshot.known else 'nothing was known before'
     side, angle = least_tilt(last.angle)
     tilt = _bound_words(side, angle, rough=last.rough) if side else 'no tilt margin'
     ago = max(snapshot.time - last.time, 0) / 1e9
-    return f'last known {ago:.1f} s ago: {_with_joint(tilt, last.torque, settings)}'
+    used = _joint_words(*_most(last.torque, view.settings))
+    return f'last known {ago:.1f} s ago: {tilt}, {used}'.removesuffix(', ')

@@ -120,10 +120,10 @@ class ShownRecording:
             told = replace(told, level=max([*active, STALE]), last=self._last(k))
             return replace(told, **self._ground(k, when, payload, known=False))
         if has_tipped(track.angle[k]):
-            rows = (replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
-            told = replace(told, alerts=tuple(rows))
+            alerts = tuple(replace(a, advice=a.advice if a.end else STAND_CLEAR) for a in alerts)
         return replace(
             told,
+            alerts=alerts,
             level=max([*active, OK]),
             known=True,
             gravity=_numbers(track.gravity[k]),

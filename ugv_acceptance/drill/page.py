@@ -9,7 +9,8 @@ from ugv_acceptance import AcceptanceError
 from ugv_acceptance.bag.atomic_files import write_json
 from ugv_acceptance.console.hub import Hub
 from ugv_acceptance.console.server import serve
-from ugv_acceptance.console.snapshot import Feed, Snapshot
+from ugv_acceptance.console.snapshot import Snapshot
+from ugv_acceptance.drill.feed import DrillFeed
 from ugv_acceptance.drill.outcome import Drill
 from ugv_acceptance.drill.record import record_json
 from ugv_acceptance.evaluation.settings import Settings
@@ -17,7 +18,7 @@ from ugv_acceptance.type_aliases import Json
 
 
 def serve_drill(  # noqa: PLR0913 - as `serve`
-    feed: Feed,
+    feed: DrillFeed,
     drill: Callable[[], Drill],
     out: Path | None = None,
     *,
@@ -29,8 +30,9 @@ def serve_drill(  # noqa: PLR0913 - as `serve`
 ) -> None:
     """Serve a drill on the console's page until SIGINT, SIGTERM or `asked`.
 
-    `drill` returns what came of it so far; it is written to `out` whenever a situation has been
-    judged, so that a drill which is interrupted leaves what was done. The rest is as in `serve`.
+    The first situation begins when the page is first opened. `drill` returns what came of it so
+    far; it is written to `out` whenever a situation has been judged, so that a drill which is
+    interrupted leaves what was done. The rest is as in `serve`.
     """
     serve(Hub(Recorded(feed, drill, out)), host, port, token, ready, asked)
 
@@ -39,22 +41,29 @@ def serve_drill(  # noqa: PLR0913 - as `serve`
 class Recorded:
     """A drill's feed that adds the `record` to its last frames, and says where it is `written`."""
 
-    feed: Feed
+    feed: DrillFeed
     drill: Callable[[], Drill]
     out: Path | None = None
     settings: Settings = field(init=False)
+    _first: Snapshot | None = None
     _record: Json | None = None
     _written: str = ''
 
     def __post_init__(self) -> None:
         self.settings = self.feed.settings
+        self._first = self.feed.snapshot()
 
     def describe(self) -> dict[str, Any]:
-        """Return the description of the drill's feed."""
+        """Return the description of the drill's feed; the drill begins with the first one."""
+        if self._first is not None:
+            self._first = None
+            self.feed.restart()
         return self.feed.describe()
 
     def snapshot(self) -> Snapshot:
         """Return the robot as it is now; keep the record of what was judged meanwhile."""
+        if self._first is not None:
+            return self._first
         snapshot = self.feed.snapshot()
         self._keep()
         return snapshot

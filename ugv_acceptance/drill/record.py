@@ -39,7 +39,7 @@ def record_json(drill: Drill) -> Json:
     record: Json = {
         'kind': KIND,
         'version': RECORD_VERSION,
-        'operator': drill.operator,
+        'operator': _one_line(drill.operator),
         'started': drill.started,
         'minutes': drill.minutes,
         'robot': {'name': drill.robot, 'sha256': drill.configuration_sha256},
@@ -49,6 +49,11 @@ def record_json(drill: Drill) -> Json:
         **_sums(situations),
     }
     return {**record, 'sha256': content_sha256(record)}
+
+
+def _one_line(name: str) -> str:
+    """Return a name as a line that can be printed and read again."""
+    return ''.join(x if x.isprintable() else '?' for x in name).strip() or '?'
 
 
 def _situation(outcome: Outcome) -> Json:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.margin_words import degrees_words, tipping_words
 from ugv_acceptance.type_aliases import Times
 
 FLAT, UNEVEN, STAIRS = 'flat', 'uneven', 'stairs'
@@ -99,7 +100,6 @@ def bound_words(side: str, angle: float, cautious: float) -> str:
 
     `angle` and `cautious` in rad; NaN: not known.
     """
-    most = f'at most {math.degrees(angle):.1f} deg of tilt left ({side}, {UPPER_BOUND})'
-    if math.isnan(cautious):
-        return most
-    return f'{most}, {math.degrees(cautious):.1f} deg taken cautiously'
+    bound = 'at most' if angle >= 0.0 else 'at least'
+    words = f'{bound} {tipping_words(side, angle)} ({UPPER_BOUND})'
+    return words if math.isnan(cautious) else f'{words}, {degrees_words(cautious)} taken cautiously'

@@ -7,6 +7,7 @@ from typing import SupportsFloat
 
 import numpy as np
 
+from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.type_aliases import Floats, Json, Times
@@ -73,5 +74,5 @@ def most_used(torque: Iterable[SupportsFloat], settings: Settings) -> tuple[str,
 def with_most_used(tilt: str, torque: Iterable[SupportsFloat], settings: Settings) -> str:
     """Return words on the tilt left, and behind them the joint that uses most of its limit."""
     joint, use = most_used(torque, settings)
-    used = f'{joint} at {use:.0%} of its limit' if joint else ''
+    used = f'{joint} {share_words(use)} of its limit' if joint else ''
     return ', '.join(words for words in (tilt, used) if words)

@@ -72,11 +72,11 @@ class Permitted:
 # Part, key, unit, least, most, floor, ceiling, what. One end of a range is where a rule would never
 # raise an alert (or, for a deadband, never end one); the other end excludes mistakes.
 _LIVE = (
-    ('limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for WARN'),
-    ('limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for ERROR'),
+    ('limits', 'torque_warn', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for CAUTION'),
+    ('limits', 'torque_error', '', 0.01, 1.0, 0.01, 10.0, 'share of the limit for DANGER'),
     ('limits', 'torque_deadband', 'nm', 0.0, 1e3, 0.0, 1e6, 'torque below it that clears, N m'),
-    ('limits', 'tip_warn', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for WARN, deg'),
-    ('limits', 'tip_error', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for ERROR, deg'),
+    ('limits', 'tip_warn', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for CAUTION, deg'),
+    ('limits', 'tip_error', 'deg', 0.0, 90.0, -90.0, 90.0, 'tilt left for DANGER, deg'),
     ('limits', 'tip_deadband', 'deg', 0.0, 10.0, 0.0, 90.0, 'tilt above it that clears, deg'),
     ('delays', 'tip_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a tip-over alert, s'),
     ('delays', 'torque_on', 's', 0.0, 5.0, 0.0, 60.0, 'how long before a torque alert, s'),

@@ -249,7 +249,7 @@ def alert_result(
         'end_s': None if alert.end is None else (alert.end - start) / 1e9,
         'peak': _peak(alert),
         'worst_s': _worst_s(alert, start),
-        'message': describe(alert, settings),
+        'message': describe(alert, settings, start),
         'advice': told or advice(rule.code, settings.robot),
         'advice_computed': told is not None,
     }

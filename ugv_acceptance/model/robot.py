@@ -1,7 +1,7 @@
 """A robot as data: links, joints and contact points of a URDF tree, and what it carries."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -155,7 +155,8 @@ class Robot:
     `held` pairs with their name, else at 0. `laws` are of joints among them.
     `ground` (m) is the height of the tracks' ground plane in `base_link`, `contact_tolerance` (m)
     how far from it a point still stands on the ground. `shapes` is the collision geometry of what
-    is held above the ground (clearance.py). `poses` are postures that people call by a name.
+    is held above the ground (clearance.py), `drawn` that of all else, which only pictures need.
+    `poses` are postures that people call by a name.
     """
 
     name: str
@@ -173,6 +174,7 @@ class Robot:
     laws: tuple[Law, ...] = ()
     shapes: tuple[Shape, ...] = ()
     poses: tuple[Pose, ...] = ()
+    drawn: tuple[Shape, ...] = field(default=(), compare=False)  # no margin hangs on it
 
     @property
     def root(self) -> str:

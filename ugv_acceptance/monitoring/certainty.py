@@ -13,6 +13,7 @@ import numpy as np
 from ugv_acceptance.evaluation.criteria.criteria import RSS
 from ugv_acceptance.evaluation.criteria.uncertainty import Source, combined, effects_of
 from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.margin_words import degrees_words, excess_words, tipping_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES
@@ -81,9 +82,9 @@ class Certainty:
         for side, tilt, bound in zip(SIDES, margins.stability.angle, angle.tolist(), strict=True):
             left = float(tilt) - limits.tip_error
             if math.isfinite(left):
-                degrees, size, least = np.degrees((float(tilt), bound, limits.tip_error)).tolist()
-                words = f'{degrees:.1f} degrees of tilt left to the {side} (limit: {least:.1f})'
-                yield side, left, bound, f'{words}, known to +/- {size:.1f} degrees'
+                least = degrees_words(limits.tip_error)
+                words = f'{tipping_words(side, float(tilt))} (DANGER from {least} on)'
+                yield side, left, bound, f'{words}, known to +/- {excess_words(bound)}'
 
     def _compute(self, margins: Margins, payload: Payload) -> None:
         """Compute the bounds of torques (j,) and angles (4,) again if the robot has moved."""

@@ -1,9 +1,9 @@
 """The monitor's verdict, alert messages and diagnostics as plain values, ready to be published."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
@@ -17,6 +17,7 @@ from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
 from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
@@ -95,13 +96,21 @@ def _worst(
         left = f'{left}; {words}'
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
     do = advisory.do(first)
-    text = f'{session.faults.sentence(_now(first, session), session.settings)}{more}; {left}; {do}'
+    sentence = session.faults.sentence(_now(first, session), session.settings)
+    text = '; '.join([f'{sentence}{more}', *_more(left, sentence), do])
     own = {
         **_named(first),
         'do': do,
         'acknowledged': all(map(alarm_tracker.acknowledged, active)),
     }
     return Status(session.level, '', text, own | values)
+
+
+def _more(left: str, sentence: str) -> list[str]:
+    """Return what is left without what the sentence of the alert begins with."""
+    first, _, others = left.partition(', ')
+    words = others if sentence.startswith(f'{first};') else left
+    return [words] if words else []
 
 
 def _limits(session: Session) -> dict[str, object]:
@@ -220,7 +229,7 @@ def margin_statuses(
             torque = margins.torque[j] if margins else math.nan
             level = _level(active, 'TORQUE_LIMIT', name, margins)
             use = abs(torque) / limit
-            text = f'{use:.0%} of its limit' if margins else 'not known'
+            text = f'{share_words(use)} of its limit' if margins else 'not known'
             text = TORQUE_NOT_JUDGED if margins and math.isnan(use) else text
             numbers: dict[str, object] = {
                 'torque': torque,
@@ -377,27 +386,3 @@ def _input(
         level = STALE
     text = '; '.join(session.faults.sentence(a, session.settings) for a in mine)
     return Status(level, f'Input {name}', text or f'{rate:.1f} Hz', values)
-
-
-class Watcher(Protocol):
-    """What `guarded` needs of a monitor node."""
-
-    session: Session | None
-
-    def get_logger(self) -> Any:  # noqa: ANN401 - rclpy's logger
-        """Return the node's logger."""
-
-
-def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
-    """Wrap a timer's work so that an exception in it is reported and the monitor goes on."""
-
-    def run() -> None:
-        try:
-            work()
-        except Exception as error:  # noqa: BLE001 - a fault in our code must not end the watch
-            text = f'{work.__name__}: fault of the monitor: {error!r}'
-            watcher.get_logger().error(text, throttle_duration_sec=5.0)
-            if watcher.session is not None:
-                watcher.session.fail(work.__name__, error)
-
-    return run

@@ -20,6 +20,7 @@ from ugv_acceptance.model.expressions import (
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Payload, Robot, Vector
+from ugv_acceptance.model.solids import Place, Solid, moving_bodies, solids_of
 from ugv_acceptance.model.stability import stances_of, standing
 from ugv_acceptance.model.tree import (
     Tree,
@@ -49,14 +50,22 @@ class Limb:
 class Figure:
     """The compiled drawing of a robot, made once: its limbs, and a box for its body (m).
 
-    `joints` are the joints of the limbs. `ends(*q, *cog)` returns (start, end) of each limb and, if
-    the robot can carry a payload, the payload's centre of gravity.
+    `joints` are the joints of the limbs. `ends(*q, *cog)` returns (start, end) of each limb, then
+    rotation and origin of each of `bodies`, the moving bodies of the `solids`, and, if the robot
+    can carry a payload, the payload's centre of gravity.
     """
 
     mechanics: Mechanics
     joints: tuple[str, ...]
     ends: Kernel
     box: tuple[Vector, Vector]
+    solids: tuple[Solid, ...]
+    bodies: tuple[int, ...]
+
+    def shape_of(self, joint: str) -> bool:
+        """Return whether what hangs on a joint has a solid of its own."""
+        tree = self.mechanics.tree
+        return any(tree.bodies[body].joint == joint for body in self.bodies)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +75,8 @@ class Skeleton:
     `polygon` is the support polygon, counter-clockwise from above; empty if there is none. `body`
     are the lower and the upper corner of a box that stands for the body. `plumb` is where the line
     through the centre of gravity along gravity meets the plane of the polygon: the robot stands
-    while it is inside. None if gravity or the polygon are not known.
+    while it is inside. None if gravity or the polygon are not known. `places` are where each of the
+    figure's `bodies` is.
     """
 
     limbs: tuple[Limb, ...]
@@ -76,6 +86,7 @@ class Skeleton:
     cog: Vector
     plumb: Vector | None
     load: Vector | None
+    places: tuple[Place, ...] = ()
 
 
 def figure_of(robot: Robot) -> Figure:
@@ -83,7 +94,8 @@ def figure_of(robot: Robot) -> Figure:
     mechanics = mechanics_of(robot)
     tree = mechanics.tree
     tips = _tips(robot, tree)
-    drives = drives_of(robot, tree)
+    drives, solids = drives_of(robot, tree), solids_of(robot)
+    bodies = moving_bodies(solids)
 
     def formula(*inputs: Any) -> list[Any]:  # noqa: ANN401 - floats, or the kernel's symbols
         *q, x, y, z = inputs
@@ -92,13 +104,14 @@ def figure_of(robot: Robot) -> Figure:
             (pose.origin[body], add(pose.origin[body], rotate(pose.rotation[body], tip)))
             for body, tip in tips
         ]
+        found += [(pose.rotation[body], pose.origin[body]) for body in bodies]
         if robot.payload_link is not None:
             found.append(point_of(tree, pose, robot.payload_link, (x, y, z))[1])
         return found
 
     kernel = compile_kernel(formula, [*robot.joint_names, 'x', 'y', 'z'])
     joints = tuple(robot.joint_names[drives[body - 1].joint] for body, _ in tips)
-    return Figure(mechanics, joints, kernel, _box(robot, tree))
+    return Figure(mechanics, joints, kernel, _box(robot, tree), solids, bodies)
 
 
 def skeleton_of(
@@ -117,7 +130,8 @@ def skeleton_of(
     limbs = tuple(Limb(joint, *found) for joint, found in zip(figure.joints, ends, strict=False))
     load = ends[-1] if robot.payload_link is not None and payload.mass > 0.0 else None
     plumb = plumb_of(cog, gravity, polygon)
-    return Skeleton(limbs, figure.box, tuple(contacts), polygon, cog, plumb, load)
+    places = tuple(ends[len(limbs) : len(limbs) + len(figure.bodies)])
+    return Skeleton(limbs, figure.box, tuple(contacts), polygon, cog, plumb, load, places)
 
 
 def _tips(robot: Robot, tree: Tree) -> tuple[tuple[int, Vector], ...]:

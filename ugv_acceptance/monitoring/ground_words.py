@@ -7,6 +7,7 @@ from ugv_acceptance.evaluation.alerts.tipping_watch import NOT_KNOWN
 from ugv_acceptance.evaluation.ground import CARRIED, bound_words, ground_words
 from ugv_acceptance.evaluation.least_margins import least_tilt
 from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.margin_words import tipping_words
 
 # What the newest trend says where the ground is not flat.
 TRENDS = {NOT_KNOWN: 'not known yet', **dict(enumerate(LEVELS[:STALE]))}
@@ -19,7 +20,7 @@ def tilt_words(margins: Margins, evaluator: LiveEvaluator) -> str:
         return 'no tilt margin'
     if evaluator.settings.ground.rough:
         return bound_words(side, angle, evaluator.watch.trend.cautious)
-    words = f'{math.degrees(angle):.1f} deg of tilt left ({side})'
+    words = tipping_words(side, angle)
     return f'{words}; {CARRIED}' if evaluator.carried else words
 
 

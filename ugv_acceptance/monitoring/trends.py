@@ -45,7 +45,7 @@ class Ahead:
 
 def end_words(subject: str, seconds: str, *, tips: bool) -> str:
     """Return what happens when a margin of a side (`tips`) or a joint is used up, and when."""
-    what = f'the robot tips to the {subject}' if tips else f'{subject} saturates'
+    what = f'tips {subject.upper()}' if tips else f'{subject} at its limit'
     return f'{what} in {seconds} s'
 
 

@@ -1,6 +1,7 @@
 """The operator's card: a printable page for each group of steps, with alerts and the safe map."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -9,10 +10,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
-from ugv_acceptance.evaluation.alerts.messages import ALERTS, advice, level_words, pattern_words
+from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
+from ugv_acceptance.evaluation.alerts.level_words import MEANS, pattern_words
+from ugv_acceptance.evaluation.alerts.messages import ALERTS, advice
 from ugv_acceptance.evaluation.alerts.robot_words import of_robot
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.evaluation.ground import FLAT, ground_words
+from ugv_acceptance.evaluation.margin_words import degrees_words, excess_words, share_words
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.plan.derive import notes_of
 from ugv_acceptance.plan.maps import safe_maps, standing_words
@@ -63,20 +66,11 @@ SHOWN = (
     'LIMITS_RELAXED',
     'CLOCK',
 )
-LEVELS = (
-    (OK, 'all margins kept', 'go on'),
-    (
-        WARN,
-        'a margin is small or shrinks fast, or an input looks wrong',
-        'go on slowly, away from the limit',
-    ),
-    (
-        ERROR,
-        'a limit is passed, or an input cannot be used',
-        'stop, unless this step expects it',
-    ),
-    (STALE, 'margins are not known', 'stop: nothing protects the robot now'),
-)
+# What the card adds to what a level says to do, where a step asks for it.
+_EXPECTED_HERE = {
+    'CAUTION': ', unless this step must show it',
+    'DANGER': ', unless this step must show it',
+}
 # Lines of a step's preparation that say ground and load, which stand in their own rows.
 GROUND_AND_LOAD = 2
 
@@ -126,7 +120,7 @@ def card_of(plan: Plan, config: Config) -> str:
         config=config,
         version=__version__,
         groups=groups,
-        levels=[(level_words(level), text, do) for level, text, do in LEVELS],
+        levels=_levels(),
         meanings=[
             (code, of_robot(ALERTS[code].meaning, arm.robot), advice(code, arm.robot))
             for code in SHOWN
@@ -139,6 +133,13 @@ def card_of(plan: Plan, config: Config) -> str:
         standing=standing_words(arm),
         notes=notes_of(config),
     )
+
+
+def _levels() -> list[tuple[str, str, str]]:
+    """Return each level with what it means and what to do, and what to do after a fall."""
+    found = [(word, text, do + _EXPECTED_HERE.get(word, '')) for word, (text, do) in MEANS.items()]
+    what, _, do = STAND_CLEAR.partition(': ')
+    return [*found, ('after a fall', what, do)]
 
 
 def _first(plan: Plan, group: str) -> int:
@@ -156,8 +157,7 @@ def group_of(arm: Arm, plan: Plan, steps: list[Step]) -> Group:
 def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Sequence[str]) -> Row:
     """Return a step's texts; joints at home, and what the group has in common, are left out."""
     moved = {n: a for n, a in step.posture_deg.items() if a != plan.home_deg.get(n)}
-    told = {'tilt_left_deg': '{:.1f}° of tilt left', 'use': '{:.0%} of the torque limit'}
-    expected = [told[key].format(value) for key, value in step.expected.items() if key in told]
+    expected = [_EXPECTED[key](x) for key, x in step.expected.items() if key in _EXPECTED]
     q = np.array(vector_of(arm.robot, plan.home_deg, step.posture_deg))
     return Row(
         step,
@@ -170,6 +170,17 @@ def row_of(arm: Arm, plan: Plan, step: Step, common: Sequence[str], never: Seque
         sketch(arm, q, step),
         tuple(p for p in step.alerts.must_not if p not in never),
     )
+
+
+# What the model expects of a step, by the keys of a plan.
+_EXPECTED: dict[str, Callable[[float], str]] = {
+    'tilt_left_deg': lambda x: (
+        f'{degrees_words(math.radians(x))} to tipping'
+        if x >= 0.0
+        else f'{excess_words(math.radians(-x))} past tipping'
+    ),
+    'use': lambda x: f'{share_words(x)} of the torque limit',
+}
 
 
 def _ground(step: Step) -> str:

@@ -1,7 +1,7 @@
 """The acceptance report: a result as one self-contained HTML page a person can sign."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
+from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.report.error_rate import error_rate_line
 from ugv_acceptance.report.format import (
     assumed_line,
@@ -29,7 +31,8 @@ from ugv_acceptance.report.format import (
     worst_text,
 )
 from ugv_acceptance.report.regions import svg_of
-from ugv_acceptance.report.run_charts import run_chart, track_map
+from ugv_acceptance.report.run_charts import gravity_of, positions_of, run_chart, track_map
+from ugv_acceptance.report.side_view import Standing, side_view
 from ugv_acceptance.report.training import training_line, training_rows
 from ugv_acceptance.type_aliases import Json
 
@@ -57,6 +60,11 @@ def _nothing(url: str, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - WeasyPrint'
 AROUND = 5.0
 MOST_EVENTS = 8
 MOST_ALERTS = 60
+# Signals whose worst moment is drawn in an event.
+MOMENTS = {
+    'tip': ('tip_angle',),
+    'torque': ('torque_utilisation', 'torque', 'torque_margin'),
+}
 MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?'}
 CLOSING = {
     'PASS': 'This run met these criteria.',
@@ -69,10 +77,11 @@ CLOSING = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An SVG with its caption."""
+    """An SVG with its caption; `below` are more of what it shows."""
 
     svg: str
     caption: str
+    below: 'tuple[Picture, ...]' = ()
 
 
 def acceptance_page(
@@ -83,6 +92,8 @@ def acceptance_page(
         loader=PackageLoader('ugv_acceptance.report'), autoescape=True, undefined=StrictUndefined
     )
     environment.filters.update(
+        training=training_line,
+        drilled=training_rows,
         number=number_text,
         seconds=seconds_text,
         level=level_words,
@@ -92,8 +103,7 @@ def acceptance_page(
         interval=interval_text,
         range=range_text,
         missing=missing_text,
-        training=training_line,
-        drilled=training_rows,
+        share=lambda share: share_words(share, 1),
     )
     return environment.get_template('acceptance.html').render(
         result=result,
@@ -126,9 +136,9 @@ def _entered(result: Json, key: str) -> str | None:
 def _overview(result: Json, strips: Strips, settings: Settings) -> Picture | None:
     made = run_chart(strips, result, settings)
     caption = (
-        'The whole run; each point is the worst value of a short interval. Solid line: limit; '
-        'dotted line: warning limit; dotted grey: no input. Bars are alerts: plain CAUTION, '
-        'hatched DANGER, dotted NO DATA.'
+        'The whole run; each point is the worst value of a short interval. Solid line: '
+        'DANGER begins; dotted line: CAUTION begins; dotted grey: no input. Bars are alerts: plain '
+        'CAUTION, hatched DANGER, dotted NO DATA; a triangle is when the worst value came.'
     )
     return Picture(svg_of(made, 'run'), caption) if made else None
 
@@ -148,8 +158,32 @@ def _events(result: Json, strips: Strips, settings: Settings) -> list[Picture]:
     for k, (title, start, end) in enumerate(_spans(result)[:MOST_EVENTS]):
         made = run_chart(strips, result, settings, (start, end))
         if made is not None:
-            pictures.append(Picture(svg_of(made, f'event{k}'), title))
+            views = tuple(_views(result, settings, (start, end), f'event{k}'))
+            pictures.append(Picture(svg_of(made, f'event{k}'), title, views))
     return pictures
+
+
+def _views(
+    result: Json, settings: Settings, span: tuple[float, float], name: str
+) -> Iterator[Picture]:
+    """Yield the robot at the worst moment of tip-over and of torque, if they are in a span (s)."""
+    for what, signals in MOMENTS.items():
+        found = [
+            (c['measured']['distance'] or 0.0, c['name'], c['measured'])
+            for c in result['criteria']['results']
+            if c['measured'].get('signal') in signals
+            and c['measured']['moment'] is not None
+            and span[0] <= c['measured']['at_s'] <= span[1]
+        ]
+        if found:
+            _, criterion, measured = min(found, key=lambda one: one[:2])
+            moment = measured['moment']
+            load = Payload(moment['payload_kg'], tuple(moment['payload_cog_m']))
+            q = tuple(positions_of(moment, settings).tolist())
+            at = Standing(q, gravity_of(moment, settings.robot.gravity), load)
+            words = f'{measured["at_s"]:.2f} s, the worst moment of {criterion}: '
+            legend = 'blue: what it stands on; dashed: plumb line; triangle: nearest edge'
+            yield Picture(side_view(at, settings, f'{name}-{what}'), words + legend)
 
 
 def _spans(result: Json) -> list[tuple[str, float, float]]:
@@ -161,7 +195,7 @@ def _spans(result: Json) -> list[tuple[str, float, float]]:
             continue
         end = duration if alert['end_s'] is None else alert['end_s']
         start, end = max(0.0, alert['start_s'] - AROUND), min(duration, end + AROUND)
-        title = f'{alert["start_s"]:.2f} s: {alert["message"]}'
+        title = f'{alert["start_s"]:.2f} s: {level_words(alert["level"])}, {alert["message"]}'
         if spans and start < spans[-1][2]:
             before = spans[-1]
             spans[-1] = (f'{before[0]}; {title}', before[1], max(before[2], end))

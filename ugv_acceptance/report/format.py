@@ -1,7 +1,15 @@
 """Formats the numbers of a result as text; an unknown number is a dash, never a zero."""
 
+import math
+
 from ugv_acceptance.evaluation.criteria.quantities import DATA
 from ugv_acceptance.evaluation.ground import FLAT
+from ugv_acceptance.evaluation.margin_words import (
+    number_beside,
+    share_words,
+    tipping_words,
+    value_beside,
+)
 from ugv_acceptance.type_aliases import Json
 
 DASH = '\N{EN DASH}'
@@ -63,29 +71,40 @@ def _in_unit(value: float | None, measured: Json) -> str:
     if value is None:
         return DASH
     if measured['signal'] == 'torque_utilisation':
-        return f'{value:.1%}'
+        return share_words(value, 1)
     return f'{value:.{measured.get("digits", 4)}g} {measured["unit"]}'.strip()
+
+
+def _beside_limit(value: float | None, measured: Json) -> str:
+    """Return a measured value with as many digits as tell it from its limit."""
+    if value is None:
+        return DASH
+    limit = measured['limit']
+    if measured['signal'] == 'torque_utilisation':
+        return f'{number_beside(100.0 * value, 100.0 * limit)} %'
+    return f'{value_beside(value, limit)} {measured["unit"]}'.strip()
 
 
 def _data_text(value: float | None, measured: Json) -> str:
     if value is None:
         return DASH
     if DATA[measured['quantity']].share:
-        return f'{value:.1%}'
+        return share_words(value, 1)
     return f'{value:.4g} {measured["unit"]}'.strip()
 
 
 def worst_text(measured: Json) -> str:
     """Return a criterion's measured value as text: the worst value, or its kind's own numbers."""
     if 'signal' in measured:
-        return _in_unit(measured['worst'], measured)
+        return _beside_limit(measured['worst'], measured)
     if 'values' in measured:
         pairs = measured['values'].items()
         several = len(measured['values']) > 1
         texts = ((name, _data_text(x, measured)) for name, x in pairs)
         return ', '.join(f'{name} {text}' if several else text for name, text in texts)
     if 'share' in measured:
-        return f'{measured["visited"]} of {measured["cells"]} cells ({measured["share"]:.1%})'
+        share = share_words(measured['share'], 1)
+        return f'{measured["visited"]} of {measured["cells"]} cells ({share})'
     count = measured['alerts']
     return 'no alert' if not count else f'{count} alert{"s" if count > 1 else ""}'
 
@@ -112,7 +131,7 @@ def missing_text(source: Json, duration: float) -> str:
     """Return the share of an input's messages that are missing by its rate; empty: hardly any."""
     expected = (source['rate_hz'] or 0.0) * duration
     share = 1.0 - source['messages'] / expected if expected else 0.0
-    return f'{share:.0%} missing' if share > MISSING else ''
+    return f'{share_words(share)} missing' if share > MISSING else ''
 
 
 def origin_line(result: Json) -> str:
@@ -154,8 +173,8 @@ def ground_line(result: Json) -> str:
     cautious = ground['cautious']
     if cautious is None:
         return text
-    least = f'{cautious["deg"]:.1f} deg to the {cautious["side"]} at {cautious["time_s"]:.1f} s'
-    return f'{text}, and taken cautiously at least {least} were left'
+    least = tipping_words(cautious['side'], math.radians(cautious['deg']))
+    return f'{text}; taken cautiously {least} at {cautious["time_s"]:.2f} s'
 
 
 def is_bound(result: Json) -> bool:

@@ -20,9 +20,9 @@ from ugv_acceptance.studies.maps import CLASSES, classes
 from ugv_acceptance.type_aliases import Floats
 
 WORDS = {
-    'torque': ('holds', 'caution: near the limit', 'saturates'),
-    'rollover': ('stands', 'caution: little tilt left', 'tips over'),
-    'payload': ('carries the load', 'caution: little reserve', 'cannot carry it'),
+    'torque': ('holds', 'CAUTION: near the limit', 'saturates'),
+    'rollover': ('stands', 'CAUTION: little tilt left', 'tips over'),
+    'payload': ('carries the load', 'CAUTION: little reserve', 'cannot carry it'),
     'drag': ('pulls over a fifth of its weight', 'over a tenth', 'less'),
 }
 # Most letters of a joint on its axis; most lines of the assumptions in the title.

@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ugv_acceptance.evaluation.margin_words import degrees_words
 from ugv_acceptance.model.robot import Matrix, Vector
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.report.regions import STYLE, figure, svg_of
@@ -231,13 +232,13 @@ def _words(axes: Axes, picture: RobotPicture) -> None:
 
 def _margin_lines(picture: RobotPicture) -> list[str]:
     known = [
-        f'{side} {angle:.1f}'
+        f'{side.upper()} {degrees_words(math.radians(angle))}'
         for side, angle in zip(SIDES, picture.margins, strict=False)
         if math.isfinite(angle)
     ]
     x, y, z = picture.cog
     return [
-        'tilt left before tipping (deg):',
+        'to tipping, as it stands:',
         '   ' + (', '.join(known) if known else 'not known'),
         f'centre of gravity: {x:.3f} {y:.3f} {z:.3f} m in {picture.root}',
         'IMU axes: x red, y green, z blue' if picture.imu else 'no IMU, or its mounting is unknown',

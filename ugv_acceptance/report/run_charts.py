@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.report.alert_lines import worst_time
 from ugv_acceptance.report.regions import draw_regions, figure, legend
 from ugv_acceptance.studies.bilinear import Grid
 from ugv_acceptance.studies.maps import Levels, rollover_map, torque_forms, utilisation_map
@@ -70,7 +71,7 @@ def _draw_torque(
         share = np.fmax.reduceat(torque[:, j], picks) / settings.limits.torque[j]
         name = plain(settings.robot.joint_names[j])
         axes.plot(time[picks], 100.0 * share, color=colour, linestyle=dashes, lw=1.1, label=name)
-    _limit(axes, 100.0 * settings.limits.torque_error, 'limit')
+    _limit(axes, 100.0 * settings.limits.torque_error, 'DANGER')
     axes.axhline(100.0 * settings.limits.torque_warn, color='#777777', lw=0.7, ls=':')
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.set_ylabel('torque (% of limit)')
@@ -83,9 +84,9 @@ def _draw_tip(
 ) -> None:
     worst = np.degrees(np.fmin.reduceat(angle, picks))
     axes.plot(time[picks], np.where(np.isfinite(worst), worst, np.nan), color='#0072b2', lw=1.1)
-    _limit(axes, math.degrees(settings.limits.tip_error), 'limit')
+    _limit(axes, math.degrees(settings.limits.tip_error), 'DANGER')
     axes.axhline(math.degrees(settings.limits.tip_warn), color='#777777', lw=0.7, ls=':')
-    axes.set_ylabel('tilt left (deg)')
+    axes.set_ylabel('to tipping (deg)')
 
 
 def _limit(axes: Axes, at: float, word: str) -> None:
@@ -122,6 +123,9 @@ def _draw_alerts(axes: Axes, alerts: list[Json], kinds: list[tuple[str, str]], e
             edgecolor='black',
             linewidth=0.4,
         )
+        worst = worst_time(alert)
+        if worst is not None:
+            axes.plot(worst, kinds.index(kind), 'v', color='black', markersize=4.0)
     names = [plain(f'{code} {subject}') for code, subject in kinds]
     axes.set_yticks(range(len(kinds)), names, fontsize=6.5)
     axes.set_ylim(len(kinds) - 0.4, -0.6)
@@ -148,7 +152,7 @@ def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None
     if pair is None or moment is None:
         return None
     grid = _grid(pair, moment, settings)
-    gravity = _gravity(moment, settings.robot.gravity)
+    gravity = gravity_of(moment, settings.robot.gravity)
     payload = Payload(float(moment['payload_kg']), settings.robot.payload.cog)
     limits = np.array(settings.limits.torque)
     forms = torque_forms(settings.robot, grid, gravity, payload)
@@ -170,7 +174,7 @@ def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None
         axes.set_title(words)
         axes.set_xlabel(_axis_name(settings, pair[0]))
     left.set_ylabel(_axis_name(settings, pair[1]))
-    areas = ('within limits', 'caution', 'beyond limits')
+    areas = ('OK', 'CAUTION', 'DANGER')
     legend(made, areas, loc='outside lower center', ncols=3)
     return made
 
@@ -202,7 +206,8 @@ def _telling_moment(result: Json) -> Json | None:
     return None
 
 
-def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
+def gravity_of(moment: Json, g: float) -> tuple[float, float, float]:
+    """Return gravity (m/s2, `base_link`) of a result's moment; `g` is its size."""
     roll, pitch = math.radians(moment['roll_deg']), math.radians(moment['pitch_deg'])
     return (
         g * math.sin(pitch),
@@ -211,10 +216,16 @@ def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
     )
 
 
-def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
-    q = np.array([x['position'] for x in moment['joints'].values()])
+def positions_of(moment: Json, settings: Settings) -> Floats:
+    """Return the joint positions (j,), rad or m, of a result's moment."""
+    q = np.array([x['position'] for x in moment['joints'].values()], dtype=np.float64)
     turning = [not settings.robot.joint(name).slides for name in settings.robot.joint_names]
-    q = np.where(turning, np.radians(q), q)
+    found: Floats = np.where(turning, np.radians(q), q)
+    return found
+
+
+def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
+    q = positions_of(moment, settings)
     x, y = (np.linspace(*_range(settings, j), CELLS) for j in pair)
     return Grid(pair[0], pair[1], x, y, q)
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.plan.maps import safe_maps, standing_words
 from ugv_acceptance.plan.plan import Plan
@@ -80,7 +81,7 @@ def visited_lines(coverage: Mapping[str, Any]) -> list[str]:
     if not coverage['joints']:
         return []
     text = 'failure map: {cells_visited} of {cells_reachable} cells of {cell_deg:g} deg visited'
-    return [f'{text} ({{share:.1%}})'.format(**coverage)]
+    return [f'{text.format(**coverage)} ({share_words(coverage["share"], 1)})']
 
 
 def approaches(coverage: Mapping[str, Any]) -> list[str]:

@@ -13,6 +13,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.alerts.messages import pattern_words
 from ugv_acceptance.evaluation.ground import Ground
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.margin_words import degrees_words, share_words
 from ugv_acceptance.evaluation.settings import ALWAYS
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.offline.evaluate import evaluate
@@ -144,7 +145,7 @@ def decide(
     if done.stopped:
         return FAIL, [f'stopped: {done.stopped}']
     if share < LEAST and not any(p.startswith('STALE') for p in step.alerts.must):
-        unknown.append(f'only {share:.0%} of the hold could be evaluated')
+        unknown.append(f'only {share_words(share)} of the hold could be evaluated')
     # An alert may have been due while margins were unknown.
     wrong = [*unwanted, *([done.wrong] if done.wrong else [])]
     if wrong or (missing and not unknown):
@@ -160,7 +161,7 @@ def _rough(step: Step, ground: Mapping[str, Any]) -> tuple[str, list[str]]:
     if accept is None:
         return INCONCLUSIVE, [*ground['objections']]
     if known < LEAST:
-        return INCONCLUSIVE, [f'the trend of the tilt left is known for {known:.0%} only']
+        return INCONCLUSIVE, [f'the trend of the tilt left is known for {share_words(known)} only']
     return PASS, [f'all alerts as expected; the trend accepted ({step.ground.reason})']
 
 
@@ -196,8 +197,10 @@ def stood(seen: Seen, done: Done) -> str:
     """Return why the robot counts as not tipped over, as text; empty if it tipped over."""
     time, _, _, tilt = seen.joined()
     rows = tilt[(time >= done.begin) & (time <= done.end)]
-    least = math.degrees(rows.min()) if rows.size else math.inf
-    return '' if least < -FALLEN else f'the robot did not tip over: {least:.1f} deg of tilt left'
+    least = float(rows.min()) if rows.size else math.inf
+    if math.degrees(least) < -FALLEN:
+        return ''
+    return f'the robot did not tip over: {degrees_words(least)} to tipping'
 
 
 def covered(seen: Seen, done: Done) -> float:

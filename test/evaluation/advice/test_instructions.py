@@ -9,7 +9,7 @@ from evaluation.streams import settings
 from robots import DOWN, tracked
 
 from ugv_acceptance.evaluation.advice.paths import Path
-from ugv_acceptance.evaluation.advice.search import joint_words, load_words, turn_words
+from ugv_acceptance.evaluation.advice.words import joint_words, load_words, turn_words
 from ugv_acceptance.model.robot import Payload, Robot
 
 
@@ -55,10 +55,11 @@ def test_a_motion_is_up_from_a_share_of_its_way_on(q: float, verb: str) -> None:
     assert words(TWO, 'lift', 0.01, (q, 0.0)).startswith(verb)
 
 
-def test_up_is_against_gravity_wherever_the_robot_stands() -> None:
-    """Nose down by 90 degrees, what lifts the arm swings it."""
-    assert words(TWO, 'lift', 0.1, (0.0, 0.0), (9.81, 0.0, 0.0)).startswith('swing')
-    assert words(TWO, 'lift', -0.1, (math.pi / 2, 0.0), (9.81, 0.0, 0.0)).startswith('lower')
+@pytest.mark.parametrize('down', [(9.81, 0.0, 0.0), (3.0, -4.0, -8.4), (0.0, 0.0, 9.81)])
+def test_up_is_that_of_the_robot_wherever_it_stands(down: tuple[float, ...]) -> None:
+    """On a slope a motion has the name that it has on level ground."""
+    assert words(TWO, 'lift', 0.1, (0.0, 0.0), down).startswith('raise')
+    assert words(TWO, 'lift', 0.1, (math.pi / 2, 0.0), down).startswith('swing')
 
 
 @pytest.mark.parametrize(('amount', 'side'), [(0.5, 'left'), (-0.5, 'right')])

@@ -13,7 +13,7 @@ from ugv_acceptance.evaluation.settings import Limits
 
 TOLD = settings(limits=Limits((50.0, 30.0)))
 RAD = math.radians(1.0)
-USED, LEFT = 'its utilisation must stay', 'the tilt left must stay above 5 deg'
+LEFT = 'must stay above 5 deg'
 RUN = made(
     seconds(0.0, 2.5),
     until=seconds(2.5, 10.0),
@@ -28,13 +28,13 @@ RUN = made(
     ('demand', 'said'),
     [
         (Value('torque_utilisation', 'lift', below=True, limit=0.9),
-         f'lift needs 60.0 N m at 0.00 s; its limit is 50.0 N m: {USED} below 90%'),
+         'lift 120 % of its limit at 0.00 s: it needs 60.0 of 50.0 N m; must stay below 90 %'),
         (Value('torque_utilisation', 'slide', below=True, limit=1.0),
-         f'slide needs 36.0 N at 0.00 s; its limit is 30.0 N: {USED} below 100%'),
+         'slide 120 % of its limit at 0.00 s: it needs 36.0 of 30.0 N; must stay below 100 %'),
         (Value('tip_angle', 'front', below=False, limit=5 * RAD),
-         f'at 0.00 s: 4.0 degrees of tilt left before the robot tips to the front; {LEFT}'),
+         f'4 deg to tipping: FRONT at 0.00 s; {LEFT}'),
         (Value('tip_angle', ANY, below=False, limit=5 * RAD),
-         f'at 0.00 s: 3.0 degrees past the tipping point to the right; {LEFT}'),
+         f'3 deg past tipping: RIGHT at 0.00 s; {LEFT}'),
         (Value('position', 'slide', below=True, limit=0.3),
          'position of slide was 0.39 m at 0.00 s; must stay below 0.3 m'),
         (Value('tilt', 'robot', below=True, limit=30 * RAD),
@@ -63,9 +63,21 @@ def test_a_tilt_of_nothing_is_not_past_the_tipping_point() -> None:
     """A tilt left of 0 is not told as past the tipping point, which begins below 0."""
     level = made(seconds(0), until=seconds(10), angle=[(0.0, 1.0, 1.0, 1.0)])
     found = judge_value(*findings(TOLD, Value('tip_angle', ANY, below=False, limit=0.1), [level]))
-    assert found.reason.startswith(
-        'at 0.00 s: 0.0 degrees of tilt left before the robot tips to the front'
-    )
+    assert found.reason.startswith('0 deg to tipping: FRONT at 0.00 s;')
+
+
+@pytest.mark.parametrize(
+    ('demand', 'said'),
+    [
+        (Value('torque_utilisation', 'lift', below=True, limit=1.2006), '120.08 % of its limit'),
+        (Value('torque_utilisation', 'lift', below=True, limit=1.2007), '120.08 % of its limit'),
+        (Value('tilt', 'robot', below=True, limit=39.999 * RAD), 'was 40 deg'),
+        (Value('position', 'slide', below=True, limit=0.3899), 'was 0.39 m'),
+    ],
+)
+def test_a_violation_never_reads_as_its_limit(demand: Value, said: str) -> None:
+    """However little it is beyond, value and limit are told apart."""
+    assert said in judge_value(*findings(TOLD, demand, [RUN])).reason
 
 
 def test_a_dwell_tells_how_long_it_was_kept() -> None:

@@ -41,10 +41,10 @@ def judged(demand: Demand, *parts: Any, **options: Any) -> Any:
     ('evaluated', 'needed', 'end', 'window', 'reason'),
     [
         (9.5, 0.95, 10.0, None, None),
-        (9.49, 0.95, 10.0, None, 'only 94.9% of the recording could be evaluated (95% needed)'),
+        (9.49, 0.95, 10.0, None, 'only 94.9 % of the recording could be evaluated (95 % needed)'),
         (2.0, 0.5, 10.0, (1.0, 5.0), None),
-        (1.0, 0.5, 10.0, (1.0, 5.0), 'only 25.0% of 1 to 5 s could be evaluated (50% needed)'),
-        (0.0, 0.0, 0.0, None, 'only 0.0% of the recording could be evaluated (0% needed)'),
+        (1.0, 0.5, 10.0, (1.0, 5.0), 'only 25.0 % of 1 to 5 s could be evaluated (50 % needed)'),
+        (0.0, 0.0, 0.0, None, 'only 0.0 % of the recording could be evaluated (0 % needed)'),
     ],
 )
 def test_too_little_data_are_told_as_a_share(
@@ -108,7 +108,7 @@ def test_a_number_of_the_data_may_be_at_its_bound(least: float, most: float, ver
     both = judged(DataDemand('rate', least=least), data=data)['criteria']['results'][0]
     assert 'joint_states unknown' in both['reason']
     short = judged(DataDemand('coverage', least=0.99), data=data)['reasons'][0]
-    assert short == 'only 98.7% of the recording could be evaluated (99% needed)'
+    assert short == 'only 98.7 % of the recording could be evaluated (99 % needed)'
 
 
 @pytest.mark.parametrize(('least', 'verdict'), [(0.5, 'PASS'), (0.51, 'INCONCLUSIVE')])
@@ -120,7 +120,7 @@ def test_the_share_of_a_map_is_of_its_cells(least: float, verdict: str) -> None:
     assert found['verdict'] == verdict
     assert found['measured'] == {'cells': 4, 'visited': 2, 'share': 0.5}
     if verdict != 'PASS':
-        assert found['reason'] == 'it: the run visited 2 of 4 cells (50.0%); 51% needed'
+        assert found['reason'] == 'it: the run visited 2 of 4 cells (50.0 %); 51 % needed'
 
 
 def test_faults_of_the_input_explain_what_is_inconclusive_and_nothing_else() -> None:
@@ -134,7 +134,7 @@ def test_faults_of_the_input_explain_what_is_inconclusive_and_nothing_else() -> 
     met = Value('torque', 'lift', below=True, limit=1.0)
     broken = replace(met, limit=0.0)
     assert judged(met, alerts=alerts)['reasons'] == [
-        'all criteria met, 98.7% of the recording evaluated'
+        'all criteria met, 98.7 % of the recording evaluated'
     ]
     assert len(judged(broken, alerts=alerts)['reasons']) == 1
     found = judged(met, alerts=alerts, end=99.0)

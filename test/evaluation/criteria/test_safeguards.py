@@ -66,8 +66,8 @@ def judged(data: Any, demand: Demand = NOTHING, **options: Any) -> Any:
     ('data', 'verdict', 'reason'),
     [
         (GOOD, 'PASS', 'all criteria met'),
-        (TIPPED, 'FAIL', 'at 3.00 s: 2.5 degrees past the tipping point to the left'),
-        (OVER, 'FAIL', 'at 4.00 s: lift needs 45.0 N m; its limit is 45.0 N m'),
+        (TIPPED, 'FAIL', '2.5 deg past tipping: LEFT at 3.00 s'),
+        (OVER, 'FAIL', 'lift 100 % of its limit at 4.00 s: it needs 45.0 of 45.0 N m'),
         (BLIND, 'INCONCLUSIVE', 'no margins from 1.00 to 2.40 s (1.40 s)'),
     ],
 )
@@ -112,7 +112,7 @@ def test_a_failed_criterion_is_not_said_twice() -> None:
     _, found = findings(TOLD, criterion, (rows,), data=TIPPED)
     reasons = judge_criteria(found)['reasons']
     assert len(reasons) == 1
-    assert 'past the tipping point to the left' in reasons[0]
+    assert 'past tipping: LEFT' in reasons[0]
 
 
 def test_an_alert_that_is_an_objection_is_one() -> None:
@@ -163,7 +163,7 @@ def test_alerts_from_margins_in_doubt_decide_nothing() -> None:
 @pytest.mark.parametrize(
     ('demand', 'window', 'words'),
     [
-        (Value('tip_angle', ANY, below=False, limit=-3.0), None, 'degrees past the tipping point'),
+        (Value('tip_angle', ANY, below=False, limit=-3.0), None, ' deg past tipping'),
         (
             Value('tip_angle', 'left', below=False, limit=0.2),
             None,
@@ -173,7 +173,7 @@ def test_alerts_from_margins_in_doubt_decide_nothing() -> None:
         (
             Value('torque_utilisation', 'lift', below=True, limit=1.4),
             None,
-            'allows 140% of the',
+            'allows 140 % of the',
         ),
         (
             Value('torque', 'lift', below=True, limit=9.0, share_in_violation=1.0),

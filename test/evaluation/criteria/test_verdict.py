@@ -140,7 +140,7 @@ def test_missing_data_never_pass() -> None:
     """A run that ends before a criterion's window does cannot pass it."""
     found = outcome(replace(TORQUE, limit=44.0), moving(), window=(1.0, 4.0))
     assert found['verdict'] == 'INCONCLUSIVE'
-    assert found['reason'] == 'only 33.3% of 1 to 4 s could be evaluated (95% needed)'
+    assert found['reason'] == 'only 33.3 % of 1 to 4 s could be evaluated (95 % needed)'
 
 
 def test_a_violation_fails_also_where_data_are_missing() -> None:
@@ -292,7 +292,7 @@ def test_without_criteria_the_limits_of_the_configuration_hold() -> None:
     told = replace(criteria, criteria=tuple(_tighter(c) for c in criteria.criteria))
     found = judged(told, heavy, T0 + 2 * S)
     assert found['verdict'] == 'FAIL'
-    assert 'lift needs' in found['reasons'][0]
+    assert '% of its limit' in found['reasons'][0]
 
 
 def _tighter(criterion: Criterion) -> Criterion:
@@ -312,7 +312,7 @@ def test_a_robot_on_its_side_fails() -> None:
     ]
     found = judged(default_criteria(TOLD), run, T0 + 2 * S)
     assert found['verdict'] == 'FAIL'
-    assert 'past the tipping point to the right' in found['reasons'][0]
+    assert 'past tipping: RIGHT' in found['reasons'][0]
 
 
 def test_the_hash_of_the_defaults_is_that_of_their_content() -> None:

@@ -208,7 +208,7 @@ def test_a_mounting_that_gravity_denies_is_not_believed(attitude: str) -> None:
     assert set(found[-200:]) == {None}
     wrong = next(a for a in alerts if a.rule.code == 'IMU_MOUNTING')
     assert describe(wrong, told) == (
-        'from the first message on imu leans by over 45 degrees, so it seems mounted otherwise '
+        'from the first message on imu leans by over 45 deg, so it seems mounted otherwise '
         'than configured: its y axis points up: imu.mounting_rpy_deg: [90, 0, 0]: '
         'imu.mounting: auto took it from the URDF (imu_link - base)'
     )

@@ -14,7 +14,7 @@ export function element(tag, className, content) {
 
 // What the server answered, where it was asked, for a while.
 export const say = (id) => (answer) => {
-  const said = answer.ok ? answer.text : `refused: ${answer.text}`;
+  const said = answer.ok || answer.text.startsWith('refused') ? answer.text : `refused: ${answer.text}`;
   text($(id), said);
   setTimeout(() => { if ($(id).textContent === said) text($(id), ''); }, 8000);
 };

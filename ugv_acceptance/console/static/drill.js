@@ -67,13 +67,14 @@ export class Drill {
     if (phase === 'judged' && (focused === document.body || $('drill').contains(focused))) $('drill-next').focus({ preventScroll: true });
   }
 
-  // The robot while it is watched; else the whole panel, above all its end, below the header that stays.
+  // The robot while it is to be watched; else the question, or the panel, right below the header, which stays.
   look(phase) {
-    if (phase === 'watch') return window.scrollTo(0, 0);
-    const header = $('verdict').offsetHeight, { top, bottom } = $('drill').getBoundingClientRect();
-    $('drill').style.scrollMarginTop = `${header}px`;
-    if (bottom > window.innerHeight) $('drill').scrollIntoView({ block: 'end' });
-    else if (top < header) $('drill').scrollIntoView({ block: 'start' });
+    if (phase === 'watch' || phase === 'acting') return window.scrollTo(0, 0);
+    const header = $('verdict').offsetHeight + 8, asks = phase === 'ask';
+    const first = asks ? $('drill-question').parentElement : $('drill'), last = asks ? $('drill-choices') : $('drill');
+    first.style.scrollMarginTop = `${header}px`;
+    const out = first.getBoundingClientRect().top < header || last.getBoundingClientRect().bottom > window.innerHeight;
+    if (out) first.scrollIntoView({ block: 'start' });
   }
 
   list(choices) {

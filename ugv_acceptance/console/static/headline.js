@@ -25,7 +25,7 @@ export function showHeadline(shown) {
   text($('cause'), `${line.cause} ${line.more ? `(and ${line.more} more)` : ''}`.trim());
   $('verdict').classList.toggle('flash', shown.cards.some((card) => card.unseen && card.level === 'ERROR'));
   // Numbers change all the time; a screen reader is told when the kind of trouble does.
-  const kind = [shown.word, what, line.action].join();
+  const kind = `${shown.word} ${what}`;
   if (kind === spoken) return;
   spoken = kind;
   text($('spoken'), [shown.word, what, line.action, line.detail, line.cause].filter(Boolean).join('. '));

@@ -15,7 +15,7 @@ export function showMargins(frame, hello, dead) {
   }
   worst = frame.worst_joint ?? worst;
   if (worst !== null) showTorque($('worst'), frame.torque[worst], hello.joints[worst].unit, dead);
-  text($('attitude'), dead ? '' : attitude(frame.attitude));
+  text($('attitude'), dead || frame.level === 'STALE' ? '' : attitude(frame.attitude));
   const g = frame.ground, cautious = g.cautious_deg === null ? '' : `, ${fixed(g.cautious_deg)}° taken cautiously`;
   text($('ground'), g.rough ? `${g.words}: upper bound${cautious}` : '');
   text($('map-ground'), g.rough ? '(on flat ground only)' : '');

@@ -1,4 +1,4 @@
-"""Searches for advice: which motion improves the worst margin most, and the sentence for it.
+"""Searches for advice: which motion improves the worst margin most (words.py says it).
 
 Each candidate is a path, followed step by step with the compiled model. It ends where another
 margin would fall below its warning limit, where a motor would have to lift more than it can, or
@@ -10,78 +10,19 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ugv_acceptance.evaluation.advice.paths import Path, joint_paths, turn_paths
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR, has_tipped
+from ugv_acceptance.evaluation.advice.words import joint_words, load_words, turn_words
+from ugv_acceptance.evaluation.margin_words import degrees_words
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.mechanics import mechanics_of
-from ugv_acceptance.model.robot import Payload, Robot
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, margins
-from ugv_acceptance.model.statics import centre_of_gravity, payload_capacity
-from ugv_acceptance.model.tree import body_positions, drives_of, pose_of
+from ugv_acceptance.model.statics import payload_capacity
 from ugv_acceptance.type_aliases import Floats
-
-# A motion is called up or down if its height is at least this share of its length.
-STEEP = 0.35
-# A joint turns something to the left or right if the height of its axis is more than this of it.
-UPRIGHT = 0.9
-
-
-def joint_words(robot: Robot, path: Path, step: int, payload: Payload) -> str:
-    """Return how to move a joint along a path up to a step, such as "raise the elbow by 20 deg"."""
-    joint, amount = robot.joint(path.subject), float(path.amount[step])
-    name = path.subject.removesuffix('_joint').replace('_', ' ')
-    if joint.slides:
-        return f'{"extend" if amount > 0.0 else "retract"} the {name} by {abs(amount) * 100:.0f} cm'
-    by = f'by {abs(math.degrees(amount)):.0f} deg'
-    start = path.q[step] - (np.array(robot.joint_names) == path.subject) * amount
-    upright = _upright(robot, start.tolist(), path.subject)
-    if abs(upright) > UPRIGHT:
-        left = amount * upright > 0.0
-        return f'turn the {name} {by} to the {"left" if left else "right"}'
-    before, after = centre_of_gravity(robot, np.stack((start, path.q[step])), payload)
-    moved = after - before
-    up = -path.gravity[step] / np.linalg.norm(path.gravity[step])
-    rise = float(moved @ up)
-    if abs(rise) >= STEEP * float(np.linalg.norm(moved)):
-        return f'{"raise" if rise > 0.0 else "lower"} the {name} {by}'
-    return f'swing the {name} {by} {"forward" if moved[0] > 0.0 else "back"}'
-
-
-def _upright(robot: Robot, q: Sequence[float], joint: str) -> float:
-    """Return the height of a joint's axis, a unit vector in `base_link`, in a posture (j,)."""
-    tree = mechanics_of(robot).tree
-    pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
-    number = next(k for k, body in enumerate(tree.bodies) if body.joint == joint)
-    upright: Any = pose.axis[number][2]
-    return float(upright)
-
-
-def turn_words(amount: float, gravity: Floats) -> str:
-    """Return how to turn the robot by `amount` (rad), and if it then faces up- or downhill.
-
-    `gravity` (3,) is that after the turn, in `base_link`.
-    """
-    side = 'left' if amount > 0.0 else 'right'
-    downhill = math.degrees(math.atan2(gravity[1], gravity[0]))
-    faces = ''
-    if abs(downhill) <= 30.0:
-        faces = ', to face downhill'
-    elif abs(downhill) >= 150.0:
-        faces = ', to face uphill'
-    return f'turn the robot slowly by {abs(math.degrees(amount)):.0f} deg to the {side}{faces}'
-
-
-def load_words(mass: float, holds: float | None) -> str:
-    """Return the sentence that the load be set down; `holds` (kg) is what this posture can hold."""
-    if holds is None or holds >= mass:
-        return f'set the load of {mass:.1f} kg down'
-    return f'set the load down: {mass:.1f} kg is {mass - holds:.1f} kg too heavy in this posture'
-
 
 # Codes of alerts whose advice is computed; their subject is the margin.
 COMPUTED = frozenset({'TIP_OVER', 'TORQUE_LIMIT'})
@@ -355,7 +296,10 @@ def _loads(cases: Sequence[_Case]) -> Iterator[tuple[_Case, Advice]]:
 
 
 def _gain_words(case: _Case, gain: float) -> str:
+    """Return a gain in words: cut like a margin, so that there is never less than was said."""
     if case.tips:
-        return f'{math.degrees(gain):.0f} deg further from tipping to the {case.subject}'
+        return f'{degrees_words(gain)} further from tipping to the {case.subject}'
     unit = case.settings.robot.joint(case.subject).units.effort
-    return f'{gain:.0f} {unit} less on the {case.subject.removesuffix("_joint")}'
+    fine = 10.0 if gain < 10.0 else 1.0
+    less = math.floor(gain * fine + SLACK) / fine
+    return f'{less:g} {unit} less on the {case.subject.removesuffix("_joint")}'

@@ -17,22 +17,21 @@ IMU_ALERTS = {
         'The orientation of the IMU is wrong: the accelerometer is used instead.',
     ),
     'IMU_GRAVITY': AlertText(
-        'while it does not turn, the acceleration of {subject} differs from gravity by {peak:.0%}'
-        '{seems}',
+        'while it does not turn, the acceleration of {subject} differs from gravity by {off}'
+        '{at}{seems}',
         'check its unit (m/s2, not g), and that its driver does not subtract gravity',
         FailureSource.SENSOR,
         'The IMU does not measure gravity correctly: tilt cannot be trusted.',
     ),
     'IMU_INCONSISTENT': AlertText(
-        'while the IMU does not turn, its orientation and acceleration disagree by '
-        '{degrees:.1f} degrees',
+        'while the IMU does not turn, its orientation and acceleration disagree by {excess}{at}',
         'check the IMU: its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
     'IMU_NO_GRAVITY': AlertText(
         'the tilt is unknown: {subject} gives no orientation that can be used, and its '
-        'acceleration differs from gravity by {peak:.0%}{seems}',
+        'acceleration differs from gravity by {off}{at}{seems}',
         'use an IMU that gives an orientation; check the unit of the acceleration (m/s2, not g)',
         FailureSource.SENSOR,
         'Nothing tells the tilt now: no margin is known.',
@@ -45,7 +44,7 @@ IMU_ALERTS = {
     ),
     'IMU_CONTRADICTION': AlertText(
         'averaged over {window:.0f} s, the acceleration of {subject} contradicts its orientation '
-        'by {degrees:.0f} degrees',
+        'by {excess}{at}',
         'check the IMU: its orientation may be stuck, drift, or have other axes; or its '
         'acceleration',
         FailureSource.SENSOR,
@@ -64,7 +63,7 @@ IMU_ALERTS = {
         'The orientation of the IMU does not turn as its rates say: tilt cannot be trusted.',
     ),
     'IMU_MOUNTING': AlertText(
-        'from the first message on {subject} leans by over 45 degrees, so it seems mounted '
+        'from the first message on {subject} leans by over 45 deg, so it seems mounted '
         'otherwise than configured: {found}',
         'set imu.mounting_rpy_deg as named (its heading cannot be told), or let the driver send '
         'z up',

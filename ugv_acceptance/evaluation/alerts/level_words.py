@@ -5,6 +5,20 @@ from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 # A level as people read it; machines (ROS, JSON, CSV, files of criteria and plans) read LEVELS.
 LEVELS_FOR_PEOPLE = dict(zip(LEVELS, ('OK', 'CAUTION', 'DANGER', 'NO DATA'), strict=True))
 
+# What each level for people means, and what it says to do: one table for card and manual.
+MEANS = {
+    'OK': ('all margins are kept', 'go on'),
+    'CAUTION': (
+        'a margin is small or shrinks fast, or an input looks wrong',
+        'slow down and follow the advice before you go on',
+    ),
+    'DANGER': (
+        'a limit is passed, or a measurement cannot be trusted',
+        'stop what you are doing and follow the advice',
+    ),
+    'NO DATA': ('the margins are not known', 'STOP: do not move on these numbers'),
+}
+
 
 def level_words(level: int | str) -> str:
     """Return a level, by its number or its name in LEVELS, as people read it."""

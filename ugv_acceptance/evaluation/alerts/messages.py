@@ -16,21 +16,29 @@ from ugv_acceptance.evaluation.alerts.robot_words import (
     moving,
     of_robot,
     relaxed_limit,
-    tilt_left,
 )
-from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
+from ugv_acceptance.evaluation.margin_words import (
+    degrees_words,
+    excess_words,
+    number_beside,
+    rate_beside,
+    rate_words,
+    share_words,
+    tipping_words,
+)
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.robot import TURNING, Robot
+from ugv_acceptance.model.robot import TURNING, JointUnits, Robot
 
 ALERTS = {
     'TORQUE_LIMIT': AlertText(
-        '{subject} needs {peak:.1f} {unit}; its limit is {limit:.1f} {unit}',
+        '{subject} {share} of its limit{at}: it needs {need} of {limit:.1f} {unit}',
         'bring the load closer to the joint, or set it down',
         FailureSource.EFFECTOR,
         'The load on the joint named is near, or above, what its motor can hold.',
     ),
     'TIP_OVER': AlertText(
-        '{tilt} to the {subject}; {kind}: {limit:.1f} degrees left',
+        '{tilt}{at}; {level} from {limit} on',
         'lower the arm over the tracks, face the slope; if the robot stands well, check the IMU',
         FailureSource.INTERACTION,
         'The robot is close to tipping over to the side named.',
@@ -42,21 +50,20 @@ ALERTS = {
         'Not on flat ground: the tilt left shrinks fast, or is small when taken cautiously.',
     ),
     'TIP_MOVING': AlertText(
-        '{moving} to the {subject}',
+        '{moving}{at}',
         'stop smoothly; lower the arm over the tracks before you drive on',
         FailureSource.INTERACTION,
         'The robot turns over its edge so fast that it may not come to rest before it tips.',
     ),
     'ACCELERATION': AlertText(
-        'braking, turning or a push is {degrees:.1f} degrees more than the robot can stand'
-        ' before it begins to lift and tip to the {subject}',
+        'braking, turning or a push is {excess} more than the robot stands before it lifts and'
+        ' tips: {side}{at}',
         'brake and turn more gently; lower the arm over the tracks, bring the load closer',
         FailureSource.INTERACTION,
         'The robot is accelerated so hard that one side carries no weight.',
     ),
     'TRACK_LIFT': AlertText(
-        'an end of the tracks lifts: pushed to the {subject}, the robot turned there by'
-        ' {degrees:.1f} degrees',
+        'an end of the tracks lifts: a push turned the robot by {excess}: {side}{at}',
         'brake and turn more gently; lower the arm over the tracks, bring the load closer',
         FailureSource.INTERACTION,
         'Braking or turning lifts an end of the tracks off the ground.',
@@ -69,38 +76,39 @@ ALERTS = {
     ),
     'ARM_ON_GROUND': AlertText(
         'the arm stands on the ground, or so it seems: {height} the plane on which the robot'
-        ' stands, so no margin is valid',
+        ' stands{at}, so no margin is valid',
         'lift the arm; if it is to touch the ground, say so (hand_may_touch); if it does not,'
         ' check the zeros of its joints and the contact points',
         FailureSource.INTERACTION,
         'The arm touches the ground, which then carries a part of the robot: no margin is valid.',
     ),
     'STATIC_MODEL': AlertText(
-        '{subject} moves at {peak:.2f} {rate}; margins are valid only up to {limit:.2f} {rate}',
+        '{subject} moves at {rate}{at}; margins are valid only up to {limit}',
         'move the joint more slowly',
         FailureSource.INTERACTION,
         'The joint moves too fast: the margins shown may be too large.',
     ),
     'SLIDE': AlertText(
-        'the tracks will slide before the robot tips: {slope:.1f} degrees of slope left',
+        'the tracks will slide before the robot tips: {slope} of slope left{at}',
         'stop; drive straight up or down the slope to where it is less steep',
         FailureSource.INTERACTION,
         'The robot is about to slide down the slope, before it tips.',
     ),
     'TIP_AHEAD': AlertText(
-        'the robot will tip to the {subject} within {seconds:.1f} s if this motion continues',
+        'it tips within {seconds:.1f} s if this motion continues: {side}',
         'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the robot tips to the side named within a second.',
     ),
     'TORQUE_AHEAD': AlertText(
-        '{subject} will reach its limit within {seconds:.1f} s if this motion continues',
+        '{subject} is at its limit within {seconds:.1f} s if this motion continues',
         'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the joint named is at its limit within a second.',
     ),
     'EFFORT_LIMIT': AlertText(
-        'the measured effort of {subject} is {peak:.1f} {unit}; its limit is {torque:.1f} {unit}',
+        'the measured effort of {subject} is {share} of its limit{at}: '
+        '{need} of {limit:.1f} {unit}',
         'move the joint more slowly, bring the load closer, or set it down',
         FailureSource.EFFECTOR,
         'The motor named is near its torque limit, by its own measurement.',
@@ -154,7 +162,7 @@ ALERTS = {
         'Clocks disagree: times of messages cannot be trusted.',
     ),
     'POSITION_LEAP': AlertText(
-        'implausible jump of {subject}: {peak:.1f} {rate}, over ten times the speed it can move at',
+        'implausible jump of {subject}: {rate}{at}, over ten times the speed it can move at',
         'check its unit (rad, not degrees), its name, and that only one node publishes it',
         FailureSource.SENSOR,
         'A joint position jumps: wrong unit, or two sources publish it.',
@@ -243,42 +251,68 @@ ALERTS = {
 # The faults only a live node sees, with their levels; the other alerts a recording shows as well.
 LIVE = {code: text.level for code, text in ALERTS.items() if text.level is not None}
 RECORDED = tuple(code for code in ALERTS if code not in LIVE)
+# The alerts whose sentence has a worst value, so that its own time is worth telling.
+HAVE_WORST = frozenset(code for code, text in ALERTS.items() if '{at}' in text.happened)
 
 
-def describe(alert: Alert, settings: Settings) -> str:
-    """Return one sentence that says what happened in an alert."""
-    rule = alert.rule
-    peak, limit = alert.peak, rule.on
-    robot = settings.robot
-    known = rule.subject in robot.joint_names
-    units = robot.joint(rule.subject).units if known else TURNING
-    if rule.code == 'TORQUE_LIMIT':
-        limit = _torque(rule.subject, settings)
-    if rule.code == 'TIP_OVER':
-        peak, limit = math.degrees(-peak), math.degrees(-rule.on)
+def describe(alert: Alert, settings: Settings, start: int | None = None) -> str:
+    """Return one sentence that says what happened in an alert.
+
+    With the `start` (ns) of a recording the worst value stands beside its own time.
+    """
+    rule, robot = alert.rule, settings.robot
     text = of_robot(ALERTS[rule.code].happened, robot)
     if alert.detail and '{detail}' not in text:
         text += ': {detail}'
+    known = rule.subject in robot.joint_names
+    units = robot.joint(rule.subject).units if known else TURNING
     return text.format(
         subject=rule.subject,
-        peak=peak,
-        limit=limit,
+        side=rule.subject.upper(),
+        peak=alert.peak,
         unit=units.effort,
-        rate=units.rate,
-        tilt=tilt_left(peak),
-        moving=moving(math.degrees(-alert.peak)),
-        height=height(-alert.peak),
-        degrees=math.degrees(alert.peak),
-        slope=max(math.degrees(-alert.peak), 0.0),
+        at=_worst_time(alert, start),
+        level=level_words(rule.level),
         seconds=-rule.on,
-        torque=_torque(rule.subject, settings),
-        kind='warning limit' if rule.level == WARN else 'limit',
         window=window(alert),
         found=found(alert),
         seems=seems(alert),
         relaxed=relaxed_limit(rule.subject, settings) if rule.code == 'LIMITS_RELAXED' else '',
         detail=alert.detail,
+        **_numbers(alert, units, settings),
     )
+
+
+def _worst_time(alert: Alert, start: int | None) -> str:
+    """Return when the worst value came in a recording that began at `start` (ns); '': unknown."""
+    if start is None or alert.worst_at is None:
+        return ''
+    return f' at {(alert.worst_at - start) / 1e9:.2f} s'
+
+
+def _numbers(alert: Alert, units: JointUnits, settings: Settings) -> dict[str, float | str]:
+    """Return the worst value of an alert and its limit in the words that fit its kind."""
+    rule, peak = alert.rule, alert.peak
+    torque = _torque(rule.subject, settings)
+    return {
+        'limit': _limit(rule, units, torque),
+        'share': share_words(peak / torque) if torque > 0.0 else share_words(math.nan),
+        'need': number_beside(peak, torque),
+        'rate': rate_beside(peak, rule.on, units.rate),
+        'tilt': tipping_words(rule.subject, -peak),
+        'moving': moving(rule.subject, -peak),
+        'height': height(-peak),
+        'excess': excess_words(peak),
+        'slope': degrees_words(max(-peak, 0.0)),
+        'off': share_words(peak),
+    }
+
+
+def _limit(rule: Rule, units: JointUnits, torque: float) -> float | str:
+    """Return the limit that an alert is about: a torque as a number, others in words."""
+    if rule.code == 'TIP_OVER':
+        return degrees_words(-rule.on)
+    return rate_words(rule.on, units.rate) if rule.code == 'STATIC_MODEL' else torque
 
 
 def _torque(subject: str, settings: Settings) -> float:
@@ -299,6 +333,7 @@ def suspect_of(code: str) -> str:
 
 __all__ = [
     'ALERTS',
+    'HAVE_WORST',
     'LEVELS_FOR_PEOPLE',
     'LIVE',
     'RECORDED',

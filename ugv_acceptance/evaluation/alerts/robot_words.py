@@ -1,5 +1,6 @@
-"""Words of alerts for the robot at hand: its tilt left, motion, clearance, and what it has."""
+"""Words of alerts for the robot at hand: its motion, clearance, and what it has."""
 
+from ugv_acceptance.evaluation.margin_words import tipping_words
 from ugv_acceptance.evaluation.permitted_limits import relaxed
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Robot
@@ -28,24 +29,17 @@ def of_robot(text: str, robot: Robot) -> str:
     return text
 
 
-def tilt_left(degrees: float) -> str:
-    """Return in words how much tilt is left, or how far the robot is past its tipping point."""
-    if degrees >= 0.0:
-        return f'{degrees:.1f} degrees of tilt left before the robot tips'
-    return f'the robot is {-degrees:.1f} degrees past its tipping point'
-
-
 def height(clearance: float) -> str:
     """Return in words how high (m) the arm was at least."""
     where = 'above' if clearance > 0.0 else 'below'
     return f'it came to {abs(clearance):.2f} m {where}'
 
 
-def moving(degrees: float) -> str:
-    """Return in words what the turn of a robot leaves of its tilt."""
-    if degrees >= 0.0:
-        return f'at the rate it turns, {degrees:.1f} degrees of tilt are left before it tips'
-    return 'the robot turns so fast that it will tip over'
+def moving(side: str, angle: float) -> str:
+    """Return in words what the turn of a robot leaves (rad) of its tilt to a side."""
+    if angle < 0.0:
+        return f'it turns so fast that it will tip over: {side.upper()}'
+    return f'as fast as it turns, {tipping_words(side, angle)}'
 
 
 def relaxed_limit(name: str, settings: Settings) -> str:

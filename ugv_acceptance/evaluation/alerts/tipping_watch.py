@@ -17,6 +17,7 @@ from ugv_acceptance.evaluation.alerts.prediction import MOST, SPACING
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Signal, feed
 from ugv_acceptance.evaluation.ground import FLAT, KINDS
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.margin_words import rate_words
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.tipping_trend import LOOKS, NOT_KNOWN, OK, TREND, Trend, trend_of
@@ -132,11 +133,11 @@ def trend_words(trend: Trend, row: int) -> str:
     """Return how fast a margin shrinks at a look, and how long it lasts; else that it is small."""
     side, slope, left = SIDES[trend.side[row]], trend.slope[row], trend.left[row]
     if not (slope <= -TREND.rate and math.isfinite(left)):
-        return (
-            f'little tilt is left to the {side}, taken cautiously: as if half a step were missing'
-        )
-    rate = f'the tilt left to the {side} shrinks by {math.degrees(-slope):.0f} degrees a second'
-    return f'the robot begins to tip: {rate}, {left:.1f} s until nothing is left'
+        words = 'little is left to tipping, taken cautiously (as if half a step were missing)'
+        return f'{words}: {side.upper()}'
+    rate = rate_words(float(-slope), 'rad/s')
+    words = f'the robot begins to tip: {side.upper()}, by {rate}'
+    return f'{words}, {left:.1f} s until nothing is left'
 
 
 __all__ = ['NOT_KNOWN', 'OK', 'TippingWatch', 'trend_words']

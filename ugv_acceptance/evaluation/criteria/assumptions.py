@@ -15,6 +15,7 @@ from ugv_acceptance.evaluation.criteria.not_judged import left_open, not_judged
 from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.ground import FLAT
+from ugv_acceptance.evaluation.margin_words import percent_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 
@@ -89,9 +90,9 @@ def _demands(measurement: CriteriaMeasurement) -> Iterator[NotChecked]:
     values = [c.demand for c in criteria.criteria if isinstance(c.demand, Value)]
     sides = {v.of for v in values if v.signal == 'tip_angle'}
     if not sides and settings.judges_tilt:
-        yield NotChecked('degrees of tilt left', 'no criterion demands any')
+        yield NotChecked('tilt left', 'no criterion demands any')
     elif ANY not in sides and len(sides) < 4:
-        yield NotChecked('degrees of tilt left', f'criteria demand them only to the {_of(sides)}')
+        yield NotChecked('tilt left', f'criteria demand them only to the {_of(sides)}')
     of_torque = [v for v in values if v.signal.startswith('torque')]
     if settings.hears_joints and not of_torque:
         yield NotChecked('margin of torques', 'no criterion demands any')
@@ -117,7 +118,7 @@ def _permissive(demand: Value, length: float) -> str:
     if demand.share_in_violation == 1.0 or any(x is not None and x >= length for x in allowances):
         return 'it cannot fail: it may be violated all the time'
     if demand.signal == 'tip_angle' and not demand.below and demand.limit <= TIPPED:
-        return f'it allows {-math.degrees(demand.limit):g} degrees past the tipping point'
+        return f'it allows {-math.degrees(demand.limit):g} deg past tipping'
     if demand.signal == 'torque_utilisation' and demand.below and demand.limit > 1.0:
-        return f'it allows {demand.limit:.0%} of the torque limit'
+        return f'it allows {percent_words(demand.limit)} of the torque limit'
     return ''

@@ -15,6 +15,7 @@ from ugv_acceptance.evaluation.criteria.measurement import (
 from ugv_acceptance.evaluation.criteria.statement import Statement
 from ugv_acceptance.evaluation.criteria.uncertainty import Bounds
 from ugv_acceptance.evaluation.holding_back import Span, drawn_in_doubt
+from ugv_acceptance.evaluation.margin_words import percent_words, share_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Json
 
@@ -72,7 +73,8 @@ def short_of_data(evaluated: int, criterion: Criterion, findings: Findings) -> s
         return f'{criterion.name}: its window begins at {criterion.window[0]:g} s, after the end'
     if criterion.window is not None:
         what = f'{criterion.window[0]:g} to {criterion.window[1]:g} s'
-    return f'only {share:.1%} of {what} could be evaluated ({needed:.0%} needed)'
+    seen = f'only {share_words(share, 1)} of {what} could be evaluated'
+    return f'{seen} ({percent_words(needed)} needed)'
 
 
 def alert_words(alert: Alert, findings: Findings) -> str:
@@ -80,4 +82,5 @@ def alert_words(alert: Alert, findings: Findings) -> str:
     end = 'the end' if alert.end is None else f'{findings.seconds(alert.end):.2f} s'
     name = f'{level_words(alert.rule.level)} {alert.rule.code}'
     start = f'{findings.seconds(alert.start):.2f} s'
-    return f'{name} from {start} to {end}: {describe(alert, findings.settings)}'
+    words = describe(alert, findings.settings, findings.measurement.start)
+    return f'{name} from {start} to {end}: {words}'

@@ -4,7 +4,6 @@ Margins in degrees hold on flat ground. On uneven ground and stairs they are an 
 meeting a limit shows nothing; criteria may accept the trend or the cautious margin, with a reason.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -26,6 +25,12 @@ from ugv_acceptance.evaluation.ground import CARRIED, FLAT, KINDS
 from ugv_acceptance.evaluation.holding_back import doubtful_spans, drawn_in_doubt
 from ugv_acceptance.evaluation.least_margins import LeastTilt
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.margin_words import (
+    degrees_words,
+    percent_words,
+    share_words,
+    tipping_words,
+)
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.shortened_tracks import has_tracks
 from ugv_acceptance.model.stability import RAISED
@@ -131,7 +136,9 @@ class GroundExamination:
 
     def _objections(self, start: int) -> Iterator[Objection]:
         accept = self.criteria.ground
-        told = [f'at {(a.start - start) / 1e9:.2f} s: {self._words(a)}' for a in self._tipping()]
+        told = [
+            f'at {(a.start - start) / 1e9:.2f} s: {self._words(a, start)}' for a in self._tipping()
+        ]
         if accept is None:
             reason = (
                 f'the ground was taken as {self._kinds()} for {self._rough:.1f} s: margins in '
@@ -144,8 +151,8 @@ class GroundExamination:
             yield Objection(SAFEGUARD, FAIL if accept.rule == TREND else INCONCLUSIVE, text)
         yield from self._trend() if accept.rule == TREND else self._cautiously(start)
 
-    def _words(self, alert: Alert) -> str:
-        return describe(alert, self.settings)
+    def _words(self, alert: Alert, start: int) -> str:
+        return describe(alert, self.settings, start)
 
     def _tipping(self) -> Iterator[Alert]:
         """Yield the alerts of a robot that begins to tip which rest on margins to be believed."""
@@ -161,8 +168,8 @@ class GroundExamination:
         if judged < needed * looks or not looks:
             share = judged / looks if looks else 0.0
             reason = (
-                f'on {self._kinds()} the trend of the tilt left is known for {share:.1%} of the '
-                f'time only ({needed:.0%} needed)'
+                f'on {self._kinds()} the trend of the tilt left is known for '
+                f'{share_words(share, 1)} of the time only ({percent_words(needed)} needed)'
             )
             yield Objection(SAFEGUARD, INCONCLUSIVE, reason)
 
@@ -175,8 +182,7 @@ class GroundExamination:
         if least.value <= limit:
             reason = (
                 f'at {(least.time - start) / 1e9:.2f} s, taken cautiously for {self._kinds()}, '
-                f'{math.degrees(least.value):.1f} degrees of tilt are left to the {least.side}; '
-                f'limit: {math.degrees(limit):.1f} degrees'
+                f'{tipping_words(least.side, least.value)}; must stay above {degrees_words(limit)}'
             )
             yield Objection(SAFEGUARD, INCONCLUSIVE, reason)
 

@@ -110,6 +110,6 @@ def _rate_gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotCh
             what, f'{rate:.0f} messages a second are too few, {LEAST_RATE:.0f} are needed'
         )
     elif not tally.turned:
-        yield NotChecked(what, 'nothing turned faster than 0.1 rad/s and the noise')
+        yield NotChecked(what, 'nothing turned faster than 6 deg/s and the noise')
     elif not tally.verified:
         yield NotChecked(what, 'no window in which something turned verified them')

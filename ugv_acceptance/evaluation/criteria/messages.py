@@ -17,6 +17,12 @@ from ugv_acceptance.evaluation.criteria.criteria import (
 )
 from ugv_acceptance.evaluation.criteria.measurement import ValueMeasure
 from ugv_acceptance.evaluation.criteria.quantities import DATA, SIGNALS, shown
+from ugv_acceptance.evaluation.margin_words import (
+    number_beside,
+    percent_words,
+    tipping_words,
+    value_beside,
+)
 from ugv_acceptance.evaluation.settings import Settings
 
 
@@ -48,7 +54,7 @@ def _value_words(demand: Value, settings: Settings) -> str:
     if demand.longest_violation is not None:
         allowed.append(f'{demand.longest_violation:g} s at a time')
     if demand.share_in_violation is not None:
-        allowed.append(f'{demand.share_in_violation:.1%} of the time')
+        allowed.append(f'{percent_words(demand.share_in_violation)} of the time')
     return (
         f'{text} except for at most {" and ".join(allowed)}' if allowed else f'{text} at all times'
     )
@@ -57,7 +63,7 @@ def _value_words(demand: Value, settings: Settings) -> str:
 def number(value: float, demand: Value, settings: Settings) -> str:
     """Return a signal's value (SI) as text with the unit for people."""
     if demand.signal == 'torque_utilisation':
-        return f'{value:.0%}'
+        return percent_words(value)
     scale, unit = shown(demand.signal, demand.of, settings)
     return f'{value * scale:.3g} {unit}'.strip()
 
@@ -73,7 +79,7 @@ def _alert_words(demand: AlertDemand) -> str:
 def _data_words(demand: DataDemand) -> str:
     quantity = DATA[demand.quantity]
     bounds = [
-        f'{word} {100.0 * bound:g}%' if quantity.share else f'{word} {bound:g}'
+        f'{word} {percent_words(bound)}' if quantity.share else f'{word} {bound:g}'
         for word, bound in (('at least', demand.least), ('at most', demand.most))
         if math.isfinite(bound)
     ]
@@ -82,7 +88,8 @@ def _data_words(demand: DataDemand) -> str:
 
 
 def _map_words(demand: MapDemand) -> str:
-    return f'at least {demand.least:.0%} of the map of {" and ".join(demand.joints)} visited'
+    least, joints = percent_words(demand.least), ' and '.join(demand.joints)
+    return f'at least {least} of the map of {joints} visited'
 
 
 def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[str, Any]) -> str:
@@ -98,19 +105,18 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
     if demand.signal == 'torque_utilisation':
         limit = settings.limits.torque[settings.robot.joint_names.index(worst.subject)]
         _, unit = shown('torque', worst.subject, settings)
+        share = number_beside(100.0 * worst.value, 100.0 * demand.limit, 0)
+        need = number_beside(worst.value * limit, limit)
         return (
-            f'{worst.subject} needs {worst.value * limit:.1f} {unit} {at}; its limit is '
-            f'{limit:.1f} {unit}: its utilisation {must} ({spent})'
+            f'{worst.subject} {share} % of its limit {at}: it needs {need} of {limit:.1f} {unit}; '
+            f'{must} ({spent})'
         )
     if demand.signal == 'tip_angle':
-        degrees = math.degrees(worst.value)
-        where = f'of tilt left before the robot tips to the {worst.subject}'
-        if degrees < 0.0:
-            where = f'past the tipping point to the {worst.subject}'
-        return f'{at}: {abs(degrees):.1f} degrees {where}; the tilt left {must} ({spent})'
+        return f'{tipping_words(worst.subject, worst.value)} {at}; {must} ({spent})'
     subject = '' if worst.subject == 'robot' else f' of {worst.subject}'
-    words = SIGNALS[demand.signal].words
-    return f'{words}{subject} was {number(worst.value, demand, settings)} {at}; {must} ({spent})'
+    words, (scale, unit) = SIGNALS[demand.signal].words, shown(demand.signal, demand.of, settings)
+    value = value_beside(worst.value * scale, demand.limit * scale)
+    return f'{words}{subject} was {value} {unit} {at}; {must} ({spent})'
 
 
 # Why a criterion on a value is not judged where there is none.

@@ -5,9 +5,9 @@ stretches that nobody saw must not pass because nobody asked. Whoever means it w
 `waive: {name: reason}`, which then stands in the first line of the verdict.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
@@ -24,6 +24,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
 )
 from ugv_acceptance.evaluation.criteria.statement import Objection, Statement
+from ugv_acceptance.evaluation.margin_words import number_beside, share_words, tipping_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Json
 
@@ -75,15 +76,16 @@ def safeguarded(
     alerts: Sequence[Alert],
     data: Json,
     statements: Sequence[Statement],
+    start: int,
 ) -> Safeguarded:
     """Return all objections to a run: from its margins, its alerts, and its examinations.
 
-    `data` is the part of the result about margins, coverage and alerts.
+    `data` is the part of the result about margins, coverage and alerts; `start` (ns) of the run.
     """
     found = [
         *_from_margins(data),
         *_unseen(criteria, data),
-        *_from_alerts(alerts, settings, {key for x in statements for key in x.unfounded}),
+        *_from_alerts(alerts, settings, {key for x in statements for key in x.unfounded}, start),
         *(objection for statement in statements for objection in statement.objections),
     ]
     reasons = dict(criteria.waive)
@@ -98,8 +100,8 @@ def _from_margins(data: Json) -> Iterator[Objection]:
     least = stability['min_angle_deg']
     if least is not None and least <= 0.0:
         reason = (
-            f'at {stability["time_of_min_s"]:.2f} s: {-least:.1f} degrees past the tipping point '
-            f'to the {stability["edge"]}'
+            f'{tipping_words(stability["edge"], math.radians(least))} '
+            f'at {stability["time_of_min_s"]:.2f} s'
         )
         yield Objection('tipping', FAIL, reason)
     for name, joint in data['torque'].items():
@@ -108,8 +110,9 @@ def _from_margins(data: Json) -> Iterator[Objection]:
             continue
         if most is not None and most >= joint['limit']:
             reason = (
-                f'at {joint["time_of_min_s"]:.2f} s: {name} needs {most:.1f} {unit}; its limit is '
-                f'{joint["limit"]:.1f} {unit}'
+                f'{name} {share_words(most / joint["limit"])} of its limit at '
+                f'{joint["time_of_min_s"]:.2f} s: it needs '
+                f'{number_beside(most, joint["limit"])} of {joint["limit"]:.1f} {unit}'
             )
             yield Objection('torque_limit', FAIL, reason)
 
@@ -129,7 +132,7 @@ def _unseen(criteria: CriteriaSet, data: Json) -> Iterator[Objection]:
 
 
 def _from_alerts(
-    alerts: Sequence[Alert], settings: Settings, unfounded: set[tuple[str, str]]
+    alerts: Sequence[Alert], settings: Settings, unfounded: set[tuple[str, str]], start: int
 ) -> Iterator[Objection]:
     seen = set(unfounded)
     for alert in alerts:
@@ -137,7 +140,7 @@ def _from_alerts(
         if told is None or (alert.rule.code, alert.rule.subject) in seen:
             continue
         seen.add((alert.rule.code, alert.rule.subject))
-        yield Objection(*told, describe(alert, settings))
+        yield Objection(*told, describe(alert, settings, start))
 
 
 def reasons_of(found: Safeguarded, verdict: str, failed: Sequence[Value]) -> list[str]:
@@ -148,7 +151,7 @@ def reasons_of(found: Safeguarded, verdict: str, failed: Sequence[Value]) -> lis
 
 def safeguards_result(found: Safeguarded, criteria: CriteriaSet, settings: Settings) -> list[Json]:
     """Return the outcome of every safeguard for JSON: the worst of its objections."""
-    judged = any(isfinite(limit) for limit in settings.limits.torque)
+    judged = any(math.isfinite(limit) for limit in settings.limits.torque)
     checked = {'torque_limit': judged, 'imu': settings.hears_imu}
     checked |= dict.fromkeys(_OF_TILT, settings.judges_tilt)
     reasons = dict(criteria.waive)

@@ -51,6 +51,7 @@ from ugv_acceptance.evaluation.criteria.safeguards import (
 )
 from ugv_acceptance.evaluation.criteria.statement import NotChecked
 from ugv_acceptance.evaluation.criteria.uncertainty import moment_json
+from ugv_acceptance.evaluation.margin_words import percent_words, share_words
 from ugv_acceptance.evaluation.permitted_limits import relaxed_words
 from ugv_acceptance.type_aliases import Json
 
@@ -214,7 +215,12 @@ def judge_criteria(findings: Findings) -> Json:
     criteria = findings.measurement.criteria
     outcomes = [(c, _outcome(c, findings)) for c in criteria.criteria]
     held = safeguarded(
-        criteria, findings.settings, findings.alerts, findings.data, findings.statements
+        criteria,
+        findings.settings,
+        findings.alerts,
+        findings.data,
+        findings.statements,
+        findings.measurement.start,
     )
     word, reasons = _overall(outcomes, held, findings)
     waived = waived_words(criteria)
@@ -254,7 +260,10 @@ def _overall(
     if findings.measurement.criteria.path is None:
         text = kept_words(findings.settings)
     wider = relaxed_words(findings.settings)
-    return PASS, [f'{text}, {share:.1%} of the recording evaluated', *([wider] if wider else [])]
+    return PASS, [
+        f'{text}, {share_words(share, 1)} of the recording evaluated',
+        *([wider] if wider else []),
+    ]
 
 
 def _not_checked(findings: Findings) -> Iterable[NotChecked]:
@@ -349,8 +358,8 @@ def _unmet_words(
     data = findings.data
     if demand.quantity == 'coverage':
         return (
-            f'only {data["coverage"]["fraction"]:.1%} of the recording could be evaluated '
-            f'({demand.least:.0%} needed)'
+            f'only {share_words(data["coverage"]["fraction"], 1)} of the recording could be '
+            f'evaluated ({percent_words(demand.least)} needed)'
         )
     if demand.quantity == 'salvaged':
         return f'the recording is truncated: {data["bag"]["salvaged"]}'
@@ -371,8 +380,8 @@ def _judge_map(criterion: Criterion, findings: Findings) -> Outcome:
     if visited / cells >= demand.least:
         return Outcome(PASS, demand_words(criterion, findings.settings), measured)
     text = (
-        f'{criterion.name}: the run visited {visited} of {cells} cells ({visited / cells:.1%}); '
-        f'{demand.least:.0%} needed'
+        f'{criterion.name}: the run visited {visited} of {cells} cells '
+        f'({share_words(visited / cells, 1)}); {percent_words(demand.least)} needed'
     )
     return Outcome(INCONCLUSIVE, text, measured)
 

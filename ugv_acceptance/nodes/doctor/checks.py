@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.inputs.joint_names import names_words, what_to_se
 from ugv_acceptance.evaluation.inputs.joint_words import held_words, position_words
 from ugv_acceptance.evaluation.inputs.turns import FULL, Turns, turning_of
 from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.margin_words import rate_words
 from ugv_acceptance.evaluation.settings import UNKNOWN as UNPLACED
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.attitude import (
@@ -257,7 +258,7 @@ def _imu(samples: Sequence[ImuSample], config: Config) -> Iterator[Finding]:
         text = (
             'angular velocity is NaN'
             if math.isnan(spin)
-            else f'the robot turns at {spin:.2f} rad/s'
+            else f'the robot turns at {rate_words(spin, "rad/s")}'
         )
         yield Finding(WARN, 'imu', f'{text}: gravity cannot be judged', 'let it stand still')
         return

@@ -29,7 +29,6 @@ from ugv_acceptance.monitoring.diagnostics import (
     Status,
     alert_status,
     diagnostics_of,
-    guarded,
     unavailable,
     verdict_of,
 )
@@ -37,6 +36,7 @@ from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
+from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
 from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,

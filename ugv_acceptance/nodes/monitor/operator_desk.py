@@ -164,7 +164,20 @@ class OperatorDesk:
         place = ', '.join(f'{c:g}' for c in cog)
         found = {'mass_kg': repr(mass), 'cog_m': ','.join(map(repr, cog)), 'link': link or ''}
         where = f' at {place} m in {link}' if mass else ''
-        return f'payload is now {mass:g} kg{where}', {**found, 'topic': self._free_topic()}
+        others = self._others()
+        more = (
+            f'; {" and ".join(others)} may replace it, for it publishes loads too' if others else ''
+        )
+        said = f'payload is now {mass:g} kg{where}{more}'
+        return said, {**found, 'topic': self._free_topic()}
+
+    def _others(self) -> list[str]:
+        """Return the nodes whose next load replaces an operator's: consoles follow it."""
+        inputs = self._inputs()
+        nodes = [] if inputs is None else inputs.publishers.get('payload', [])
+        return [
+            node for node in nodes if not node.endswith(('/acceptance_console', '/acceptance_tell'))
+        ]
 
     def _free_topic(self) -> str:
         """Return the payload topic if its client may tell recorders there; '' if others do."""
