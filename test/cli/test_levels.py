@@ -77,8 +77,8 @@ def test_a_judged_recording_is_told_in_words(
     site.write_text(SITE)
     files = [tmp_path / name for name in ('r.html', 'r.json', 'm.csv')]
     options = zip(('--report', '--json', '--csv'), files, strict=True)
-    printed = here('evaluate', bag, *(x for pair in options for x in pair))
-    judged = here('evaluate', bag, '--criteria', site)
+    printed = here('evaluate', bag, '-v', *(x for pair in options for x in pair))
+    judged = here('evaluate', bag, '-v', '--criteria', site)
     for text in (printed, judged, files[0].read_text()):
         assert not FOR_MACHINES.search(text)
         assert words_of(text) >= shown

@@ -33,9 +33,9 @@ def described(*arguments: str) -> dict[str, Any]:
 
 
 def test_tables_fit_in_80_columns() -> None:
-    """Only paths and warnings may be longer: cut lines cannot be copied."""
+    """Only paths may be longer: cut lines cannot be copied."""
     lines = output_of().splitlines()
-    free = ('config ', 'urdf ', 'warning:')
+    free = ('config ', 'urdf ')
     assert [line for line in lines if len(line) > 80 and not line.startswith(free)] == []
 
 
@@ -56,7 +56,7 @@ def test_tables_fit_in_80_columns() -> None:
 )
 def test_what_the_tool_believes_is_printed(text: str) -> None:
     """Links, masses, joints, limits, contacts, polygon, payload and warnings."""
-    assert text in output_of('--posture', 'flipper_joint=180deg')
+    assert text.strip() in ' '.join(output_of('--posture', 'flipper_joint=180deg').split())
 
 
 def test_the_payload_that_is_left_is_exact() -> None:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from ugv_acceptance.cli.paper_simulation import simulated_arm, simulated_joints, simulated_truth
 from ugv_acceptance.config import load
@@ -12,7 +11,7 @@ from ugv_acceptance.studies.planar import PAPER, planar_torque
 
 def test_every_random_case_is_counted_once() -> None:
     """The confusion matrix holds all cases, and none differs far from the boundary."""
-    table = simulated_truth(load().settings.robot, 6, Console(quiet=True))
+    table = simulated_truth(load().settings.robot, 6)
     assert sum(int(cell) for row in table[1:4] for cell in row[1:] if cell) == 6
     assert table[4][1] == '0'
 

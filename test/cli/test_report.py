@@ -319,8 +319,9 @@ def test_another_recording_has_another_hash(papers: Path) -> None:
     bag = SHIPPED / 'packbot_pass'
     done = run(VERIFY, papers / 'packbot_fail.json', '--bag', bag)
     assert done.exit_code == 1
-    lines = [line.strip() for line in done.output.splitlines() if line.strip()]
-    assert lines[0].startswith('bag.sha256')
+    assert done.output.startswith('[X] DIFFERS')
+    differences = done.output.partition('differences')[2]
+    assert differences.split()[0].startswith('bag.sha256')
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ Ctrl-C on a terminal is SIGINT to all its processes; SIGTERM goes to the one tha
 import fcntl
 import os
 import pty
+import re
 import select
 import signal
 import struct
@@ -173,6 +174,23 @@ def test_a_verb_ends_when_it_is_told_to(name: str, tmp_path: Path) -> None:
                 run.errors()
             )
             assert '\x1b' not in run.out(), 'codes for a terminal where there is none'
+
+
+def test_a_stopped_campaign_says_how_to_go_on(tmp_path: Path) -> None:
+    """How many runs are judged, where their results are, and the command; nothing on a pipe."""
+    many(tmp_path / 'my runs')
+    words = ('campaign', 'my runs', '--workers', '2', '-o', 'all')
+    with started(tmp_path, words) as run:
+        end_it(
+            run, signal.SIGINT, lambda run: working(run) and any(run.folder.glob('all/runs/*.json'))
+        )
+        told = ' '.join(run.errors().split())
+        assert run.process.returncode == BROKEN_OFF[signal.SIGINT]
+    found = re.search(r'stopped: (\d+) of 200 runs are judged, their results are in all/runs', told)
+    assert found, told
+    assert int(found[1]) < 200
+    assert "ugv-acceptance campaign 'my runs' --workers 2 -o all" in told
+    assert run.out() == ''
 
 
 def many(folder: Path) -> None:

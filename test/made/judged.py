@@ -78,9 +78,9 @@ def judged(
 def told(result: Mapping[str, Any]) -> str:
     """Return the text that `evaluate` prints and the sentences of its result."""
     out = io.StringIO()
-    print_result(dict(result), Console(file=out, width=400, highlight=False))
+    print_result(dict(result), Console(file=out, highlight=False), verbose=True)
     kept = {key: result.get(key) for key in TOLD} | {'warnings': result['robot']['warnings']}
-    text = out.getvalue() + json.dumps(kept, ensure_ascii=False)
+    text = ' '.join(out.getvalue().split()) + json.dumps(kept, ensure_ascii=False)
     for path in result['bag']['path']:  # the name of a case is no word of ours
         text = text.replace(str(path), 'run').replace(str(Path(path).parent), 'run')
     return text

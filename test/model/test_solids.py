@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from robots import places, tracked
-from scipy.spatial.transform import Rotation
 
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Matrix, Shape
@@ -19,8 +18,8 @@ turns = st.floats(-3.2, 3.2)
 
 def leaning(angle: float) -> Matrix:
     """Return a rotation about x."""
-    a, b, c = Rotation.from_euler('x', angle).as_matrix().tolist()
-    return tuple(a), tuple(b), tuple(c)
+    s, c = math.sin(angle), math.cos(angle)
+    return (1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)
 
 
 SHAPES = (

@@ -27,7 +27,11 @@ def of_data(quantity: str, unit: str, **bounds: float | None) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ('measured', 'limit', 'worst'),
     [
-        (of_data('coverage', '', least=0.95), 'at least 95.0 %', f'joint_states 50.0 %, imu {DASH}'),
+        (
+            of_data('coverage', '', least=0.95),
+            'at least 95.0 %',
+            f'joint_states 50.0 %, imu {DASH}',
+        ),
         (of_data('longest_gap', 's', most=0.2), 'at most 0.2 s', f'joint_states 0.5 s, imu {DASH}'),
         (
             of_data('rate', 'Hz', least=90.0, most=110.0),

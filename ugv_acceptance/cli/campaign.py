@@ -1,6 +1,5 @@
 """`ugv-acceptance campaign`: judges many recorded runs and states their reliability."""
 
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -8,13 +7,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
+from ugv_acceptance.cli.terminal_output import (
+    again,
+    console_of,
+    progress,
+    said_of_work,
+    say,
+    say_list,
+    shown_verdict,
+    while_read,
+    wrote,
+)
 from ugv_acceptance.report.format import hours_text
 from ugv_acceptance.type_aliases import Json
 
@@ -26,8 +34,9 @@ if TYPE_CHECKING:
 
 
 VERDICTS = ('PASS', 'FAIL', 'INCONCLUSIVE', 'DOUBTFUL', 'BROKEN')
-MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
 _MOST_BROKEN = 8
+# Columns of the names before the statement's values.
+_NAMES = 13
 # Verdicts whose runs are named with the reason, and what they have in common.
 _NAMED = {
     'DOUBTFUL': 'passed with doubts',
@@ -36,25 +45,33 @@ _NAMED = {
 }
 
 
-def print_campaign(said: Json, out: Path, console: Console | None = None) -> None:
-    """Print the statement of a campaign, and where its files are."""
-    console = console or Console(highlight=False)
-    table = Table(box=None, pad_edge=False, padding=(0, 2), show_header=False)
+def print_campaign(said: Json) -> None:
+    """Print the statement of a campaign; its verdict first and last."""
+    console = console_of()
+    verdict = shown_verdict(_WORDS[exit_code(said)], verdict_text(said))
+    say(console, verdict)
     for what, text in lines(said):
-        table.add_row(escape(what), escape(text))
-    console.print(table)
+        say(console, f'{what:{_NAMES}}{escape(text)}', 2, 2 + _NAMES)
     for word, what in _NAMED.items():
         runs = [run for run in said['each_run'] if run['verdict'] == word]
-        for run in runs[:_MOST_BROKEN]:
-            text = f'    {word} {run["name"]}: {run["reasons"][0]}'
-            console.print(escape(text), soft_wrap=True)
-        if len(runs) > _MOST_BROKEN:
-            console.print(f'    and {len(runs) - _MOST_BROKEN} more that {what}')
-    console.print(f'    {escape(str(out / "campaign.json"))}, campaign.html', soft_wrap=True)
+        told = [f'{word} {run["name"]}: {run["reasons"][0]}' for run in runs]
+        say_list(console, told, _MOST_BROKEN, f'that {what} (campaign.json lists them)', 2)
+    say(console, verdict)
+
+
+def verdict_text(said: Json) -> str:
+    """Return what the verdict of a campaign is about: its requirement, or what its runs came to."""
+    if said['no_statement'] is not None:
+        return 'nothing is stated: runs are missing'
+    if said['requirement'] is not None:
+        return requirement_text(said['requirement'], f'{said["confidence"]:.0%}')
+    runs = said['runs']
+    counts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS if runs[word])
+    return f'{runs["total"]} runs: {counts or "none"}'
 
 
 def lines(said: Json) -> list[tuple[str, str]]:
-    """Return the statement as pairs of a name and a value."""
+    """Return the statement but its requirement as pairs of a name and a value."""
     runs, share = said['runs'], f'{said["confidence"]:.0%}'
     hours, failed = said['hours'], said['failures']
     verdicts = ', '.join(f'{runs[word]} {word}' for word in VERDICTS)
@@ -89,8 +106,6 @@ def lines(said: Json) -> list[tuple[str, str]]:
         found.append(('availability', f'{text}; {shown} at {share}'))
     if said['endurance']:
         found.append(('longest run', endurance_text(said['endurance'], share)))
-    if said['requirement']:
-        found.append(('requirement', requirement_text(said['requirement'], share)))
     if said['comparison']:
         found += comparison_lines(said['comparison'], said['confidence'])
     return found
@@ -139,7 +154,7 @@ def endurance_text(found: Json, share: str) -> str:
 
 def requirement_text(found: Json, share: str) -> str:
     """Return whether the required MTBF is demonstrated, and the hours missing, as text."""
-    start = f'{MARKS[found["verdict"]]} MTBF {found["mtbf_h"]:g} h at {share}'
+    start = f'MTBF {found["mtbf_h"]:g} h at {share}'
     words = {'PASS': 'demonstrated', 'FAIL': 'excluded', 'INCONCLUSIVE': 'not demonstrated'}
     text = f'{start}: {words[found["verdict"]]}'
     if found['verdict'] == 'PASS':
@@ -184,15 +199,16 @@ def _group_text(group: Json) -> str:
 
 
 def print_effort(effort: 'Effort', runs: int, seconds: float) -> None:
-    """Print how fast the runs were judged, and how many already had a result."""
+    """Say how fast the runs were judged, and how many already had a result."""
     rate = 3600.0 / max(seconds, 1e-9)
-    text = f'    {effort.judged} of {runs} newly judged in {seconds:.1f} s'
+    text = f'{effort.judged} of {runs} newly judged in {seconds:.1f} s'
     if effort.judged:
         text += f': {effort.judged * rate:.0f} bags/h, {effort.size / 1e9 * rate:.2f} GB/h'
-    Console(highlight=False).print(text, soft_wrap=True)
+    say(said_of_work(), text)
 
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
+_WORDS = {0: 'PASS', 1: 'FAIL', 2: 'BAD INPUT', 3: 'INCONCLUSIVE'}
 
 
 def campaign(
@@ -252,18 +268,16 @@ def campaign(
 
     \b
     Examples:
-      ugv-acceptance campaign recordings --require-mtbf 96 --failures failures.yaml
+      ugv-acceptance campaign recordings --require-mtbf 96 --failures log.yaml
       ugv-acceptance campaign s3://bucket/runs --scheduler tcp://head:8786
-      ugv-acceptance campaign recordings --compare 'old=*/fw1/*' --compare 'new=*/fw2/*'
+      ugv-acceptance campaign runs --compare 'old=*/fw1/*' --compare 'new=*/fw2/*'
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.campaign.carry_out import Place, all_failures, carry_out
     from ugv_acceptance.campaign.failure_log import read_log
     from ugv_acceptance.campaign.pool import cores
     from ugv_acceptance.campaign.sources import find_sources
     from ugv_acceptance.campaign.statement import Question, statement
-    from ugv_acceptance.cli.campaign import print_campaign, print_effort
     from ugv_acceptance.cli.output_kinds import CAMPAIGN
-    from ugv_acceptance.cli.result_text import while_read
 
     check_requirement(require_mtbf)
     question = Question(confidence, require_mtbf, ended_by_failure, groups_from(compare or []))
@@ -274,15 +288,16 @@ def campaign(
     inputs = inputs_of(brief.config, recorded, criteria=criteria, failures=failures)
     check_folder('--out', out, CAMPAIGN, inputs, overwrite=overwrite)
     began = time.monotonic()
-    with progress_bar(len(sources)) as progress:
+    with counted_runs(out, len(sources)) as reached:
         place = Place(out, workers or cores(), scheduler, cluster_wait)
-        rows, effort = carry_out(sources, brief, place, progress)
+        rows, effort = carry_out(sources, brief, place, reached)
     took = time.monotonic() - began
     said = statement(rows, all_failures(rows, entries), question, origin)
     write(out, said)
     with while_read():
-        print_campaign(said, out)
-        print_effort(effort, len(sources), took)
+        print_campaign(said)
+    print_effort(effort, len(sources), took)
+    wrote(out / 'runs', out / 'campaign.json', out / 'campaign.html')
     raise typer.Exit(exit_code(said))
 
 
@@ -355,26 +370,30 @@ def write(out: Path, said: dict[str, Any]) -> None:
 
 
 @contextmanager
-def progress_bar(total: int) -> 'Iterator[Callable[[Done], None]]':
-    """Show how many runs are done and how many not judged, if the output is a terminal."""
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress
+def counted_runs(out: Path, total: int) -> 'Iterator[Callable[[Done], None]]':
+    """Show how many runs are done and how many not judged; when it is stopped, how to go on."""
+    done = lost = 0
+    with progress('runs', total, 'runs') as reached:
 
-    console = Console(file=sys.stderr)
-    with Progress(
-        *Progress.get_default_columns(),
-        MofNCompleteColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task('runs', total=total)
-        lost = 0
+        def advance(one: 'Done') -> None:
+            nonlocal done, lost
+            done, lost = done + 1, lost + bool(one.lost)
+            reached(done, f'({lost} not judged)' if lost else '')
 
-        def advance(done: 'Done') -> None:
-            nonlocal lost
-            lost += bool(done.lost)
-            words = f'runs ({lost} not judged)' if lost else 'runs'
-            bar.update(task, advance=1, description=words)
+        try:
+            yield advance
+        except SystemExit:
+            held = done - lost
+            _say_stopped(out, held, total)
+            raise
 
-        yield advance
+
+def _say_stopped(out: Path, held: int, total: int) -> None:
+    """Say what a campaign has that was stopped, and how to go on."""
+    console = said_of_work()
+    say(
+        console,
+        f'stopped: {held} of {total} runs are judged, their results are in '
+        f'{escape(str(out / "runs"))}. This judges the other {total - held}:',
+    )
+    console.print(f'  {escape(again())}', soft_wrap=True)

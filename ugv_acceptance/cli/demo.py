@@ -16,6 +16,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from ugv_acceptance import BadBag
+from ugv_acceptance.cli.plain_text import has_utf8
+from ugv_acceptance.cli.terminal_output import console_of, say
 
 if TYPE_CHECKING:
     from ugv_acceptance.cli.monitor import Raised
@@ -33,20 +35,24 @@ def demonstrate(bag: Path | None, rate: float, *, page: bool) -> int:
     from ugv_acceptance.cli.result_text import print_result
     from ugv_acceptance.offline.evaluate import evaluate
 
-    console = Console(highlight=False)
+    console = console_of()
     path = find(bag)
     domain = free_domain()
     os.environ['ROS_DOMAIN_ID'] = str(domain)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    console.rule('1. Live: a recorded run, published through DDS, watched by the monitor')
-    console.print(
-        f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}', soft_wrap=True
-    )
+    _head(console, '1. Live: a recorded run, published through DDS, watched by the monitor')
+    say(console, f'{escape(str(path))} at {rate:g} x real time, ROS domain {domain}')
     alerts, played = live(path, rate, console, page=page)
-    console.rule('2. The same run from the recording')
+    _head(console, '2. The same run from the recording')
     result = evaluate(path).result
-    print_result(result)
+    print_result(result, console)
     return conclude(console, alerts, played, result)
+
+
+def _head(console: Console, text: str) -> None:
+    """Print the heading of a part."""
+    console.print()
+    console.rule(text, characters='-' if not has_utf8(sys.stdout) else '─')
 
 
 def free_domain() -> int:
@@ -117,29 +123,29 @@ def announce(process: 'subprocess.Popen[str]', console: Console) -> None:
     said = next(iter(process.stdout or ()), '').split()
     if len(said) > 2:
         text = f'Open {said[2]} in a browser on this machine to see it as an operator does.'
-        console.print(text, soft_wrap=True)
+        say(console, text)
 
 
 def conclude(console: Console, seen: 'Raised', played: bool, result: dict[str, Any]) -> int:
     """Print the results of the live run and of the evaluation; return the exit code."""
     from ugv_acceptance.evaluation.alerts.messages import level_words
 
-    console.rule('3. The result')
+    _head(console, '3. The result')
     recorded = Counter((a['code'], a['subject'], a['level']) for a in result['alerts'])
     both, only_live, only_bag = seen & recorded, seen - recorded, recorded - seen
-    console.print(f'{both.total()} alerts were raised both live and from the recording.')
+    say(console, f'{both.total()} alerts were raised both live and from the recording.')
     for name, extra in (('live', only_live), ('from the recording', only_bag)):
         for code, subject, level in extra:
             why = ' (before it began and after it ended)' if code == 'INPUT_STALE' else ''
-            console.print(f'only {name}: {level_words(level)} {code} {subject}{why}')
+            say(console, f'only {name}: {level_words(level)} {code} {subject}{why}')
     verdict = result['verdict']
-    console.print(f'The verdict on the recording is [bold]{verdict}[/].')
+    say(console, f'The verdict on the recording is [bold]{verdict}[/].')
     if verdict == 'FAIL' and Path(result['bag']['path'][0]).name.startswith(BAG):
-        console.print('FAIL is the right verdict: this run was made to break the limits.')
+        say(console, 'FAIL is the right verdict: this run was made to break the limits.')
     if not played or not seen:
-        console.print('[bold red]The live part did not work:[/] try `ugv-acceptance doctor`.')
+        say(console, '[bold red]The live part did not work:[/] try `ugv-acceptance doctor`.')
         return BROKEN
-    console.print('Everything worked.')
+    say(console, 'Everything worked.')
     return WORKED
 
 

@@ -1,14 +1,19 @@
 """`ugv-acceptance doctor`: checks a ROS set-up and says what to do."""
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
+from ugv_acceptance.cli.terminal_output import console_of, said_of_work, say
+
+if TYPE_CHECKING:
+    from ugv_acceptance.nodes.doctor.checks import Finding
 
 COLOURS = {'OK': 'bold green', 'WARN': 'bold yellow', 'FAIL': 'bold red'}
 FINE, AILING = 0, 1
@@ -20,7 +25,7 @@ _NO_ROS = (
 
 def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[str]) -> int:
     """Print the findings and return the exit code: 1 if any has failed."""
-    console = Console(highlight=False)
+    console = console_of()
     if find_spec('rclpy') is None:
         tell(console, 'FAIL', 'ROS', 'not found', _NO_ROS)
         return AILING
@@ -29,21 +34,31 @@ def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[s
     from ugv_acceptance.nodes.monitor.own_description import load_live
 
     loaded = load_live(config, urdf, args)
-    console.print(f'Listening for {seconds:g} s; let the robot stand still.')
-    levels = []
-    for finding in examine(listen(loaded.topics, seconds, args), loaded):
+    say(said_of_work(), f'Listening for {seconds:g} s; let the robot stand still.')
+    findings = list(examine(listen(loaded.topics, seconds, args), loaded))
+    outcome = _outcome(findings)
+    say(console, outcome)
+    for finding in findings:
         tell(console, finding.level, finding.about, finding.seen, finding.do)
-        levels.append(finding.level)
-    failed, warned = levels.count('FAIL'), levels.count('WARN')
-    console.print(f'{len(levels)} checks: {failed} failed, {warned} warnings')
-    return AILING if failed else FINE
+    say(console, outcome)
+    return AILING if any(finding.level == 'FAIL' for finding in findings) else FINE
+
+
+def _outcome(findings: 'Sequence[Finding]') -> str:
+    """Return what the checks came to, as markup: how many, and which have failed."""
+    failed = [finding.about for finding in findings if finding.level == 'FAIL']
+    warned = sum(finding.level == 'WARN' for finding in findings)
+    colour = COLOURS['FAIL' if failed else 'WARN' if warned else 'OK']
+    named = f': {", ".join(failed)}' if failed else ''
+    counts = f'{len(failed)} failed{named}; {warned} warning{"s" * (warned != 1)}'
+    return f'[{colour}]{len(findings)} checks[/]: {escape(counts)}'
 
 
 def tell(console: Console, level: str, about: str, seen: str, do: str) -> None:
     """Print one finding."""
     advice = f' [dim]->[/] {escape(do)}' if do else ''
     text = f'[{COLOURS[level]}]{level:<4}[/] {escape(about)}: {escape(seen)}{advice}'
-    console.print(text, soft_wrap=True)
+    say(console, text, 0, 5)
 
 
 __all__ = ['CONTEXT', 'doctor']
@@ -62,7 +77,7 @@ def doctor(
     \b
     Examples:
       ugv-acceptance doctor
-      ugv-acceptance doctor --config my_robot.yaml --seconds 10 --ros-args -r __ns:=/robot1
+      ugv-acceptance doctor -c my_robot.yaml --seconds 10 --ros-args -r __ns:=/r1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.doctor import consult
 

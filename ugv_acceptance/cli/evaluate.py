@@ -6,7 +6,15 @@ from typing import Annotated, Any
 import typer
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, GroundKinds, Overwrite, UrdfFile
+from ugv_acceptance.cli.options import (
+    ConfigFile,
+    CriteriaFile,
+    GroundKinds,
+    Overwrite,
+    UrdfFile,
+    Verbose,
+    dash,
+)
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
@@ -21,10 +29,12 @@ def evaluate(
     config: ConfigFile = None,
     urdf: UrdfFile = None,
     json_file: Annotated[
-        Path | None, typer.Option('--json', help='Write the result to this file.')
+        Path | None,
+        typer.Option('--json', callback=dash, help='Write the result to this file; -: print it.'),
     ] = None,
     csv_file: Annotated[
-        Path | None, typer.Option('--csv', help='Write the margins over time to this file.')
+        Path | None,
+        typer.Option('--csv', callback=dash, help='Write the margins over time to this file.'),
     ] = None,
     compare_effort: Annotated[
         bool,
@@ -55,6 +65,7 @@ def evaluate(
         Path | None,
         typer.Option(help='Write the recording with margins, verdict and alerts beside it (MCAP).'),
     ] = None,
+    verbose: Verbose = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Judge recorded runs: margins, alerts and a verdict with its reasons.
@@ -65,9 +76,9 @@ def evaluate(
     \b
     Examples:
       ugv-acceptance evaluate bags/packbot_pass
-      ugv-acceptance evaluate run_0.mcap run_1.mcap --json result.json --csv margins.csv
-      ugv-acceptance evaluate run --config my_robot.yaml --urdf my_robot.urdf --compare-effort
-      ugv-acceptance evaluate run --criteria site.yaml --json r.json --report r.html --junit r.xml
+      ugv-acceptance evaluate run_0.mcap run_1.mcap --json r.json --csv m.csv
+      ugv-acceptance evaluate run -c robot.yaml --urdf robot.urdf --compare-effort
+      ugv-acceptance evaluate run --criteria site.yaml --report r.html --junit r.xml
       ugv-acceptance evaluate run --annotate run_judged.mcap
       ugv-acceptance evaluate run --ground stairs=12s..40s
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
@@ -75,7 +86,8 @@ def evaluate(
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.evidence import Papers, evaluate_files, write_junit
     from ugv_acceptance.cli.ground_option import ground_from
-    from ugv_acceptance.cli.result_text import print_result, while_read
+    from ugv_acceptance.cli.result_text import print_results
+    from ugv_acceptance.cli.terminal_output import complain, result_console, while_read, wrote
     from ugv_acceptance.config import description_topic, load
     from ugv_acceptance.config.files import find
     from ugv_acceptance.config.identity import file_of, identity_from
@@ -97,7 +109,7 @@ def evaluate(
                 paths, robot, papers, compare_effort=compare_effort, identity=entered
             ).result
         except AcceptanceError as error:
-            typer.echo(f'ugv-acceptance: {error}', err=True)
+            complain(str(error))
             result = {'verdict': 'BAD INPUT', 'reasons': [str(error)], 'bag': {'path': paths}}
             codes.append(BAD_INPUT)
         else:
@@ -108,9 +120,8 @@ def evaluate(
     if junit is not None:
         write_junit(junit, results)
     with while_read():
-        for result in results:
-            if result['verdict'] in EXIT:
-                print_result(result)
+        print_results(results, result_console(json_file, csv_file, junit), verbose=verbose)
+    wrote(json_file, junit)
     raise typer.Exit(worst(codes))
 
 

@@ -1,17 +1,15 @@
 """Writes the files `evaluate` is asked for: report, PDF, JUnit XML, tables, criteria."""
 
-import sys
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import typer
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from ugv_acceptance.cli.outputs import Output
     from ugv_acceptance.config import Config
@@ -74,7 +72,7 @@ def evaluate_files(
     `config` is a path where the recording has to tell the robot's URDF.
     """
     from ugv_acceptance.bag.recording import open_recording
-    from ugv_acceptance.cli.result_text import progress_of
+    from ugv_acceptance.cli.terminal_output import wrote
     from ugv_acceptance.evaluation.downsampling import StripRecorder
     from ugv_acceptance.offline.evaluate import evaluate
     from ugv_acceptance.offline.judge import Options
@@ -89,7 +87,7 @@ def evaluate_files(
     with (
         CsvSink(papers.csv, settings, start) as csv,
         ParquetSink(papers.parquet, settings, start) as parquet,
-        progress_of(start, end, sys.stderr) as progress,
+        reading(start, end) as progress,
     ):
         takers = [*csv.sinks, *parquet.sinks]
         detail = bool(takers)
@@ -102,21 +100,32 @@ def evaluate_files(
             identity=identity,
             options=Options(tuple(takers), progress, detail, compare_effort),
         )
+    wrote(papers.csv, papers.parquet)
     if papers.annotate is not None:
         annotate(papers.annotate, found)
     write_papers(papers, found.result, recorder, settings)
     return found
 
 
+@contextmanager
+def reading(start: int, end: int) -> 'Iterator[Callable[[int], None]]':
+    """Show how far a recording is read; yields a function of the log time (ns) reached."""
+    from ugv_acceptance.cli.terminal_output import progress
+
+    with progress('reading', max(end - start, 1) / 1e9, 's of the recording') as reached:
+        yield lambda now: reached((now - start) / 1e9, '')
+
+
 def annotate(path: Path, evaluation: 'Evaluation') -> None:
     """Write a copy of the recording with margins, alerts and verdict added, for viewers."""
     from ugv_acceptance.bag.annotated import write_annotated
-    from ugv_acceptance.cli.result_text import progress_of
+    from ugv_acceptance.cli.terminal_output import wrote
     from ugv_acceptance.offline.annotation import Annotation
 
     told, bag = Annotation(evaluation), evaluation.recording.bag
-    with progress_of(bag.start_ns, bag.end_ns, sys.stderr) as progress:
+    with reading(bag.start_ns, bag.end_ns) as progress:
         write_annotated(path, bag, told.types, told.said(), progress)
+    wrote(path)
 
 
 def write_papers(
@@ -125,12 +134,14 @@ def write_papers(
     """Write the report, the PDF and the proposed criteria of one recording."""
     if recorder is not None:
         from ugv_acceptance.bag.atomic_files import write_text
+        from ugv_acceptance.cli.terminal_output import wrote
         from ugv_acceptance.config.identity import PARTS
         from ugv_acceptance.report.acceptance import acceptance_page
 
         html = acceptance_page(result, recorder.strips(), settings, PARTS)
         if papers.report is not None:
             write_text(papers.report, html)
+            wrote(papers.report)
         if papers.pdf is not None:
             _write_pdf(papers.pdf, html)
     if papers.init_criteria is not None:
@@ -140,25 +151,29 @@ def write_papers(
 def _propose(path: Path, result: Json) -> None:
     """Write criteria that a good run meets; for any other print why not, the verdict stands."""
     from ugv_acceptance.bag.atomic_files import write_text
+    from ugv_acceptance.cli.terminal_output import complain, wrote
     from ugv_acceptance.config.seal import sealed
     from ugv_acceptance.evaluation.criteria.proposal import proposed_criteria
 
     if result['verdict'] == 'PASS':
         write_text(path, sealed(proposed_criteria(result, result['robot']['name'])))
+        wrote(path)
     else:
-        text = f'--init-criteria: expected a run that passes, got {result["verdict"]}'
-        typer.echo(f'ugv-acceptance: {text}', err=True)
+        complain(f'--init-criteria: expected a run that passes, got {result["verdict"]}')
 
 
 def _write_pdf(path: Path, html: str) -> None:
     """Write the PDF; without WeasyPrint print that and go on: the verdict does not need it."""
     from ugv_acceptance.bag.atomic_files import write_bytes
+    from ugv_acceptance.cli.terminal_output import complain, wrote
     from ugv_acceptance.report.acceptance import pdf_of
 
     try:
         write_bytes(path, pdf_of(html))
     except AcceptanceError as error:
-        typer.echo(f'ugv-acceptance: {error}', err=True)
+        complain(str(error))
+    else:
+        wrote(path)
 
 
 def write_junit(path: Path, results: list[Json]) -> None:

@@ -15,12 +15,14 @@ def foxglove(
 ) -> None:
     """Show the live topics in Foxglove or Lichtblick on this machine (needs foxglove-sdk).
 
-    Read only: nothing can be published, set or called. Ctrl-C ends.
+    Read only: nothing can be published, set or called. Open ws://localhost:8765 there, with the
+    layout layouts/foxglove.json; of a robot over SSH: ssh -L 8765:localhost:8765 robot
+    ugv-acceptance foxglove. Ctrl-C ends.
 
     \b
     Examples:
-      ugv-acceptance foxglove        # then open ws://localhost:8765 and layouts/foxglove.json
-      ssh -L 8765:localhost:8765 robot ugv-acceptance foxglove
+      ugv-acceptance foxglove
+      ugv-acceptance foxglove --port 0 --ros-args -r __ns:=/robot1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.nodes.executor import end, ros, spin
     from ugv_acceptance.nodes.foxglove_bridge import Bridge

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.completion import words_like
 from ugv_acceptance.cli.options import Overwrite
+from ugv_acceptance.cli.terminal_output import console_of, say, wrote
 
 if TYPE_CHECKING:
     from ugv_acceptance.cli.init_work import Found
@@ -26,7 +25,7 @@ COLOURS = {
 }
 
 
-def say(text: str) -> None:
+def doing(text: str) -> None:
     """Say on a terminal what is being done; nothing in a script."""
     if sys.stderr.isatty():
         typer.echo(f'{text} ...', err=True)
@@ -41,29 +40,25 @@ def print_found(found: 'Found') -> int:
     """Print checks, notes and what is open; return the exit code."""
     from ugv_acceptance.configure.checks import exit_code
 
-    console = Console(highlight=False)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ('check', '', 'what was found'):
-        table.add_column(column, overflow='fold')
-    for check in found.checks:
-        state = f'[{COLOURS[check.state]}]{check.state}[/]'
-        table.add_row(escape(check.what), state, escape(check.text))
-    for note in found.notes:
-        console.print(f'note: {escape(note)}', soft_wrap=True)
-    console.print(table)
-    for question in found.questions:
-        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
-        console.print(escape(text), soft_wrap=True)
-    code = exit_code(found.checks)
+    console, code = console_of(), exit_code(found.checks)
     failed = [check.what for check in found.checks if check.state == 'FAILS']
     words = {
-        DONE: f'done: {found.done}',
-        FAILS: f'NOT done, a check fails: {", ".join(failed)}',
-        OPEN: 'NOT done: something is open, and what hangs on it is not checked',
+        DONE: f'[bold green]done:[/] {escape(found.done)}',
+        FAILS: f'[bold red]NOT done, a check fails:[/] {escape(", ".join(failed))}',
+        OPEN: '[bold yellow]NOT done:[/] something is open, and what hangs on it is not checked',
     }
-    for path in found.written:
-        console.print(f'written: {escape(str(path))}', soft_wrap=True)
-    console.print(escape(words[code]), soft_wrap=True)
+    say(console, words[code])
+    for note in found.notes:
+        say(console, f'note: {escape(note)}')
+    wide = max((len(check.what) for check in found.checks), default=0)
+    for check in found.checks:
+        state = f'[{COLOURS[check.state]}]{check.state:8}[/]'
+        say(console, f'{check.what:{wide}}  {state}  {escape(check.text)}', 2, wide + 14)
+    for question in found.questions:
+        text = f'open: {question.key}: {question.option}; until then {question.otherwise}'
+        say(console, escape(text))
+    say(console, words[code])
+    wrote(*found.written)
     return code
 
 
@@ -96,24 +91,42 @@ def init(
         typer.Option(help='Check this configuration, against a recording if one is given.'),
     ] = None,
     mass: Annotated[
-        str | None, typer.Option(help='What it weighs on scales: 68kg; or urdf: as the URDF says.')
+        str | None,
+        typer.Option(
+            help='What it weighs on scales: 68kg; or urdf: as the URDF says.',
+            autocompletion=words_like('urdf'),
+        ),
     ] = None,
     contacts: Annotated[
-        str | None, typer.Option(help='What touches the ground: yes (as found), no, LINK,LINK.')
+        str | None,
+        typer.Option(
+            help='What touches the ground: yes (as found), no, LINK,LINK.',
+            autocompletion=words_like('yes', 'no'),
+        ),
     ] = None,
     tilt: Annotated[
-        str | None, typer.Option(help='The tilt of its contact points is real, or not-real.')
+        str | None,
+        typer.Option(
+            help='The tilt of its contact points is real, or not-real.',
+            autocompletion=words_like('real', 'not-real'),
+        ),
     ] = None,
     mounting: Annotated[
         str | None,
-        typer.Option(help='How the IMU is turned: 180deg,-90deg,0; yes (as found); none.'),
+        typer.Option(
+            help='How the IMU is turned: 180deg,-90deg,0; yes (as found); none.',
+            autocompletion=words_like('yes', 'none'),
+        ),
     ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(help='JOINT=50 (N m; N of a slide), =none, =urdf; "*=urdf" (repeatable).'),
     ] = None,
     load_link: Annotated[
-        str | None, typer.Option(help='The link that carries the load, or none.')
+        str | None,
+        typer.Option(
+            help='The link that carries the load, or none.', autocompletion=words_like('none')
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -130,7 +143,7 @@ def init(
       ugv-acceptance init husky.urdf
       ugv-acceptance init husky.urdf run/ --mass 52kg --picture husky.png
       ugv-acceptance init robot.urdf.xacro --meshes ~/ws/src -o robot.yaml
-      ugv-acceptance init run/ --contacts wheel_1,wheel_2,wheel_3 --limit 'arm_*=urdf'
+      ugv-acceptance init run/ --contacts wheel_1,wheel_2 --limit 'arm_*=urdf'
       ugv-acceptance init --live --for 20s
       ugv-acceptance init --check robot.yaml run/ --picture robot.html
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
@@ -142,7 +155,7 @@ def init(
     heard = quantity(seconds, 'time', '--for') if live else None
     arguments = dict(_argument(text) for text in xacro_arg or ())
     asked = Asked(
-        tuple(sources or ()), tuple(meshes or ()), heard, arguments, picture, overwrite, say
+        tuple(sources or ()), tuple(meshes or ()), heard, arguments, picture, overwrite, doing
     )
     if check is not None:
         _refuse_answers(answers)

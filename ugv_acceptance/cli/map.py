@@ -5,40 +5,62 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import (
+    MAPS,
+    ORIENTATIONS,
+    joints_like,
+    map_files_like,
+    poses_like,
+    words_like,
+)
 from ugv_acceptance.cli.options import Overwrite, PayloadMass, RobotFile
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
-from ugv_acceptance.type_aliases import Floats
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
     from ugv_acceptance.report.map_data import Scene
+    from ugv_acceptance.type_aliases import Floats
 
 
 def map(  # noqa: A001 - the verb's name; one parameter an option
-    kind: Annotated[str, typer.Argument(help='torque, rollover, payload or drag.')],
+    kind: Annotated[
+        str,
+        typer.Argument(help='torque, rollover, payload or drag.', autocompletion=words_like(*MAPS)),
+    ],
     out: Annotated[
         list[Path] | None,
-        typer.Option(help='File to write: .svg, .png, .csv or .npz; may be given again.'),
+        typer.Option(
+            help='File to write: .svg, .png, .csv or .npz; may be given again.',
+            autocompletion=map_files_like,
+        ),
     ] = None,
     config: RobotFile = None,
     x: Annotated[
         str,
         typer.Option(
             help='Joint of the horizontal axis: JOINT or JOINT=0deg:180deg; by default the first '
-            'of the arm that lifts.'
+            'of the arm that lifts.',
+            autocompletion=joints_like,
         ),
     ] = '',
     y: Annotated[
         str,
         typer.Option(
-            help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg; by default the second.'
+            help='Joint of the vertical axis: JOINT or JOINT=0deg:360deg; by default the second.',
+            autocompletion=joints_like,
         ),
     ] = '',
-    posture: Annotated[str, typer.Option(help='Posture of the other joints: joint=30deg,...')] = '',
+    posture: Annotated[
+        str,
+        typer.Option(
+            help='Posture of the other joints: joint=30deg,...', autocompletion=poses_like
+        ),
+    ] = '',
     orientation: Annotated[
         str,
         typer.Option(
-            help='How the ground lies: level, right, left, nose-up, nose-down, nose-up-right, ...'
+            help='How the ground lies: level, right, left, nose-up, nose-down, nose-up-right, ...',
+            autocompletion=words_like(*ORIENTATIONS),
         ),
     ] = 'level',
     slope: Annotated[str, typer.Option(help='How far it is tilted: 30deg.')] = '30deg',
@@ -64,16 +86,19 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     \b
     Examples:
       ugv-acceptance map torque
-      ugv-acceptance map rollover --orientation right --slope 30deg --posture flipper_joint=180deg
-      ugv-acceptance map payload --limit shoulder_joint=70,elbow_joint=70 --out payload.png
-      ugv-acceptance map rollover --x flipper_joint=-30deg:180deg --y elbow_joint --out tip.csv
+      ugv-acceptance map rollover --orientation right --posture flipper_joint=180deg
+      ugv-acceptance map payload --limit elbow_joint=70 --out payload.png
+      ugv-acceptance map rollover --x flipper_joint=0deg:180deg --out tip.csv
       ugv-acceptance map rollover --from-bag bags/packbot_pass
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
+    from rich.markup import escape
+
     from ugv_acceptance.bag.atomic_files import whole
     from ugv_acceptance.bag.recording import open_recording
     from ugv_acceptance.cli import output_kinds as kinds
     from ugv_acceptance.cli.map_scene import Wanted, scene_from, with_levels
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
+    from ugv_acceptance.cli.terminal_output import result_console, say, wrote
     from ugv_acceptance.config import load
     from ugv_acceptance.offline.own_robot import robot_of
     from ugv_acceptance.report.map_data import map_of
@@ -89,14 +114,16 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     data = with_levels(map_of(kind, scene), caution, failure)
     warn(payload_doubts(scene.robot, payload))
     track = _track(loaded, scene, from_bag) if from_bag else None
-    typer.echo(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}')
+    console = result_console(*paths)
+    say(console, escape(f'{scene.robot.name}: {data.what}; {assumptions(scene, kind)}'))
     found = classes(data.margin, data.levels.caution, data.levels.failure)
     for k, name in enumerate(CLASSES):
-        typer.echo(f'  {name:8}{100.0 * area_fraction(found == k, scene.grid):6.1f} % of the map')
+        share = 100.0 * area_fraction(found == k, scene.grid)
+        console.print(f'  {name:8}{share:6.1f} % of the map')
     for path in paths:
         with whole(path) as file:
             write_map(file, path.suffix.lower(), scene, data, track)
-        typer.echo(f'Wrote {path}.')
+        wrote(path)
 
 
 def _track(loaded: 'Config', scene: 'Scene', paths: list[Path]) -> 'Floats':

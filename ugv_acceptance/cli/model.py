@@ -4,14 +4,22 @@ import math
 from typing import Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile, poses_like
+from ugv_acceptance.cli.completion import joints_like, poses_like
+from ugv_acceptance.cli.options import ConfigFile, PayloadMass, UrdfFile
+from ugv_acceptance.cli.terminal_output import (
+    COLOURS,
+    console_of,
+    print_table,
+    say,
+    table_of,
+)
 from ugv_acceptance.evaluation.ground import CARRIED, UPPER_BOUND, ground_words
+from ugv_acceptance.evaluation.margin_words import share_words, tipping_words
 from ugv_acceptance.model.stability import RAISED, STATES
 from ugv_acceptance.report.format import number_text
 
@@ -23,38 +31,53 @@ _MANY = 10.0
 
 def print_tables(description: Values) -> None:
     """Print a description returned by `describe` as tables."""
-    console = Console(highlight=False, soft_wrap=False)
+    console = console_of()
+    say(console, _summary(description))
     _head(console, description)
-    console.print(_links(description))
-    console.print(_joints(description))
+    print_table(console, _links(description))
+    print_table(console, _joints(description))
     _print_carrying(console, description)
     _print_poses(console, description)
     _print_payload(console, description)
-    console.print(_contacts(description))
+    print_table(console, _contacts(description))
     _print_stability(console, description)
     for text in description['warnings']:
-        console.print(f'[yellow]warning:[/] {escape(text)}', soft_wrap=True)
+        say(console, f'[yellow]warning:[/] {escape(text)}')
+    say(console, _summary(description))
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify='left', box=box.SIMPLE_HEAD, pad_edge=False)
-    for k, column in enumerate(columns):
-        table.add_column(column, justify='left' if k == 0 else 'right', overflow='fold')
-    return table
+def _summary(d: Values) -> str:
+    """Return what is nearest to its limit, as markup: a joint, and the least tilt left."""
+    limited = [j for j in d['joints'] if j.get('utilisation') is not None]
+    told, beyond = [], False
+    if limited:
+        joint = max(limited, key=lambda j: float(j['utilisation']))
+        told.append(f'{joint["name"]} {_share(joint["utilisation"])} of its limit')
+        beyond = joint['utilisation'] >= 1.0
+    angles = {side: m['tilt_left_deg'] for side, m in d['sides'].items()}
+    known = [(angle, side) for side, angle in angles.items() if angle is not None]
+    if known:
+        angle, side = min(known)
+        told.append(tipping_words(side, math.radians(angle)))
+        beyond |= angle <= 0.0
+    text = '; '.join(told) or 'no limit to compare with'
+    state = '' if known else f' ({d["state"]}: no tilt left to tell)'
+    colour = COLOURS['FAIL'] if beyond else 'bold'
+    mark = 'beyond a limit' if beyond else 'in this posture'
+    return f'[{colour}]{escape(d["robot"]["name"])}, {mark}:[/] {escape(text + state)}'
 
 
 def _head(console: Console, d: Values) -> None:
     serial = d['robot']['serial']
-    console.print(
-        f'[bold]{escape(d["robot"]["name"])}[/]' + (f', serial {serial}' if serial else '')
-    )
+    of_it = f', serial {escape(serial)}' if serial else ''
+    say(console, f'[bold]{escape(d["robot"]["name"])}[/]{of_it}')
     console.print(f'config {escape(d["config"]["path"])}', soft_wrap=True)
     console.print(f'urdf   {escape(d["config"]["urdf"])}', soft_wrap=True)
-    console.print(f'sha256 {d["config"]["sha256"][:16]}\n')
+    say(console, f'sha256 {d["config"]["sha256"][:16]}\n')
 
 
 def _links(d: Values) -> Table:
-    table = _table('Links (centre of gravity in link axes)', 'link', 'kg', 'x m', 'y m', 'z m')
+    table = table_of('Links (centre of gravity in link axes)', 'link', 'kg', 'x m', 'y m', 'z m')
     for link in d['links']:
         if link['mass_kg'] > 0.0:
             table.add_row(escape(link['name']), *_numbers([link['mass_kg']]), *_xyz(link))
@@ -66,7 +89,7 @@ def _links(d: Values) -> Table:
 
 def _joints(d: Values) -> Table:
     roll, pitch = d['tilt']['roll_deg'], d['tilt']['pitch_deg']
-    table = _table(
+    table = table_of(
         f'Joints in this posture (base: roll {roll:g} deg, pitch {pitch:g} deg)',
         *('joint', 'range', 'at', 'torque', 'limit', 'used'),
     )
@@ -92,7 +115,7 @@ def _print_carrying(console: Console, d: Values) -> None:
     carrying = [joint for joint in d['joints'] if joint.get('carrying')]
     if not carrying:
         return
-    table = _table(
+    table = table_of(
         'Joints that carry the robot: above is the even spread of its weight',
         *('joint', 'hanging', 'even spread', 'least', 'most', 'limit'),
     )
@@ -102,12 +125,14 @@ def _print_carrying(console: Console, d: Values) -> None:
         texts = [f'{number_text(number)} {unit}' for number in numbers]
         texts.append('' if limit is None else f'{limit:g} {unit}')
         table.add_row(escape(joint['name']), *texts)
-    console.print(table)
-    console.print(
+    print_table(console, table)
+    say(
+        console,
         'How the contact points share the weight is not measured: torques from least to most '
         'cannot be excluded.\nFriction comes on top where feet, flippers and tracks brace '
         'against each other.\n',
-        soft_wrap=True,
+        0,
+        0,
     )
 
 
@@ -116,17 +141,16 @@ def _print_poses(console: Console, d: Values) -> None:
     if not d['poses']:
         return
     joints = {joint['name']: joint for joint in d['joints']}
-    table = _table('Poses, for --posture NAME', 'pose', 'joints that are not at 0')
-    table.columns[1].justify = 'left'
+    table = table_of('Poses, for --posture NAME', 'pose', 'joints that are not at 0', names=2)
     for pose in d['poses']:
         at = pose['positions'].items()
         places = [f'{n} {_place({**joints[n], "position": q})}' for n, q in at if q]
         table.add_row(escape(pose['name']), escape(', '.join(places) or 'none'))
-    console.print(table)
+    print_table(console, table)
 
 
 def _share(used: float) -> str:
-    return f'{used:.0%}' if used < 100.0 else f'{number_text(used, 0)} x'
+    return share_words(used) if used < 100.0 else f'{number_text(used, 0)} x'
 
 
 def _range(joint: Values) -> str:
@@ -148,18 +172,19 @@ def _unit(joint: Values) -> tuple[float, str]:
 def _print_payload(console: Console, d: Values) -> None:
     load = d['payload']
     if load['link'] is None:
-        console.print('Payload: no payload link is configured\n')
+        say(console, 'Payload: no payload link is configured\n')
         return
-    console.print(f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}:\n  ', end='')
+    say(console, f'Payload {load["mass_kg"]:g} kg on {escape(load["link"])}:')
     if not load['holds_itself']:
-        console.print('[red]the arm is too heavy for its limits without one[/]\n')
+        text = '[red]the arm is too heavy for its limits without one[/]'
     elif _boundless(d):
-        console.print('no joint limit bounds it in this posture; tipping may, see below\n')
+        text = 'no joint limit bounds it in this posture; tipping may, see below'
     else:
         left = load['largest_kg'] - load['mass_kg']
-        text = f'{number_text(abs(left), 2)} kg'
-        state = f'{text} left' if left >= 0.0 else f'[red]{text} too much[/]'
-        console.print(f'the limits allow {number_text(load["largest_kg"], 2)} kg here: {state}\n')
+        of_it = f'{number_text(abs(left), 2)} kg'
+        state = f'{of_it} left' if left >= 0.0 else f'[red]{of_it} too much[/]'
+        text = f'the limits allow {number_text(load["largest_kg"], 2)} kg here: {state}'
+    say(console, f'{text}\n', 2)
 
 
 def _boundless(d: Values) -> bool:
@@ -170,8 +195,15 @@ def _boundless(d: Values) -> bool:
 
 
 def _contacts(d: Values) -> Table:
-    table = _table(
-        f'Contact points ({d["robot"]["root"]})', 'point', 'link', 'x m', 'y m', 'z m', 'polygon'
+    table = table_of(
+        f'Contact points ({d["robot"]["root"]})',
+        'point',
+        'link',
+        'x m',
+        'y m',
+        'z m',
+        'polygon',
+        names=2,
     )
     for contact in d['contacts']:
         xyz = _numbers(contact['position_m'])
@@ -182,27 +214,25 @@ def _contacts(d: Values) -> Table:
 
 def _print_stability(console: Console, d: Values) -> None:
     x, y, z = _numbers(d['centre_of_gravity_m'])
-    console.print(
-        f'Total mass {number_text(d["total_mass_kg"], 2)} kg with payload, '
-        f'centre of gravity {x} {y} {z} m'
-    )
+    mass = number_text(d['total_mass_kg'], 2)
+    say(console, f'Total mass {mass} kg with payload, centre of gravity {x} {y} {z} m')
     if d['imu']:
-        console.print(f'IMU: {escape(d["imu"])}', soft_wrap=True)
+        say(console, f'IMU: {escape(d["imu"])}')
     names = ' '.join(d['support_polygon']) or 'none'
-    console.print(f'Support polygon: {escape(names)} ({d["state"]})')
+    say(console, f'Support polygon: {escape(names)} ({d["state"]})')
     arm = d['clearance']
     if arm['height_m'] is not None:
         height = number_text(arm['height_m'], 2)
-        console.print(f'Arm: {escape(arm["lowest"])} is lowest, {height} m above the ground')
+        say(console, f'Arm: {escape(arm["lowest"])} is lowest, {height} m above the ground')
     cautious = _print_ground(console, d)
     title = 'Tilt left before tipping' + (f' ({UPPER_BOUND})' if cautious else '')
-    table = _table(title, 'side', 'deg', 'restoring N m', 'energy J')
+    table = table_of(title, 'side', 'deg', 'restoring N m', 'energy J')
     for side, margin in d['sides'].items():
         angle = margin['tilt_left_deg']
         text = '-' if angle is None else _tilt(angle, bound=bool(cautious))
         row = (margin['restoring_moment_nm'], margin['energy_j'])
         table.add_row(side, text, *('-' if value is None else number_text(value) for value in row))
-    console.print(table)
+    print_table(console, table)
 
 
 def _print_ground(console: Console, d: Values) -> Values | None:
@@ -218,7 +248,7 @@ def _print_ground(console: Console, d: Values) -> Values | None:
         )
     elif d['state'] == STATES[RAISED]:
         text += f'; {CARRIED}'
-    console.print(text, soft_wrap=True)
+    say(console, escape(text))
     return cautious
 
 
@@ -262,7 +292,10 @@ def model(
     ] = False,
     braked: Annotated[
         str,
-        typer.Option(help='With --power-loss: joints whose brakes close without power, NAME,NAME.'),
+        typer.Option(
+            help='With --power-loss: joints whose brakes close without power, NAME,NAME.',
+            autocompletion=joints_like,
+        ),
     ] = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not tables.')] = False,
 ) -> None:
@@ -274,9 +307,9 @@ def model(
     Examples:
       ugv-acceptance model
       ugv-acceptance model --posture shoulder_joint=30deg,flipper_joint=180deg
-      ugv-acceptance model --config packbot_eod --posture STOW,shoulder_joint=90deg
+      ugv-acceptance model -c packbot_eod --posture STOW,shoulder_joint=90deg
       ugv-acceptance model --tilt roll=10deg,pitch=-5deg --payload 2
-      ugv-acceptance model --posture shoulder_joint=60deg --tilt roll=15deg --power-loss
+      ugv-acceptance model --posture shoulder_joint=60deg --power-loss
       ugv-acceptance model --config my_robot.yaml --urdf my_robot.urdf --json
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.power_loss import describe_power_loss, print_power_loss

@@ -16,6 +16,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
+from ugv_acceptance.cli.terminal_output import console_of, say
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.ground import ground_words
 
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 Raised = Counter[tuple[str, str, str]]
 
 COLOURS = ('bold green', 'bold yellow', 'bold red', 'bold magenta')
+# Columns before the words of a line.
+_BEHIND = 21
 # Lines of alerts that stay in sight under the table.
 _SHOWN = 8
 
@@ -55,7 +58,7 @@ class Lines:
 
     def _print(self, now: float, status: 'Status') -> None:
         text = f'{now - self.began:8.2f} s  {mark(status.level)}  {escape(status.message)}'
-        self._console.print(text, soft_wrap=True, highlight=False)
+        say(self._console, text, 0, _BEHIND)
 
 
 class Panel:
@@ -143,6 +146,8 @@ def watch(
     console: Console,
     every: float = 5.0,
     until: Callable[[], bool] | None = None,
+    *,
+    plain: bool = False,
 ) -> Raised:
     """Run the monitor in this process until it is interrupted; return the alerts it raised.
 
@@ -151,7 +156,7 @@ def watch(
     from ugv_acceptance.nodes.executor import end, ros, spin
     from ugv_acceptance.nodes.monitor.node import build
 
-    panel = Panel(console) if console.is_terminal else None
+    panel = Panel(console) if console.is_terminal and not plain else None
     shown = panel or Lines(console, every)
     with ros(ros_args) as stop, panel or nullcontext():
         node = build(config, urdf, shown)
@@ -187,13 +192,9 @@ def monitor(
       ugv-acceptance monitor --config my_robot.yaml --ros-args -r __ns:=/robot1
       ugv-acceptance monitor --ros-args -p use_sim_time:=true -p publish_rate:=0.0
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from rich.console import Console
-
     from ugv_acceptance.cli.monitor import watch
 
-    # None: whether the output is a terminal decides.
-    console = Console(highlight=False, force_terminal=False if plain else None)
-    watch(_text(config), _text(urdf), ros_arguments(context), console, every)
+    watch(_text(config), _text(urdf), ros_arguments(context), console_of(), every, plain=plain)
 
 
 def _text(path: Path | None) -> str | None:

@@ -7,11 +7,18 @@ import typer
 
 from ugv_acceptance.cli.options import Overwrite, RobotFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
+from ugv_acceptance.cli.terminal_output import (
+    console_of,
+    say,
+    status,
+    tracked,
+    while_read,
+    wrote,
+)
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ugv_acceptance.config import Config
+    from ugv_acceptance.report.paper.numbers import Row
     from ugv_acceptance.report.paper.page import Section
     from ugv_acceptance.report.paper.sections import Subject
 
@@ -37,24 +44,20 @@ def paper(
       ugv-acceptance paper
       ugv-acceptance paper --out pages/paper --truth 500
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from rich.console import Console
-    from rich.progress import track
-
     from ugv_acceptance.cli.output_kinds import PAPER
     from ugv_acceptance.config import load
     from ugv_acceptance.report.paper.joints import check_parts
-    from ugv_acceptance.report.paper.numbers import as_json, summary
+    from ugv_acceptance.report.paper.numbers import as_json
     from ugv_acceptance.report.paper.page import draw, render
     from ugv_acceptance.report.paper.sections import SECTIONS
 
     loaded = load(config)
     check_parts(loaded.settings.robot)
     check_folder('--out', out, PAPER, inputs_of(loaded), overwrite=overwrite)
-    console = Console(stderr=True)
-    subject = _subject(loaded, simulate, truth, console)
+    subject = _subject(loaded, simulate, truth)
     sections: list[Section] = []
     extra: dict[str, Any] = {}
-    for build in track(SECTIONS.values(), 'Computing', console=console):
+    for build in tracked(SECTIONS.values(), 'computing', len(SECTIONS), 'sections'):
         section, more = build(subject)
         sections.append(section)
         extra |= more
@@ -63,14 +66,30 @@ def paper(
     document = as_json(rows, [f'{name}.svg' for name in drawn]) | extra
     pages = {'paper.html': render(loaded.name, sections, drawn)}
     _write(out, document, pages | {f'{name}.svg': svg for name, svg in drawn.items()})
+    with while_read():
+        _print(rows, subject)
+    wrote(*(out / name for name in ('paper.json', 'paper.html', *(f'{one}.svg' for one in drawn))))
+
+
+def _print(rows: 'list[Row]', subject: 'Subject') -> None:
+    """Print how much of the paper was found again, all that differs, and the simulated truth."""
+    from rich.markup import escape
+
+    from ugv_acceptance.report.paper.numbers import summary
+
+    console, matches = console_of(), sum(row.match for row in rows)
+    outcome = f'{matches} of {len(rows)} numbers of the paper match'
+    say(console, outcome)
     for place, count in summary(rows).items():
-        typer.echo(f'{place:34}{count["matches"]:3} of {count["of"]:2} match')
+        say(console, f'{escape(place):34}{count["matches"]:3} of {count["of"]:2} match', 2)
     for row in rows:
         if not row.match:
-            typer.echo(f'  differs: {row.what}: paper {row.paper}, ours {row.ours}: {row.reason}')
+            text = f'differs: {row.what}: paper {row.paper}, ours {row.ours}: {row.reason}'
+            say(console, escape(text), 2)
     for line in subject.truth:
-        typer.echo('  '.join(f'{cell:24}' for cell in line).rstrip())
-    typer.echo(f'Wrote {out / "paper.html"} and {out / "paper.json"}.')
+        first, *others = line
+        say(console, escape('  '.join([f'{first:32}', *others]).rstrip()), 2, 6)
+    say(console, outcome)
 
 
 def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
@@ -86,7 +105,7 @@ def _write(out: Path, document: dict[str, Any], files: dict[str, str]) -> None:
         write_text(out / name, content)
 
 
-def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -> 'Subject':
+def _subject(loaded: 'Config', simulate: bool, truth: int) -> 'Subject':
     import numpy as np
 
     from ugv_acceptance.report.paper.sections import Subject
@@ -99,7 +118,7 @@ def _subject(loaded: 'Config', simulate: bool, truth: int, console: 'Console') -
     torques, f_values = simulated_arm()
     joints = [simulated_joints(robot, free=False)]
     if truth:
-        with console.status('Turning the elbow on the simulated vehicle'):
+        with status('Turning the elbow on the simulated vehicle'):
             joints.append(simulated_joints(robot, free=True))
-    lines = simulated_truth(robot, truth, console) if truth else ()
+    lines = simulated_truth(robot, truth) if truth else ()
     return Subject(robot, limits, torques, f_values, lines, joints)

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from rich.console import Console
 
+from ugv_acceptance.cli.terminal_output import status
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.statics import static_torque
 from ugv_acceptance.report.paper.joints import PARTS, posture
@@ -57,11 +57,11 @@ def _ends(values: Floats) -> str:
     return f'{low:.2f}' if low == high else f'{low:.2f} to {high:.2f}'
 
 
-def simulated_truth(robot: Robot, count: int, console: Console) -> list[list[str]]:
+def simulated_truth(robot: Robot, count: int) -> list[list[str]]:
     """Return the confusion matrix of the rollover map against simulated tipping, as a table."""
     from ugv_acceptance.simulation.tip_cases import confusion, judge_all, random_cases
 
-    with console.status(f'Tilting the plane under the simulated robot, {count} cases'):
+    with status(f'Tilting the plane under the simulated robot, {count} cases'):
         judged = judge_all(robot, random_cases(robot, count, seed=1))
     found = confusion(judged)
     left = np.abs(np.degrees([case.left for case in judged]))

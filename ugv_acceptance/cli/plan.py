@@ -5,22 +5,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import ConfigFile, Overwrite
+from ugv_acceptance.cli.options import ConfigFile, Overwrite, dash
 from ugv_acceptance.cli.outputs import Output, check_outputs, inputs_of
+from ugv_acceptance.cli.terminal_output import result_console, say, while_read, wrote
 
 if TYPE_CHECKING:
-    from ugv_acceptance.plan.plan import Plan
+    from rich.console import Console
 
-# Columns of the table where the output is no terminal.
-_WIDE = 160
-# Letters of a step's id in one line of the table.
-_ID = 72
+    from ugv_acceptance.plan.plan import Plan, Step
 
 
 def plan(
     *,
     out: Annotated[
-        Path | None, typer.Option('--out', '-o', help='Write the plan to this YAML file.')
+        Path | None,
+        typer.Option('--out', '-o', callback=dash, help='Write the plan to this YAML file.'),
     ] = None,
     card: Annotated[
         Path | None, typer.Option(help='Write the operator card to this HTML file.')
@@ -50,7 +49,7 @@ def plan(
     Examples:
       ugv-acceptance plan -o plan.yaml --card card.html
       ugv-acceptance plan --from plan.yaml --card card.html
-      ugv-acceptance plan --config my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
+      ugv-acceptance plan -c my_robot.yaml --tilt 15deg --points 3 -o plan.yaml
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.bag.atomic_files import write_text
     from ugv_acceptance.cli import output_kinds as kinds
@@ -70,13 +69,15 @@ def plan(
         wanted = Wanted(_ramp(tilt), points=points, endurance=hours * 3600.0, short=short)
         made = derive(loaded, wanted)
         warn(f'{loaded.name}: {note}' for note in notes_of(loaded))
-    _print(made)
+    with while_read():
+        _print(made, result_console(out, card))
     if out is not None:
         write_text(out, plan_text(made))
     if card is not None:
         from ugv_acceptance.plan.card import card_of
 
         write_text(card, card_of(made, loaded))
+    wrote(out, card)
 
 
 def _ramp(tilt: str) -> float:
@@ -92,37 +93,35 @@ def _ramp(tilt: str) -> float:
     return angle
 
 
-def _print(made: 'Plan') -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _print(made: 'Plan', console: 'Console') -> None:
+    """Print the plan: how much there is to do, then each step by its id and what belongs to it."""
+    from rich.markup import escape
 
-    from ugv_acceptance.evaluation.alerts.messages import pattern_words
     from ugv_acceptance.plan.order import duration
     from ugv_acceptance.report.format import time_text
 
-    table = Table(box=None, pad_edge=False, padding=(0, 2))
-    # Longer ids, of joints with long names, are folded before they push the rest off the table.
-    long = max(len(step.id) for step in made.steps) > _ID
-    table.add_column('step', no_wrap=not long, overflow='fold', max_width=_ID if long else None)
-    for heading in ('where', 'ground', 'load', 'use', 'tilt left', 'must be raised'):
-        table.add_column(heading)
-    for step in made.steps:
-        use, tilt = step.expected.get('use'), step.expected.get('tilt_left_deg')
-        table.add_row(
-            step.id,
-            step.where,
-            f'{step.ground.orientation} {step.ground.tilt_deg:g}'
-            if step.ground.tilt_deg
-            else 'level',
-            f'{step.payload_kg:g} kg',
-            '' if use is None else f'{use:.0%}',
-            '' if tilt is None else f'{tilt:.1f} deg',
-            ', '.join(map(pattern_words, step.alerts.must)),
-        )
-    console = Console(highlight=False)
-    if not console.is_terminal:
-        console = Console(highlight=False, width=_WIDE)
-    console.print(table)
+    count = f'{len(made.steps)} step{"s" * (len(made.steps) != 1)}'
     length = time_text(duration(made), digits=2)
-    console.print(f'{len(made.steps)} steps, {length} of motion and holding')
-    console.print(f'plan {made.plan}, sha256 {made.sha256}', soft_wrap=True)
+    summary = f'plan {escape(made.plan)}: {count}, {length} of motion and holding'
+    say(console, summary)
+    for step in made.steps:
+        say(console, f'[bold]{escape(step.id)}[/]', 2)
+        say(console, escape(_step(step)), 6, 6)
+    say(console, f'{summary}\nsha256 {made.sha256}')
+
+
+def _step(step: 'Step') -> str:
+    """Return where a step is done, with what, and what is expected."""
+    from ugv_acceptance.evaluation.alerts.messages import pattern_words
+    from ugv_acceptance.evaluation.margin_words import share_words
+
+    use, tilt = step.expected.get('use'), step.expected.get('tilt_left_deg')
+    ground, must = step.ground, ', '.join(map(pattern_words, step.alerts.must))
+    lies = f'{ground.orientation} {ground.tilt_deg:g} deg' if ground.tilt_deg else 'level'
+    told = (
+        f'{step.where}, {lies}, {step.payload_kg:g} kg',
+        '' if use is None else f'use {share_words(use)}',
+        '' if tilt is None else f'tilt left {tilt:.1f} deg',
+        must and f'must raise {must}',
+    )
+    return '; '.join(filter(None, told))

@@ -1,16 +1,19 @@
 """Whether the robot tips when its power goes, for `ugv-acceptance model --power-loss`."""
 
 import math
-import sys
 from typing import Any
 
-from rich import box
-from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.robot_description import payload_from, posture_from, tilted_gravity
+from ugv_acceptance.cli.terminal_output import (
+    console_of,
+    print_table,
+    say,
+    status,
+    table_of,
+)
 from ugv_acceptance.config import Config
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.report.format import number_text
@@ -51,7 +54,7 @@ def describe_power_loss(
     from ugv_acceptance.simulation.power_loss import Released, power_loss
 
     say_balanced(robot)
-    with Console(file=sys.stderr).status('Letting the joints go in the simulation'):
+    with status('Letting the joints go in the simulation'):
         found = power_loss(Released(robot, tuple(q), load, gravity, held))
     return {
         'answer': found.answer,
@@ -82,33 +85,28 @@ def describe_power_loss(
 
 def print_power_loss(found: Values) -> None:
     """Print the answer and its two tables."""
-    console = Console(highlight=False)
+    console = console_of()
     colour, meaning = MEANING[found['answer']]
     held = ', '.join(found['braked'])
-    console.print(f'If the power goes: [{colour}]{found["answer"]}[/]: {meaning}')
+    answer = f'If the power goes: [{colour}]{found["answer"]}[/]: {meaning}'
+    say(console, answer)
     if not found['stands_with_power']:
-        console.print('[red]With power it does not stand in this posture either.[/]')
-    console.print(f'Held by brakes: {escape(held) or "no joint"}')
-    falls = _table('Simulated falls', 'damping ratios', 'largest turn deg', 'tips')
+        say(console, '[red]With power it does not stand in this posture either.[/]')
+    say(console, f'Held by brakes: {escape(held) or "no joint"}')
+    falls = table_of('Simulated falls', 'damping ratios', 'largest turn deg', 'tips')
     for fall in found['falls']:
         turn = f'{fall["largest_turn_deg"]:.1f}' if not fall['tips'] else 'over 30'
         ratios = fall['damping_ratios']
         shown = ratios[:1] if len(set(ratios)) == 1 else ratios
         text = ' '.join(f'{ratio:g}' for ratio in shown)
         falls.add_row(text, turn, 'yes' if fall['tips'] else 'no')
-    console.print(falls)
-    brakes = _table('What a brake would hold here', 'joint', 'torque', 'falls m', 'energy J')
+    print_table(console, falls)
+    brakes = table_of('What a brake would hold here', 'joint', 'torque', 'falls m', 'energy J')
     for brake in found['brakes']:
         torque = f'{number_text(brake["torque"])} {brake["torque_unit"]}'
         more = " and the ground's load" if brake['carries_the_robot'] else ''
         row = (number_text(brake['fall_m'], 2), number_text(brake['energy_j']))
         brakes.add_row(escape(brake['joint']), torque + more, *row)
-    console.print(brakes)
-    console.print(found['assumed'], soft_wrap=False)
-
-
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify='left', box=box.SIMPLE_HEAD, pad_edge=False)
-    for k, column in enumerate(columns):
-        table.add_column(column, justify='left' if k == 0 else 'right', overflow='fold')
-    return table
+    print_table(console, brakes)
+    say(console, found['assumed'])
+    say(console, answer)

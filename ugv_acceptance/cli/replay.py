@@ -45,7 +45,7 @@ def replay(
     \b
     Examples:
       ugv-acceptance replay bags/packbot_fail
-      ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data --topics /joint_states
+      ugv-acceptance replay run_0.mcap --rate 2 --topics /imu/data
       ugv-acceptance replay run --clock --loop --ros-args -r __ns:=/robot1
       ugv-acceptance replay run --no-restamp
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
@@ -65,18 +65,7 @@ def replay(
 
 
 def _play(player: 'Player', stop: 'Stop') -> None:
-    import sys
+    from ugv_acceptance.cli.terminal_output import progress
 
-    from rich.console import Console
-    from rich.progress import Progress, TextColumn
-
-    console = Console(file=sys.stderr)
-    with Progress(
-        *Progress.get_default_columns(),
-        TextColumn('{task.completed:.1f} of {task.total:.1f} s'),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task('playing', total=player.bag.duration_s)
-        player.run(stop, lambda seconds: bar.update(task, completed=seconds))
+    with progress('playing', player.bag.duration_s) as reached:
+        player.run(stop, lambda seconds: reached(seconds, ''))

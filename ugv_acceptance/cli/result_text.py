@@ -1,269 +1,245 @@
-"""Prints a result in a terminal: the verdict, its reasons, and the worst of each margin."""
+"""Prints a result in a terminal: the verdict first and last, its reasons, the worst of each margin.
 
-import os
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, TextIO
+A dozen lines; what they leave out is counted, and `verbose` prints it. Reasons of a verdict,
+doubts, and that something was not checked are never left out altogether.
+"""
+
+import math
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import Progress, TextColumn
-from rich.table import Table
 
+from ugv_acceptance.cli.result_details import (
+    ALL,
+    LISTED,
+    SEVERITY,
+    Result,
+    at_time,
+    checksum_words,
+    counted,
+    input_line,
+    is_foreign,
+    print_alert,
+    print_details,
+    print_effort,
+    share_of,
+)
+from ugv_acceptance.cli.terminal_output import (
+    COLOURS,
+    console_of,
+    say,
+    say_list,
+    shown_verdict,
+    while_read,
+)
 from ugv_acceptance.evaluation.alerts.messages import level_words
+from ugv_acceptance.evaluation.margin_words import share_words, tipping_words
 from ugv_acceptance.report.format import (
     assumed_line,
-    carrying_lines,
     doubts_of,
     ground_line,
     is_bound,
     missing_text,
-    not_checked_lines,
-    number_text,
     origin_line,
 )
 
-COLOURS = {'PASS': 'bold green', 'FAIL': 'bold red', 'INCONCLUSIVE': 'bold yellow'}
-MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]'}
-_MOST_ALERTS = 12
-_MOST_EFFORTS = 11
-_MOST_WARNINGS = 6
-# More messages than this have a rate, if they can be used.
-_FEW = 100
-# Said of an alert that rests only on a sensor found to be wrong.
-DOUBTFUL = ' (by a sensor that is contradicted: it decides nothing)'
-# Levels of alerts, the least severe first.
-_SEVERITY = ('OK', 'WARN', 'STALE', 'ERROR')
+__all__ = ['print_result', 'print_results', 'while_read']
+
+# In the short text: reasons, doubts, warnings, alerts, findings about the data, efforts.
+_REASONS, _DOUBTS, _WARNINGS, _ALERTS, _FINDINGS, _EFFORTS = 3, 2, 1, 3, 3, 11
+# A share of the recording from which on nothing is worth a number.
+_WHOLE = 0.995
+# Letters of what was not checked, in the short text.
+_UNCHECKED = 150
+# What is at stake is told before what may be wrong with the data.
+_RANK = {'TIP_OVER': 0, 'TORQUE_LIMIT': 1}
 
 
-@contextmanager
-def progress_of(start: int, end: int, stream: TextIO) -> Iterator[Callable[[int], None]]:
-    """Show how far a recording is read (log times, ns), if the output is a terminal."""
-    console = Console(file=stream)
-    if not console.is_terminal:  # a disabled bar of older rich still prints an empty line
-        yield lambda _: None
-        return
-    with Progress(
-        *Progress.get_default_columns(),
-        TextColumn('{task.fields[seconds]:.0f} s of the recording'),
-        console=console,
-        transient=True,
-    ) as progress:
-        task = progress.add_task('reading', total=max(end - start, 1), seconds=0.0)
-
-        def reached(now: int) -> None:
-            progress.update(task, completed=now - start, seconds=(now - start) / 1e9)
-
-        yield reached
+def print_result(result: Result, console: Console | None = None, *, verbose: bool = False) -> None:
+    """Print one result of `evaluate`."""
+    print_results([result], console, verbose=verbose)
 
 
-@contextmanager
-def while_read() -> Iterator[None]:
-    """Print until the reader closes the pipe (`| head`), which changes no exit code."""
-    try:
-        yield
-        sys.stdout.flush()
-    except (BrokenPipeError, SystemExit):  # newer rich turns the first into the second
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def print_results(
+    results: Sequence[Result], console: Console | None = None, *, verbose: bool = False
+) -> None:
+    """Print results of `evaluate`; at the end the verdicts once more, one line a recording."""
+    console = console or console_of()
+    for result in results:
+        if 'criteria' in result:
+            _print_result(result, console, verbose=verbose)
+    for result in results:
+        console.print(_headline(result), soft_wrap=True)
 
 
-def print_result(result: dict[str, Any], console: Console | None = None) -> None:
-    """Print a result of `evaluate`."""
-    console = console or Console(highlight=False)
-    word = result['verdict']
+def _headline(result: Result) -> str:
     paths = result['bag']['path']
-    heading = f'\n[{COLOURS[word]}]{escape(MARKS[word])} {word}[/]  {escape(paths[0])}'
-    console.print(heading, soft_wrap=True)
-    for reason in result['reasons'][:5]:
-        console.print(f'    {escape(reason)}', soft_wrap=True)
-    if len(result['reasons']) > 5:
-        console.print(f'    and {len(result["reasons"]) - 5} more reasons')
-    for line in filter(None, (origin_line(result), assumed_line(result), ground_line(result))):
-        console.print(f'    {escape(line)}', soft_wrap=True)
-    unchecked = not_checked_lines(result)
-    if unchecked:
-        console.print('    [bold]NOT CHECKED:[/]')
-    for line in unchecked:
-        console.print(f'      {escape(line)}', soft_wrap=True)
-    for doubt in doubts_of(result):
-        console.print(f'    [bold yellow]doubt:[/] {escape(doubt)}', soft_wrap=True)
-    _print_warnings(result['robot']['warnings'] if 'robot' in result else (), console)
-    if result['criteria']['path'] is not None:
-        _print_criteria(result['criteria']['results'], console)
-    console.print(_margins(result))
-    for line in carrying_lines(result):
-        console.print(escape(line), soft_wrap=True)
-    _print_data(result, console)
-    _print_alerts(result, console)
+    more = len(paths) - 1
+    text = f'{paths[0]}{f" and {more} more" if more else ""}'
+    return shown_verdict(result['verdict'], text)
+
+
+def _print_result(result: Result, console: Console, *, verbose: bool) -> None:
+    console.print(_headline(result), soft_wrap=True)
+    most = ALL if verbose else _REASONS
+    say_list(console, result['reasons'], most, f'reasons {LISTED}', 2)
+    given = (origin_line(result), assumed_line(result)) if verbose else (_given_line(result),)
+    say_list(console, given, ALL, '', 2)
+    _print_marked(console, 'doubt', doubts_of(result), ALL if verbose else _DOUBTS)
+    _print_marked(console, 'warning', _warnings(result), ALL if verbose else _WARNINGS)
+    (print_details if verbose else _print_short)(result, console)
     if 'effort' in result:
-        _print_effort(result, console)
+        print_effort(result, console, ALL if verbose else _EFFORTS)
 
 
-def _print_warnings(warnings: Sequence[str], console: Console) -> None:
-    """Print what is odd with the robot's own files: margins are only as good as these."""
-    for text in warnings[:_MOST_WARNINGS]:
-        console.print(f'    [bold yellow]warning:[/] {escape(text)}', soft_wrap=True)
-    more = len(warnings) - _MOST_WARNINGS
-    if more > 0:
-        console.print(f'    and {more} more warnings (`ugv-acceptance model` lists them)')
+def _warnings(result: Result) -> list[str]:
+    """Return what is odd with the robot's own files: margins are only as good as these."""
+    return list(result['robot']['warnings'])
 
 
-def _print_criteria(outcomes: list[dict[str, Any]], console: Console) -> None:
-    for outcome in outcomes:
-        word = outcome['verdict']
-        mark = f'[{COLOURS[word]}]{escape(MARKS[word]):5}[/]'
-        text = f'{outcome["name"]}: {outcome["demand"]}'
-        console.print(f'  {mark} {escape(text)}', soft_wrap=True)
+def _print_marked(console: Console, mark: str, lines: Sequence[str], most: int) -> None:
+    for line in lines[:most]:
+        say(console, f'[bold yellow]{mark}:[/] {escape(line)}', 2)
+    if len(lines) > most:
+        say(console, f'and {len(lines) - most} more {mark}s {LISTED}', 2)
 
 
-def _margins(result: dict[str, Any]) -> Table:
-    table = Table(box=None, pad_edge=False, padding=(0, 2))
-    for heading in ('margin', 'worst', 'limit', 'left', 'at', 'in violation'):
-        table.add_column(heading, justify='left' if heading == 'margin' else 'right')
-    for name, joint in result['torque'].items():
-        unit = joint['unit']
-        table.add_row(
-            escape(name),
-            _number(joint['max_abs'], unit),
-            _number(joint['limit'], unit),
-            _number(joint['min_margin'], unit),
-            _number(joint['time_of_min_s'], 's'),
-            _number(joint['time_in_violation_s'], 's', 2),
-        )
+def _print_short(result: Result, console: Console) -> None:
+    if result['criteria']['path'] is not None:
+        say(console, escape(_criteria_counted(result['criteria']['results'])), 2)
+    worst = _worst_of(result['alerts'])[:_ALERTS]
+    for line in (*_least(result, worst), ground_line(result), _data_line(result)):
+        if line:
+            say(console, escape(line), 2)
+    say_list(console, _troubles(result), _FINDINGS, f'findings {LISTED}', 2)
+    _print_worst_alerts(result, worst, console)
+    unchecked = _unchecked(result)
+    if unchecked:
+        say(console, f'[bold]NOT CHECKED:[/] {escape(unchecked)}', 2)
+    say(console, escape(_left_out(result, len(worst))), 2)
+
+
+def _criteria_counted(outcomes: Sequence[Result]) -> str:
+    missed = [o['name'] for o in outcomes if o['verdict'] != 'PASS']
+    text = f'{len(outcomes) - len(missed)} of {len(outcomes)} criteria met'
+    if not missed:
+        return text
+    named = ', '.join(missed[:_REASONS])
+    more = len(missed) - _REASONS
+    return f'{text}; not: {named}' + (f' and {more} more {LISTED}' if more > 0 else '')
+
+
+def _least(result: Result, told: Sequence[Result]) -> list[str]:
+    """Return the most used joint and the least tilt left, each with its own time.
+
+    What one of the alerts says that are `told` is not said twice.
+    """
+    said = {(alert['code'], alert['subject']) for alert in told}
+    lines = []
+    limited = [(n, j) for n, j in result['torque'].items() if j['limit'] and j['max_abs']]
+    if limited:
+        name, joint = max(limited, key=lambda one: one[1]['max_abs'] / one[1]['limit'])
+        share = share_words(joint['max_abs'] / joint['limit'])
+        most = f'{joint["max_abs"]:.1f} of {joint["limit"]:.1f} {joint["unit"]}'
+        if ('TORQUE_LIMIT', name) not in said:
+            lines.append(f'{name} {share} of its limit ({most}){at_time(joint["time_of_min_s"])}')
     stability = result['stability']
-    unread = result['inputs']['imu']['topic'] is None
-    edge = 'not checked' if unread else stability['edge'] or 'no polygon'
-    table.add_row(
-        f'tip-over ({edge})',
-        '',
-        '',
-        ('<= ' if is_bound(result) else '') + _number(stability['min_angle_deg'], 'deg'),
-        _number(stability['time_of_min_s'], 's'),
-        _number(stability['time_in_violation_s'], 's', 2),
-    )
-    return table
+    if stability['min_angle_deg'] is not None and ('TIP_OVER', stability['edge']) not in said:
+        angle = math.radians(stability['min_angle_deg'])
+        bound = 'at most ' if is_bound(result) and angle > 0.0 else ''
+        words = tipping_words(stability['edge'] or '', angle)
+        lines.append(f'{bound}{words}{at_time(stability["time_of_min_s"])}')
+    return lines
 
 
-def _number(value: float | None, unit: str, digits: int = 1) -> str:
-    return '-' if value is None else f'{value:.{digits}f} {unit}'
+def _data_line(result: Result) -> str:
+    coverage = result['coverage']
+    part = f' ({share_of(coverage["fraction"])})' if coverage['fraction'] < _WHOLE else ''
+    text = f'{coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s evaluated{part}'
+    return text if result['alerts'] else f'{text}; no alerts'
 
 
-def _print_data(result: dict[str, Any], console: Console) -> None:
-    coverage, bag = result['coverage'], result['bag']
-    console.print(
-        f'evaluated {coverage["evaluated_s"]:.1f} of {coverage["duration_s"]:.1f} s '
-        f'({coverage["fraction"]:.1%}); '
-        + {'all': 'every chunk has a checksum', 'part': 'some chunks have no checksum'}.get(
-            bag['protected'], 'no checksums: a changed byte would go unnoticed'
-        ),
-        soft_wrap=True,
-    )
-    for key in ('joint_states', 'imu'):
-        source = result['inputs'][key]
-        if source['topic'] is None:
-            console.print(f'  {key}: not read')
-            continue
-        rate = source['rate_hz']
-        faults = ', '.join([*source['faults'], *_malformed(source)])
-        missing = missing_text(source, coverage['duration_s'])
-        count = source['messages']
-        console.print(
-            f'  {escape(str(source["topic"]))}: {count} message{"s" * (count != 1)}'
-            + (f' at {rate:.0f} Hz' if rate else '')
-            + (f', {missing}' if missing else '')
-            + _gaps(source)
-            + ('; none contains a joint of this robot' if _foreign(key, source) else '')
-            + (f'; {escape(faults)}' if faults else ''),
-            soft_wrap=True,
-        )
-    if bag['salvaged']:
-        console.print(f'  damaged: {escape(bag["salvaged"])}', soft_wrap=True)
-    for finding in bag['findings'][:5]:
-        console.print(f'  {escape(finding)}', soft_wrap=True)
+def _given_line(result: Result) -> str:
+    """Return what a recording is of: simulated or real, and a robot known how well."""
+    assumed = result['robot']['assumed']
+    if assumed is None:
+        words = "the robot's configuration does not say which numbers are assumed"
+    elif not assumed:
+        words = 'no number of the robot is only assumed'
+    else:
+        words = f'{counted(len(assumed), "number")} of the robot assumed, not measured'
+    return f'{origin_line(result)}; {words}'
 
 
-def _foreign(key: str, source: dict[str, Any]) -> bool:
-    """Return whether joint states came but none was usable, as those of another robot."""
-    return bool(key == 'joint_states' and source['messages'] > _FEW and not source['rate_hz'])
+def _troubles(result: Result) -> list[str]:
+    """Return what is wrong with the data, a sentence each."""
+    bag = result['bag']
+    found = [f'damaged: {bag["salvaged"]}'] if bag['salvaged'] else []
+    if bag['protected'] != 'all':
+        found.append(checksum_words(bag))
+    told = ((key, result['inputs'][key]) for key in ('joint_states', 'imu'))
+    odd = (input_line(key, source, result) for key, source in told if _is_odd(key, source, result))
+    return [*found, *odd, *bag['findings']]
 
 
-def _gaps(source: dict[str, Any]) -> str:
-    count = source['gaps']
-    if not count:
-        return ''
-    return f', {count} gap{"s" * (count > 1)} of up to {source["longest_gap_s"]:.2f} s'
+def _is_odd(key: str, source: Result, result: Result) -> bool:
+    missing = missing_text(source, result['coverage']['duration_s'])
+    troubled = missing or source['gaps'] or source['faults'] or source['malformed']
+    return bool(source['topic'] is not None and (troubled or is_foreign(key, source)))
 
 
-def _malformed(source: dict[str, Any]) -> list[str]:
-    count = source['malformed']
-    return [f'{count} malformed ({source["malformed_reason"]})'] if count else []
-
-
-def _print_alerts(result: dict[str, Any], console: Console) -> None:
+def _print_worst_alerts(result: Result, worst: Sequence[Result], console: Console) -> None:
+    """Print how many alerts there were, and the worst, a line each."""
     alerts = result['alerts']
     if not alerts:
-        console.print('no alerts')
         return
-    console.print(f'{len(alerts)} alert{"s" * (len(alerts) > 1)}:')
-    for alert in alerts[:_MOST_ALERTS]:
-        end = 'the end' if alert['end_s'] is None else f'{alert["end_s"]:.2f} s'
-        level = level_words(alert['level'])
-        console.print(
-            f'  {alert["start_s"]:8.2f} to {end:>9}  {level:7}  {alert["code"]:16}  '
-            f'{escape(alert["message"])}' + (DOUBTFUL if alert['doubtful'] else ''),
-            soft_wrap=True,
-        )
-    if len(alerts) > _MOST_ALERTS:
-        console.print(f'  and {len(alerts) - _MOST_ALERTS} more (--json FILE lists all)')
-    most = max(_SEVERITY.index(alert['level']) for alert in alerts)
-    worst = {a['code']: a['advice'] for a in alerts if _SEVERITY.index(a['level']) == most}
-    for code, advice in list(worst.items())[:3]:
-        console.print(f'  {code}: {escape(advice)}', soft_wrap=True)
+    level = level_words(worst[0]['level'])
+    count = sum(alert['level'] == worst[0]['level'] for alert in alerts)
+    of_them = f'{count} of them ' if count < len(alerts) else 'all ' if count > 1 else ''
+    text = f'{counted(len(alerts), "alert")}, {of_them}[{COLOURS[level]}]{level}[/]'
+    say(console, f'{text}; the worst:' if len(worst) < len(alerts) else f'{text}:', 2)
+    for alert in worst:
+        print_alert(alert, console, short=True)
 
 
-def _print_effort(result: dict[str, Any], console: Console) -> None:
-    """Print what efforts mean and say, then efforts at rest beside static torques."""
-    check = result['model_check']
-    console.print('what the measured efforts mean:')
-    for joint in check['joints'].values():
-        console.print(f'  {escape(joint["sentence"])}', soft_wrap=True)
-    for load in check['loads']:
-        console.print(f'  {_load_line(load)}', soft_wrap=True)
-    for finding in check['findings']:
-        console.print(f'  {escape(finding)}', soft_wrap=True)
-    joints = [(name, plateaus) for name, plateaus in result['effort'].items() if plateaus]
-    if not joints:
-        console.print('no measured effort at rest to compare')
-        return
-    joints.sort(key=lambda joint: -max(abs(p['effort_per_kg']) for p in joint[1]))
-    lines = [
-        _plateau_line(name, p)
-        for name, plateaus in joints
-        for p in plateaus
-        if p['effort_per_kg'] or abs(p['difference']) > 1.0
-    ]
-    console.print('measured effort and static torque at rest:')
-    for line in lines[:_MOST_EFFORTS]:
-        console.print(line, soft_wrap=True)
-    console.print(
-        f'  {sum(len(p) for _, p in joints)} intervals at rest in total: --json FILE lists them'
+def _worst_of(alerts: Sequence[Result]) -> list[Result]:
+    """Return the alerts of the highest level: the worst of each kind and part, gravest first."""
+    most = max((SEVERITY.index(alert['level']) for alert in alerts), default=0)
+    kept: dict[tuple[str, str], Result] = {}
+    for alert in alerts:
+        if SEVERITY.index(alert['level']) == most:
+            key = alert['code'], alert['subject']
+            kept[key] = max(kept.get(key, alert), alert, key=_weight)
+    return sorted(kept.values(), key=lambda a: (_RANK.get(a['code'], 2), a['start_s']))
+
+
+def _weight(alert: Result) -> tuple[float, float]:
+    """Return how bad an alert is beside others of its kind: by its worst value, by its length."""
+    peak, end = alert['peak'] or 0.0, alert['end_s']
+    worst = {'TIP_OVER': -peak, 'TORQUE_LIMIT': abs(peak)}.get(alert['code'], 0.0)
+    return worst, math.inf if end is None else end - alert['start_s']
+
+
+def _unchecked(result: Result) -> str:
+    """Return what no number tells: as many names as fit in two lines, and how many more."""
+    names = [one['what'] for one in result['not_checked']]
+    kept: list[str] = []
+    for name in names:
+        if kept and len('; '.join([*kept, name])) > _UNCHECKED:
+            break
+        kept.append(name)
+    more = len(names) - len(kept)
+    return '; '.join(kept) + (f'; and {more} more' if more else '')
+
+
+def _left_out(result: Result, shown: int) -> str:
+    """Return what only the long text says, counted; `shown` alerts are in the short one."""
+    counts = (
+        (len(result['alerts']) - shown, 'alert', ''),
+        (len(result['not_checked']), 'reason of NOT CHECKED', 'reasons of NOT CHECKED'),
+        (len(result['robot']['assumed'] or ()), 'assumed number', ''),
+        (len(result.get('carrying', ())), 'joint that carried it', 'joints that carried it'),
     )
-
-
-def _load_line(load: dict[str, Any]) -> str:
-    mass = load['mass_kg']
-    return (
-        f'{load["start_s"]:.0f}-{load["end_s"]:.0f} s: payload {max(mass["value"], 0.0):.2f} kg '
-        f'(95 %: {max(mass["low"], 0.0):.2f} to {max(mass["high"], 0.0):.2f} kg) by measured '
-        f'efforts, {number_text(load["declared_kg"], 2)} kg declared'
-    )
-
-
-def _plateau_line(name: str, plateau: dict[str, Any]) -> str:
-    p = plateau
-    text = (
-        f'  {escape(name)}  {p["start_s"]:.0f}-{p["end_s"]:.0f} s  measured {p["measured"]:.1f}, '
-        f'model {p["model"]:.1f}, difference {p["difference"]:+.1f} {p["unit"]}'
-    )
-    return f'{text}: saturated: the effort stays at a limit' if p['saturated'] else text
+    told = [counted(count, one, many) for count, one, many in counts if count]
+    return f'{", ".join(told) or "all margins"} left out: -v lists them'

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ugv_acceptance.cli.options import RobotFile, poses_like
+from ugv_acceptance.cli.completion import poses_like
+from ugv_acceptance.cli.options import RobotFile
 
 
 def risk(
@@ -53,8 +54,7 @@ def risk(
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     import json
 
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.markup import escape
 
     from ugv_acceptance.cli.risk_study import (
         as_document,
@@ -64,29 +64,24 @@ def risk(
         phases_from,
     )
     from ugv_acceptance.cli.robot_description import warn
+    from ugv_acceptance.cli.terminal_output import console_of, progress, say, while_read
     from ugv_acceptance.config import load
     from ugv_acceptance.studies.risk import run
 
     phases = phases_from(load(config), posture, vary or [], mission)
     warn(doubted := doubts(phases))
     count = int(samples)
-    columns = (TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn())
     results = []
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        for phase in phases:
-            task = bar.add_task(phase.name, total=count)
-            found = run(
-                phase.study,
-                count,
-                seed,
-                workers,
-                lambda done, task=task: bar.update(task, completed=done),  # type: ignore[misc]
+    for phase in phases:
+        with progress(phase.name, count, 'samples') as reached:
+            results.append(
+                run(phase.study, count, seed, workers, lambda done, told=reached: told(done, ''))  # type: ignore[misc]
             )
-            results.append(found)
     if as_json:
         typer.echo(json.dumps(as_document(phases, results) | {'warnings': doubted}, indent=2))
         return
-    for phase, found in zip(phases, results, strict=True):
-        typer.echo('\n'.join(phase_lines(phase, found)))
-    if mission is not None:
-        typer.echo('\n'.join(mission_lines(phases, results)))
+    texts = [phase_lines(phase, found) for phase, found in zip(phases, results, strict=True)]
+    texts += [mission_lines(phases, results)] if mission is not None else []
+    with while_read():
+        for line in (line for text in texts for line in text):
+            say(console_of(), escape(line), 0, len(line) - len(line.lstrip()) + 4)

@@ -14,6 +14,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.config.units import quantity
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Joint, Robot
+from ugv_acceptance.report.format import short_name
 from ugv_acceptance.studies.axes import check_drives
 from ugv_acceptance.studies.risk import EVENTS, Risk, Study, estimate
 from ugv_acceptance.studies.risk_kernel import known_names
@@ -182,6 +183,8 @@ def _kind(robot: Robot, key: str) -> str:
     return {**(sliding if slides else turning), **fixed}[part]
 
 
+# Letters of an input's name, for a table of 80 columns.
+_NAME = 23
 # Inputs shown: those that matter most.
 SHOWN = 8
 _ANGLES = ('slope', 'heading', '.position', '.rate')
@@ -190,7 +193,10 @@ _ANGLES = ('slope', 'heading', '.position', '.rate')
 def phase_lines(phase: Phase, risk: Risk) -> list[str]:
     """Return the results of one phase as lines of text."""
     first = risk.estimates['either']
-    lines = [f'{phase.name}: {first.samples:,} samples, seed {risk.seed}, 95 % intervals']
+    lines = [
+        f'{phase.name}: probability {first.probability:.6f} that a joint saturates or it tips',
+        f'  {first.samples:,} samples, seed {risk.seed}, 95 % intervals',
+    ]
     lines += [
         f'  {event:12}{found.probability:12.6f}   [{found.low:.6f}, {found.high:.6f}]'
         if event not in not_judged(phase)
@@ -202,12 +208,13 @@ def phase_lines(phase: Phase, risk: Risk) -> list[str]:
         lines.append(f'  {e.samples:>14,}{e.probability:12.6f}   +/- {(e.high - e.low) / 2:.6f}')
     lines += ['  what matters most (share of the variance explained alone)']
     ranked = sorted(risk.sensitivity, key=lambda name: -max(risk.sensitivity[name].values()))
-    wide = max(28, *(len(name) + 1 for name in ranked[:SHOWN]))
-    lines.append(f'    {"input":{wide}}{"saturation":>12}{"rollover":>12}   drawn')
+    shown = {name: short_name(name, _NAME) for name in ranked[:SHOWN]}
+    wide = _NAME + 1
+    lines.append(f'    {"input":{wide}}{"saturation":>11}{"rollover":>10}  drawn')
     for name in ranked[:SHOWN]:
         share, spread = risk.sensitivity[name], phase.study.spreads[name]
-        numbers = f'{100 * share["saturation"]:11.1f}%{100 * share["rollover"]:11.1f}%'
-        lines.append(f'    {name:{wide}}{numbers}   {words(name, spread, phase.study.robot)}')
+        numbers = f'{100 * share["saturation"]:10.1f}%{100 * share["rollover"]:9.1f}%'
+        lines.append(f'    {shown[name]:{wide}}{numbers}  {words(name, spread, phase.study.robot)}')
     if phase.not_varied:
         lines.append(f'  not varied: {", ".join(phase.not_varied)}')
     return lines

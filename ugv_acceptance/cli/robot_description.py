@@ -7,9 +7,8 @@ import math
 from collections.abc import Iterable
 from typing import Any, SupportsFloat
 
-import typer
-
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.terminal_output import complain
 from ugv_acceptance.config import Config, quantity, rotation_from_rpy, worst_torques
 from ugv_acceptance.config.poses import nearest_name, pose_named
 from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
@@ -140,7 +139,7 @@ def payload_doubts(robot: Robot, text: str, option: str = '--payload') -> list[s
 def warn(sentences: Iterable[str]) -> None:
     """Print warnings to standard error."""
     for text in sentences:
-        typer.echo(f'ugv-acceptance: warning: {text}', err=True)
+        complain(f'warning: {text}')
 
 
 def tilted_gravity(robot: Robot, text: str) -> Vector:

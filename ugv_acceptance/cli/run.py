@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import FAULTS, steps_like, words_like
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, ros_arguments
 
 __all__ = ['CONTEXT', 'run']
@@ -36,11 +37,17 @@ def run(
         bool, typer.Option('--resume', help='Continue an interrupted run in that folder.')
     ] = False,
     only: Annotated[
-        list[str] | None, typer.Option(help='Only this step or group; may be given several times.')
+        list[str] | None,
+        typer.Option(
+            help='Only this step or group; may be given several times.', autocompletion=steps_like
+        ),
     ] = None,
     skip: Annotated[
         list[str] | None,
-        typer.Option(help='Leave out this step or group; may be given several times.'),
+        typer.Option(
+            help='Leave out this step or group; may be given several times.',
+            autocompletion=steps_like,
+        ),
     ] = None,
     config: ConfigFile = None,
     attempts: Annotated[
@@ -53,7 +60,8 @@ def run(
     fault: Annotated[
         list[str] | None,
         typer.Option(
-            help='A fault of the simulated robot, written as for simulate, angles as 30deg.'
+            help='A fault of the simulated robot, written as for simulate, angles as 30deg.',
+            autocompletion=words_like(*FAULTS),
         ),
     ] = None,
 ) -> None:

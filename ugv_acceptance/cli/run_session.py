@@ -16,9 +16,20 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import Progress, TaskID
 
 from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance.cli.terminal_output import (
+    again,
+    bar_on,
+    console_of,
+    said_of_work,
+    say,
+    say_list,
+    shown_verdict,
+    status,
+    wrote,
+)
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
@@ -52,15 +63,8 @@ class Steps:
 
         known = dict(zip((s.id for s in self.plan.steps), durations(self.plan), strict=True))
         self._planned = [known[step.id] + BESIDES for step in self.waiting]
-        self.bar = Progress(
-            TextColumn('{task.description}'),
-            BarColumn(bar_width=20),
-            TimeRemainingColumn(compact=True),
-            TextColumn('left  {task.fields[step]}'),
-            console=self.console,
-            transient=True,
-            disable=not self.console.is_terminal,
-        )
+        self.bar = bar_on(self.console, '{task.fields[step]}')
+        self.bar.disable = not self.console.is_terminal
         self._task = self.bar.add_task('starting', total=sum(self._planned), step='')
 
     def begin(self, step: 'Step') -> None:
@@ -83,12 +87,13 @@ class Steps:
         verdict, width = result['verdict'], len(str(len(self.waiting)))
         number = f'{self._number:>{width}}/{len(self.waiting)}'
         tried = len(result['earlier']) + 1
-        again = f' (attempt {tried})' if tried > 1 else ''
-        line = f'{number} [{COLOURS[verdict]}]{verdict:<13}[/]{escape(result["id"])}{again}'
-        self.console.print(line, soft_wrap=True)
+        more = f' (attempt {tried})' if tried > 1 else ''
+        line = f'{number} [{COLOURS[verdict]}]{verdict:<13}[/]{escape(result["id"])}{more}'
+        behind = 2 * width + 2
+        say(self.console, line, 0, behind)
         shown = result['reasons'] if verdict != 'PASS' else raised(result)
         for text in shown:
-            self.console.print(f'{" " * (2 * width + 2)}{escape(text)}', soft_wrap=True)
+            say(self.console, escape(text), behind)
 
 
 def raised(result: Mapping[str, Any]) -> list[str]:
@@ -103,7 +108,7 @@ def raised(result: Mapping[str, Any]) -> list[str]:
 
 def say_stop(console: Console, reason: str) -> None:
     """Print at once that motion was frozen, and why."""
-    console.print(f'[bold red]STOP[/] motion is frozen: {escape(reason)}', soft_wrap=True)
+    say(console, f'[bold red]STOP[/] motion is frozen: {escape(reason)}')
 
 
 def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
@@ -114,8 +119,8 @@ def asking(console: Console) -> Callable[[str, Callable[[], bool]], bool]:
     """
 
     def ask(text: str, going: Callable[[], bool]) -> bool:
-        console.print(f'[bold]{escape(text)}[/]', soft_wrap=True)
-        console.print('press Enter when it is done, s and Enter to skip this step')
+        say(console, f'[bold]{escape(text)}[/]')
+        say(console, 'press Enter when it is done, s and Enter to skip this step')
         answer = b''
         while going():
             if not select.select([0], [], [], 0.1)[0]:
@@ -136,15 +141,16 @@ def print_result(result: Mapping[str, Any], folder: 'RunFolder', console: Consol
     from ugv_acceptance.run.report import approaches, counts_of
 
     verdict, covered = result['verdict'], result['coverage']
-    console.print(f'[bold {COLOURS[verdict]}]{verdict}[/]: {counts_of(result)}', soft_wrap=True)
+    outcome = shown_verdict(verdict, counts_of(result))
+    say(console, outcome)
+    told = approaches(covered)
     if covered['joints']:
         text = '{cells_visited} of {cells_reachable} cells of the failure map visited'
-        console.print(text.format(**covered))
-    for line in approaches(covered):
-        console.print(line, soft_wrap=True)
-    console.print(
-        f'{escape(str(folder.path))}/report.html, report.txt, result.json, steps/', soft_wrap=True
-    )
+        told = [text.format(**covered), *told]
+    say_list(console, told, len(told), '', 2)
+    say(console, outcome)
+    made = ('result.json', 'report.txt', 'report.html', 'steps')
+    wrote(*(folder.path / name for name in made))
 
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
@@ -189,21 +195,29 @@ def execute(asked: Asked) -> int:
     check_folder('--out', out, RUN, inputs_of(config))
     folder = open_folder(out, plan, asked.plan, mode, config, resume=asked.resume)
     waiting = [step for step in chosen if folder.done(step) is None]
-    console = Console(highlight=False)
-    console.print(f'plan {escape(plan.plan)}, sha256 {plan.sha256}', soft_wrap=True)
+    console = console_of()
+    say(console, f'plan {escape(plan.plan)}, sha256 {plan.sha256}')
     if plan.config_sha256 != config.sha256:
-        console.print("[yellow]The plan was derived from another state of the robot's files.[/]")
+        say(console, "[yellow]The plan was derived from another state of the robot's files.[/]")
     if len(waiting) < len(chosen):
-        console.print(f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
+        say(console, f'{len(chosen) - len(waiting)} of {len(chosen)} steps are done already')
     interrupted = bool(waiting) and _do(asked, config, folder, Steps(console, plan, waiting))
-    with console.status('computing the coverage of the run'):
+    with status('computing the coverage of the run'):
         result = folder.finish(config, coverage(config, folder))
     folder.note('interrupted' if interrupted else 'finished', verdict=result['verdict'])
     print_result(result, folder, console)
     if interrupted:
-        console.print('interrupted: --resume continues where it ended')
+        _say_interrupted(asked, out, sum(folder.done(step) is not None for step in chosen), chosen)
         return INTERRUPTED
     return EXIT[result['verdict']]
+
+
+def _say_interrupted(asked: Asked, out: Path, done: int, chosen: Sequence['Step']) -> None:
+    """Say what a run has that was interrupted, and how to go on."""
+    more = [*(() if asked.out else ('--out', str(out))), *(() if asked.resume else ('--resume',))]
+    console = said_of_work()
+    say(console, f'interrupted: {done} of {len(chosen)} steps are done. This goes on:')
+    console.print(f'  {escape(again(*more))}', soft_wrap=True)
 
 
 def plan_of(asked: Asked, config: 'Config') -> 'Plan':
@@ -251,7 +265,7 @@ def _do(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> bo
                 return True
             shown.end(result)
             if runner.over:
-                shown.console.print(f'[bold red]The run ends here:[/] {runner.over}')
+                say(shown.console, f'[bold red]The run ends here:[/] {escape(runner.over)}')
                 return True
     return False
 

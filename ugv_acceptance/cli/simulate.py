@@ -1,27 +1,41 @@
 """`ugv-acceptance simulate`: records a robot simulated in MuJoCo, faster than real time."""
 
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
+from ugv_acceptance.cli.completion import FAULTS, SCENARIOS, words_like
 from ugv_acceptance.cli.options import ConfigFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
+from ugv_acceptance.cli.terminal_output import (
+    complain,
+    console_of,
+    progress,
+    say,
+    while_read,
+    wrote,
+)
 
 if TYPE_CHECKING:
     from ugv_acceptance.model.robot import Robot
-    from ugv_acceptance.run.catalogue import Case
     from ugv_acceptance.run.record import Outcome
 
+# Columns of a list's names.
+_NAMES = 28
 # Links that a warning names.
 SHOWN = 8
 
 
 def simulate(
     scenario: Annotated[
-        str, typer.Argument(help='A scenario by name; --list says which there are.')
+        str,
+        typer.Argument(
+            help='A scenario by name; --list says which there are.',
+            autocompletion=words_like(*SCENARIOS),
+        ),
     ] = 'gentle',
     seconds: Annotated[
         float | None,
@@ -37,7 +51,8 @@ def simulate(
         list[str] | None,
         typer.Option(
             help='KIND[:SUBJECT][=AMOUNT][@START[-END]], times in s, an angle as 30deg; '
-            'may be given several times.'
+            'may be given several times.',
+            autocompletion=words_like(*FAULTS),
         ),
     ] = None,
     config: ConfigFile = None,
@@ -62,7 +77,7 @@ def simulate(
       ugv-acceptance simulate --list
       ugv-acceptance simulate overreach --seed 2 --bag out/overreach
       ugv-acceptance simulate tilt --config husky.yaml --bag out/tilt
-      ugv-acceptance simulate work -s 600 --bag out/work --fault frozen-encoder:elbow_joint@60-90
+      ugv-acceptance simulate work -s 600 --bag out/work --fault imu-bias@60-90
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     if listed:
         _print_list()
@@ -82,9 +97,10 @@ def simulate(
     case = case_of(scenario, robot, seed, seconds, faults)
     say_balanced(robot)
     began = time.monotonic()
-    with _bar(case) as progress:
-        outcome = record(loaded, case, seed, bag, progress)
+    with progress('simulating', case.scenario.duration) as reached:
+        outcome = record(loaded, case, seed, bag, lambda done: reached(done, ''))
     _print_outcome(outcome, bag, outcome.seconds / (time.monotonic() - began))
+    wrote(bag)
 
 
 def say_balanced(robot: 'Robot') -> None:
@@ -94,79 +110,33 @@ def say_balanced(robot: 'Robot') -> None:
     names = balanced_links(robot)
     if names:
         listed = ', '.join(names[:SHOWN]) + (', ...' if len(names) > SHOWN else '')
-        typer.echo(
+        complain(
             f'warning: the inertia of {listed} is not that of a rigid body: the simulation takes '
-            'the mean of its three moments; static margins do not use it',
-            err=True,
+            'the mean of its three moments; static margins do not use it'
         )
-
-
-def _bar(case: 'Case') -> 'Bar':
-    return Bar(case.scenario.duration)
-
-
-class Bar:
-    """A progress bar of simulated seconds on a terminal; nothing elsewhere."""
-
-    def __init__(self, total: float) -> None:
-        from rich.console import Console
-        from rich.progress import Progress, TextColumn
-
-        console = Console(file=sys.stderr)
-        text = TextColumn('{task.completed:.0f} of {task.total:.0f} s')
-        self._progress = Progress(
-            *Progress.get_default_columns(),
-            text,
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._task = self._progress.add_task('simulating', total=total)
-
-    def __enter__(self) -> 'Bar':  # noqa: PYI034 - Self is Python 3.11
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def __call__(self, reached: float) -> None:
-        """Show the simulated time (s) reached."""
-        self._progress.update(self._task, completed=reached)
 
 
 def _print_list() -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     from ugv_acceptance.run.catalogue import names
     from ugv_acceptance.simulation.faults import KINDS
 
-    console = Console(highlight=False)
-    for title, rows in (
-        ('scenarios', names().items()),
-        (
-            'faults',
-            [
-                (name, f'{kind.words}; subject: {kind.subject}' if kind.subject else kind.words)
-                for name, kind in KINDS.items()
-            ],
-        ),
-    ):
-        table = Table(box=None, pad_edge=False, padding=(0, 2), title=title, title_justify='left')
-        table.add_column('name', no_wrap=True)
-        table.add_column('what happens')
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
+    console = console_of()
+    faults = {
+        name: f'{kind.words}; subject: {kind.subject}' if kind.subject else kind.words
+        for name, kind in KINDS.items()
+    }
+    with while_read():
+        for title, rows in (('scenarios', names()), ('faults', faults)):
+            say(console, f'[bold]{title}[/]')
+            for name, words in rows.items():
+                say(console, escape(f'{name:{_NAMES}}{words}'), 2, _NAMES + 2)
 
 
 def _print_outcome(outcome: 'Outcome', bag: Path, speed: float) -> None:
-    tipped = outcome.tipped_at
+    console, tipped = console_of(), outcome.tipped_at
     events = [f'{name} saturated at {at:.2f} s' for name, at in outcome.saturated_at.items()]
     if tipped < float('inf'):
         events.append(f'tipped over at {tipped:.2f} s')
-    typer.echo(
-        f'{bag}: {outcome.seconds:.1f} s, {outcome.messages} messages, {speed:.0f} x real time'
-    )
-    typer.echo(f'truth: {"; ".join(events) or "nothing saturated, did not tip"}')
+    text = f'{bag}: {outcome.seconds:.1f} s, {outcome.messages} messages, {speed:.0f} x real time'
+    say(console, escape(text))
+    say(console, escape(f'truth: {"; ".join(events) or "nothing saturated, did not tip"}'))

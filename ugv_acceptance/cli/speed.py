@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ugv_acceptance.cli.completion import poses_like
 from ugv_acceptance.cli.options import PayloadMass, RobotFile
 
 if TYPE_CHECKING:
@@ -11,12 +12,17 @@ if TYPE_CHECKING:
     from ugv_acceptance.type_aliases import Floats
 
 
+# Letters of a joint's name, for a table of 80 columns.
+_NAME = 58
+
+
 def speed(
     config: RobotFile = None,
     posture: Annotated[
         str,
         typer.Option(
-            help='Posture held while each joint turns: joint=30deg,...; by default all postures.'
+            help='Posture held while each joint turns: joint=30deg,...; by default all postures.',
+            autocompletion=poses_like,
         ),
     ] = '',
     payload: PayloadMass = '',
@@ -75,13 +81,25 @@ def speed(
         document |= {'speed_m_s': slides} if slides else {}
         typer.echo(json.dumps(document, indent=2))
         return
-    typer.echo(
-        f'{robot.name}, {load_carried.mass:g} kg, '
-        f'error of the static model {reference:g} N m, F < {bound:.4f}'
-    )
-    wide = max(24, *(len(name) + 1 for name in robot.joint_names))
-    for name, limit in zip(robot.joint_names, limits, strict=True):
-        typer.echo(f'  {name:{wide}}{_speed(robot, name, limit)}')
+    _print(robot, limits, f'{load_carried.mass:g} kg, {_model_words(reference, bound)}')
+
+
+def _model_words(reference: float, bound: float) -> str:
+    return f'error of the static model {reference:g} N m, F < {bound:.4f}'
+
+
+def _print(robot: 'Robot', limits: 'list[float]', given: str) -> None:
+    from rich.markup import escape
+
+    from ugv_acceptance.cli.terminal_output import console_of, say
+    from ugv_acceptance.report.format import short_name
+
+    console = console_of()
+    say(console, escape(f'{robot.name}, {given}'))
+    shown = [short_name(name, _NAME) for name in robot.joint_names]
+    wide = max(24, *(len(name) + 1 for name in shown))
+    for name, label, limit in zip(robot.joint_names, shown, limits, strict=True):
+        console.print(escape(f'  {label:{wide}}{_speed(robot, name, limit)}'), soft_wrap=True)
 
 
 def _check(robot: 'Robot') -> None:

@@ -4,8 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.cli.completion import configs_like
+from ugv_acceptance.cli.terminal_output import COLOURS, console_of, say, say_list, while_read
 from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
@@ -25,7 +28,13 @@ def verify(
     ],
     bag: Annotated[list[Path] | None, typer.Option(help='The recording, if it was moved.')] = None,
     config: Annotated[
-        Path | None, typer.Option('--config', '-c', help="The robot's YAML file, if it was moved.")
+        Path | None,
+        typer.Option(
+            '--config',
+            '-c',
+            help="The robot's YAML file, if it was moved.",
+            autocompletion=configs_like,
+        ),
     ] = None,
     urdf: Annotated[Path | None, typer.Option(help='The URDF, if it was moved.')] = None,
     criteria: Annotated[Path | None, typer.Option(help='The criteria, if they were moved.')] = None,
@@ -39,25 +48,26 @@ def verify(
       ugv-acceptance verify result.json
       ugv-acceptance verify result.json --bag /media/usb/run_0.mcap
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.result_text import while_read
-
     told = read_result(result_file)
     found = again(told, result_file.parent, bag, config, urdf, criteria)
     differences = compare(told, found)
     with while_read():
-        for line in said(differences, result_file, told['verdict']):
-            typer.echo(line)
+        print_comparison(differences, result_file, told['verdict'])
     raise typer.Exit(1 if differences else 0)
 
 
-def said(differences: list[str], path: Path, verdict: str) -> list[str]:
-    """Return the outcome of the comparison as lines of text."""
+def print_comparison(differences: list[str], path: Path, verdict: str) -> None:
+    """Print the outcome of the comparison; where anything differs, first and last."""
+    console = console_of()
     if not differences:
-        return [f'[OK] VERIFIED  {path}: the same hashes, verdicts and numbers ({verdict})']
-    lines = [f'  {line}' for line in differences[:MOST_SHOWN]]
-    more = len(differences) - MOST_SHOWN
-    lines += [f'  and {more} more'] if more > 0 else []
-    return [*lines, f'[X] DIFFERS  {path}: {len(differences)} differences']
+        text = f'{path}: the same hashes, verdicts and numbers ({verdict})'
+        say(console, f'[{COLOURS["PASS"]}]\\[OK] VERIFIED[/]  {escape(text)}')
+        return
+    count = f'{len(differences)} difference{"s" * (len(differences) > 1)}'
+    outcome = f'[{COLOURS["FAIL"]}]\\[X] DIFFERS[/]  {escape(f"{path}: {count}")}'
+    say(console, outcome)
+    say_list(console, differences, MOST_SHOWN, 'differences', 2)
+    say(console, outcome)
 
 
 def read_result(path: Path) -> Json:

@@ -118,7 +118,7 @@ class Advisory:
     def tipped(self) -> bool:
         """Whether the robot has tipped over, by its newest margins."""
         margins = self.evaluator.margins
-        return margins is not None and has_tipped(margins.stability.angle)  # type: ignore[arg-type]
+        return margins is not None and has_tipped(margins.stability.angle)
 
     def do(self, alert: Alert) -> str:
         """Return what to do about an alert: the computed advice for its margin, else general.

@@ -1,7 +1,7 @@
 """The acceptance report: a result as one self-contained HTML page a person can sign."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.downsampling import Strips
 from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.report.error_rate import error_rate_line
 from ugv_acceptance.report.format import (
     assumed_line,
@@ -30,7 +31,8 @@ from ugv_acceptance.report.format import (
     worst_text,
 )
 from ugv_acceptance.report.regions import svg_of
-from ugv_acceptance.report.run_charts import run_chart, track_map
+from ugv_acceptance.report.run_charts import gravity_of, positions_of, run_chart, track_map
+from ugv_acceptance.report.side_view import Standing, side_view
 from ugv_acceptance.type_aliases import Json
 
 
@@ -57,6 +59,11 @@ def _nothing(url: str, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - WeasyPrint'
 AROUND = 5.0
 MOST_EVENTS = 8
 MOST_ALERTS = 60
+# Signals whose worst moment is drawn in an event.
+MOMENTS = {
+    'tip': ('tip_angle',),
+    'torque': ('torque_utilisation', 'torque', 'torque_margin'),
+}
 MARKS = {'PASS': '✓', 'FAIL': '✗', 'INCONCLUSIVE': '?'}
 CLOSING = {
     'PASS': 'This run met these criteria.',
@@ -69,10 +76,11 @@ CLOSING = {
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An SVG with its caption."""
+    """An SVG with its caption; `below` are more of what it shows."""
 
     svg: str
     caption: str
+    below: 'tuple[Picture, ...]' = ()
 
 
 def acceptance_page(
@@ -147,8 +155,32 @@ def _events(result: Json, strips: Strips, settings: Settings) -> list[Picture]:
     for k, (title, start, end) in enumerate(_spans(result)[:MOST_EVENTS]):
         made = run_chart(strips, result, settings, (start, end))
         if made is not None:
-            pictures.append(Picture(svg_of(made, f'event{k}'), title))
+            views = tuple(_views(result, settings, (start, end), f'event{k}'))
+            pictures.append(Picture(svg_of(made, f'event{k}'), title, views))
     return pictures
+
+
+def _views(
+    result: Json, settings: Settings, span: tuple[float, float], name: str
+) -> Iterator[Picture]:
+    """Yield the robot at the worst moment of tip-over and of torque, if they are in a span (s)."""
+    for what, signals in MOMENTS.items():
+        found = [
+            (c['measured']['distance'] or 0.0, c['name'], c['measured'])
+            for c in result['criteria']['results']
+            if c['measured'].get('signal') in signals
+            and c['measured']['moment'] is not None
+            and span[0] <= c['measured']['at_s'] <= span[1]
+        ]
+        if found:
+            _, criterion, measured = min(found, key=lambda one: one[:2])
+            moment = measured['moment']
+            load = Payload(moment['payload_kg'], tuple(moment['payload_cog_m']))
+            q = tuple(positions_of(moment, settings).tolist())
+            at = Standing(q, gravity_of(moment, settings.robot.gravity), load)
+            words = f'{measured["at_s"]:.2f} s, the worst moment of {criterion}: '
+            legend = 'blue: what it stands on; dashed: plumb line; triangle: nearest edge'
+            yield Picture(side_view(at, settings, f'{name}-{what}'), words + legend)
 
 
 def _spans(result: Json) -> list[tuple[str, float, float]]:

@@ -3,6 +3,8 @@
 import json
 from importlib.resources import files
 
+from ugv_acceptance.type_aliases import Json
+
 # Written by `make error-rate ARGS=--write`.
 FILE = 'error_rate.json'
 
@@ -13,11 +15,13 @@ def error_rate_line() -> str:
     if not source.is_file():
         return 'Error rate of verdicts: not measured with this installation.'
     told = json.loads(source.read_text(encoding='utf-8'))
-    rates = '; '.join(
-        f'of {x["runs"]} {x["what"]} {x["wrong"]} {x["did"]} (95 %: at most {x["most"]:.2%})'
-        for x in told['rates']
-    )
+    rates = '; '.join(map(_rate, told['rates']))
     return (
         f'Error rate of verdicts, measured on drawn runs of {told["kinds"]} kinds: {rates}. Faults '
         'of other kinds are not in it; docs/error_rate.md has the table.'
     )
+
+
+def _rate(told: Json) -> str:
+    most = f'95 %: at most {100.0 * told["most"]:.2f} %'
+    return f'of {told["runs"]} {told["what"]} {told["wrong"]} {told["did"]} ({most})'

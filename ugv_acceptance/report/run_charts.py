@@ -152,7 +152,7 @@ def track_map(strips: Strips, result: Json, settings: Settings) -> Figure | None
     if pair is None or moment is None:
         return None
     grid = _grid(pair, moment, settings)
-    gravity = _gravity(moment, settings.robot.gravity)
+    gravity = gravity_of(moment, settings.robot.gravity)
     payload = Payload(float(moment['payload_kg']), settings.robot.payload.cog)
     limits = np.array(settings.limits.torque)
     forms = torque_forms(settings.robot, grid, gravity, payload)
@@ -206,7 +206,8 @@ def _telling_moment(result: Json) -> Json | None:
     return None
 
 
-def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
+def gravity_of(moment: Json, g: float) -> tuple[float, float, float]:
+    """Return gravity (m/s2, `base_link`) of a result's moment; `g` is its size."""
     roll, pitch = math.radians(moment['roll_deg']), math.radians(moment['pitch_deg'])
     return (
         g * math.sin(pitch),
@@ -215,10 +216,16 @@ def _gravity(moment: Json, g: float) -> tuple[float, float, float]:
     )
 
 
-def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
-    q = np.array([x['position'] for x in moment['joints'].values()])
+def positions_of(moment: Json, settings: Settings) -> Floats:
+    """Return the joint positions (j,), rad or m, of a result's moment."""
+    q = np.array([x['position'] for x in moment['joints'].values()], dtype=np.float64)
     turning = [not settings.robot.joint(name).slides for name in settings.robot.joint_names]
-    q = np.where(turning, np.radians(q), q)
+    found: Floats = np.where(turning, np.radians(q), q)
+    return found
+
+
+def _grid(pair: list[int], moment: Json, settings: Settings) -> Grid:
+    q = positions_of(moment, settings)
     x, y = (np.linspace(*_range(settings, j), CELLS) for j in pair)
     return Grid(pair[0], pair[1], x, y, q)
 

@@ -257,7 +257,7 @@ def rewritten(
         replace(
             link,
             cog=place(link.name, link.cog),
-            inertia=tuple(map(tuple, _turned(turns.get(link.name), link.inertia))),
+            inertia=_turned(turns.get(link.name), link.inertia),
         )
         for link in robot.links
     )
@@ -274,11 +274,12 @@ def rewritten(
     return other, np.array([signs[name] for name in robot.joint_names])
 
 
-def _turned(turn: Rotation | None, inertia: Matrix) -> list[list[float]]:
+def _turned(turn: Rotation | None, inertia: Matrix) -> Matrix:
     if turn is None:
-        return np.array(inertia).tolist()
+        return inertia
     back = turn.inv().as_matrix()
-    return (back @ np.array(inertia) @ back.T).tolist()
+    a, b, c = (back @ np.array(inertia) @ back.T).tolist()
+    return tuple(a), tuple(b), tuple(c)
 
 
 def told(robot: Robot, q: Floats, down: Floats, payload: Payload) -> list[str]:

@@ -8,19 +8,26 @@ const TIPPED = -20; // degrees of tilt left: it no longer stands on the ground t
 
 // Which way a view looks: what is to the right on the screen, and its sides.
 export const VIEWS = [
-  { id: 'from-side', words: 'from its right side', across: (p) => p[0], sides: ['rear', 'front'] },
-  { id: 'from-rear', words: 'from behind', across: (p) => -p[1], sides: ['left', 'right'] },
+  { id: 'from-side', words: 'from its right side', across: (p) => p[0], deep: 1, sides: ['rear', 'front'] },
+  { id: 'from-rear', words: 'from behind', across: (p) => -p[1], deep: 0, sides: ['left', 'right'] },
 ];
 
 export class SideView {
-  constructor(canvas, view) { this.canvas = canvas; this.view = view; this.box = null; this.robot = null; }
+  constructor(canvas, view) { this.canvas = canvas; this.view = view; this.box = null; this.robot = null; this.drawn = ''; this.outlined = ''; }
 
   draw(frame, hello) {
-    const { c, width, height } = brush(this.canvas), p = frame.posture, g = frame.attitude.gravity;
+    const p = frame.posture, g = frame.attitude.gravity;
     const [gu, gv] = [this.view.across(g), g[2]], size = Math.hypot(gu, gv) || 1, cos = -gv / size, sin = -gu / size;
+    // What nobody sees is not drawn again: a tenth of a degree, a few millimetres.
+    const seen = [p.places, p.cog, p.load, (p.plumb ?? []).map((x) => x.toFixed(2)), sin.toFixed(3), cos > 0, frame.payload.mass_kg,
+      frame.tilt.map((t) => [words_of(t), t.level]), frame.torque.map((t) => t.level ?? t.use >= 1), this.canvas.clientWidth, this.canvas.clientHeight, window.devicePixelRatio];
+    const now = JSON.stringify(seen);
+    if (now === this.drawn && this.robot === hello.robot) return;
+    this.drawn = now;
+    const { c, width, height } = brush(this.canvas);
     // In metres from base_link, gravity down.
-    const flat = (q) => { const u = this.view.across(q), v = q[2]; return [u * cos - v * sin, u * sin + v * cos]; };
-    const shapes = (hello.solids ?? []).map((s) => ({ joint: s.joint, radius: s.radius_m, points: placed(s, p.places).map(flat) }));
+    const turned = ([u, v]) => [u * cos - v * sin, u * sin + v * cos], flat = (q) => turned([this.view.across(q), q[2]]);
+    const shapes = this.outlines(p, hello).map((s) => ({ ...s, points: s.points.map(turned) }));
     const ground = support(p, this.view, flat), cog = flat(p.cog), plumb = p.plumb && flat(p.plumb);
     this.grow(hello, shapes, [...p.limbs.flatMap((l) => [l.from, l.to]), ...p.contacts, ...p.body].map(flat), [cog, ...ground]);
     const font = Math.round(Math.min(20, Math.max(14, height / 16)));
@@ -41,6 +48,16 @@ export class SideView {
     const turn = slope(pen, ground, fallen);
     this.corners(pen, frame);
     this.canvas.setAttribute('aria-label', `Robot ${this.view.words}, on a slope of ${fixed(turn)} degrees${told ? `; nearest edge: ${told.side}, ${told.words}` : ''}`);
+  }
+
+  // The outlines of a posture, level: they are found anew only when a joint has moved.
+  outlines(p, hello) {
+    const posture = JSON.stringify(p.places);
+    if (posture !== this.outlined || this.robot !== hello.robot) {
+      this.outlined = posture;
+      this.shapes = (hello.solids ?? []).map((s) => ({ joint: s.joint, radius: s.radius_m, points: hull(placed(s, p.places).map((q) => [this.view.across(q), q[2]])) }));
+    }
+    return this.shapes;
   }
 
   // The picture only grows, so that it does not jump while the arm moves.
@@ -95,14 +112,23 @@ function placed(solid, places) {
   return solid.points.map(([x, y, z]) => [0, 3, 6].map((k) => m[k] * x + m[k + 1] * y + m[k + 2] * z + m[9 + k / 3]));
 }
 
-// The two ends of what it stands on, left and right on the screen; of a robot that stands on nothing a line below its body.
+// The two ends of what it stands on, left and right on the screen, in a section through the plumb line; of a robot that stands on
+// nothing a line below its body.
 function support(p, view, flat) {
-  const feet = p.polygon.length ? p.polygon : [[p.body[0][0], p.body[0][1], p.body[0][2]], [p.body[1][0], p.body[1][1], p.body[0][2]]];
-  const order = [...feet].sort((a, b) => view.across(a) - view.across(b));
-  return [flat(order[0]), flat(order[order.length - 1])];
+  const body = [p.body[0], [p.body[1][0], p.body[1][1], p.body[0][2]]], feet = p.polygon.length ? p.polygon : body;
+  const deep = feet.map((q) => q[view.deep]), at = (p.plumb ?? p.cog)[view.deep], level = Math.min(Math.max(at, Math.min(...deep)), Math.max(...deep)), cuts = [];
+  feet.forEach((a, k) => {
+    const b = feet[(k + 1) % feet.length], start = a[view.deep] - level, end = b[view.deep] - level;
+    if (start === 0 && end === 0) cuts.push(a, b);
+    else if (start * end <= 0) cuts.push(a.map((x, i) => x + (start / (start - end)) * (b[i] - x)));
+  });
+  if (!p.polygon.length) cuts.splice(0, cuts.length, ...body);
+  cuts.sort((a, b) => view.across(a) - view.across(b));
+  return [flat(cuts[0]), flat(cuts[cuts.length - 1])];
 }
 
 function hull(points) {
+  if (points.length < 3) return points;
   const order = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]), found = [];
   const left = (a, b, q) => (b[0] - a[0]) * (q[1] - a[1]) - (b[1] - a[1]) * (q[0] - a[0]);
   for (const run of [order, [...order].reverse()]) {
@@ -136,7 +162,7 @@ function solids(pen, shapes, frame) {
   for (const s of shapes) {
     if (!s.points.length) continue;
     c.beginPath();
-    if (s.radius > 0) { const [x, y] = at(s.points[0]); c.arc(x, y, s.radius * scale, 0, 7); } else hull(s.points).forEach((q) => c.lineTo(...at(q)));
+    if (s.radius > 0) { const [x, y] = at(s.points[0]); c.arc(x, y, s.radius * scale, 0, 7); } else s.points.forEach((q) => c.lineTo(...at(q)));
     c.closePath();
     const over = level.get(s.joint) === 'ERROR';
     c.fillStyle = over ? '#f3b9bd' : FILL; c.strokeStyle = over ? COLOURS.ERROR : '#333'; c.fill(); c.stroke();

@@ -65,7 +65,7 @@ class _Motion:
 
     def rises(self, share: float) -> bool:
         """Return whether it goes up or down by at least this share of its way."""
-        return abs(self.way[2]) >= share * self.length
+        return abs(float(self.way[2])) >= share * self.length
 
     @property
     def stretches(self) -> bool:

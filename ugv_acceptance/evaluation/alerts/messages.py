@@ -95,13 +95,13 @@ ALERTS = {
         'The robot is about to slide down the slope, before it tips.',
     ),
     'TIP_AHEAD': AlertText(
-        'it tips within {seconds:.1f} s if this motion goes on: {side}',
+        'it tips within {seconds:.1f} s if this motion continues: {side}',
         'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the robot tips to the side named within a second.',
     ),
     'TORQUE_AHEAD': AlertText(
-        '{subject} is at its limit within {seconds:.1f} s if this motion goes on',
+        '{subject} is at its limit within {seconds:.1f} s if this motion continues',
         'stop the motion',
         FailureSource.INTERACTION,
         'At this rate the joint named is at its limit within a second.',

@@ -366,6 +366,7 @@ def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
         'roll_deg': math.degrees(math.atan2(-gy, -gz)),
         'pitch_deg': math.degrees(math.atan2(gx, math.hypot(gy, gz))),
         'payload_kg': moment.payload.mass,
+        'payload_cog_m': list(moment.payload.cog),
     }
 
 

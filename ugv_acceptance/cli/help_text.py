@@ -1,0 +1,73 @@
+"""The help of the verbs and the words of a wrong usage, from a verb's docstring and its options.
+
+Sentences are wrapped for the page they are shown on, not as the docstring is; lines of examples
+(after a backspace, as click has it) stay as they are written.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from ugv_acceptance.cli.plain_text import WIDEST, columns_of, is_terminal, takes_colour
+
+KEPT = '\b'
+# What typer raises where the options do not fit; it has no name for all of them.
+USAGE: type[Exception] = next(
+    base for base in typer.BadParameter.__mro__ if base.__name__ == 'ClickException'
+)
+
+
+def help_of(function: Callable[..., Any]) -> str:
+    """Return the help of a verb: its docstring, a paragraph a line; examples as they stand."""
+    paragraphs = inspect.cleandoc(function.__doc__ or '').split('\n\n')
+    return '\n\n'.join(
+        part.removeprefix(KEPT).strip('\n') if part.startswith(KEPT) else ' '.join(part.split())
+        for part in paragraphs
+    )
+
+
+def usage_text(error: Any) -> str:  # noqa: ANN401 - typer's own class has no public name
+    """Return a wrong usage as one line: of which verb, what is wrong, where it says more.
+
+    Empty where no word was given and the help is printed instead.
+    """
+    context = getattr(error, 'ctx', None)
+    if context is None or not error.format_message():
+        return str(error.format_message())
+    verb = context.command_path.partition(' ')[2]
+    about, path = (f'{verb}: ' if verb else ''), context.command_path
+    return f'{about}{error.format_message().rstrip(".")}; `{path} --help` says more'
+
+
+def _fit_page() -> None:
+    """Tell typer's help of the stream it goes to: its columns, and whether it has colour."""
+    from typer import rich_utils
+
+    stream = sys.stdout
+    drawn = is_terminal(stream)
+    rich_utils.FORCE_TERMINAL = drawn
+    rich_utils.MAX_WIDTH = min(columns_of(stream), WIDEST)
+    system: Any = None if not takes_colour(stream) else 'auto' if drawn else 'standard'
+    rich_utils.COLOR_SYSTEM = system
+
+
+class Verb(TyperCommand):
+    """A verb whose help fits the page it is shown on."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - classes of typer's
+        """Write the help."""
+        _fit_page()
+        super().format_help(ctx, formatter)
+
+
+class Group(TyperGroup):
+    """The program; its help fits the page it is shown on."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - classes of typer's
+        """Write the help."""
+        _fit_page()
+        super().format_help(ctx, formatter)
