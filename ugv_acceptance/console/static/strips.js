@@ -2,10 +2,11 @@
 import { $, brush, nice } from './dom.js';
 
 const SECONDS = 60;
+const EVERY = 250; // ms: in a minute's width nobody sees a twentieth of a second
 const LINES = [['#0047b3', []], ['#b3005f', [8, 4]], ['#007a5a', [2, 4]], ['#8a4b00', [12, 3, 3, 3]]];
 
 export class Strips {
-  constructor() { this.rows = []; }
+  constructor() { this.rows = []; this.due = 0; }
 
   describe(hello) { this.hello = hello; this.rows.length = 0; }
 
@@ -20,7 +21,9 @@ export class Strips {
   }
 
   draw() {
-    const h = this.hello;
+    const h = this.hello, now = performance.now();
+    if (now < this.due) return;
+    this.due = now + EVERY;
     this.chart('strip-tilt', 'tilt', h.sides, [[h.tip_warn_deg, '#a87f00'], [h.tip_error_deg, '#c00016']], -10, 60, '°');
     this.chart('strip-torque', 'use', h.joints.map((j) => (j.limit === null ? null : nice(j.name))), [[100 * h.torque_warn, '#a87f00'], [100 * h.torque_error, '#c00016']], 0, 125, ' %');
   }
