@@ -41,7 +41,8 @@ Complete = Callable[[str], list[str]]
 
 def typed_words() -> list[str]:
     """Return the whole words after the program that a shell asks completions for."""
-    typed = os.environ.get('COMP_WORDS') or os.environ.get('_TYPER_COMPLETE_ARGS', '')
+    bash = os.environ.get('_UGV_ACCEPTANCE_COMPLETE', '').endswith('bash')
+    typed = os.environ.get('COMP_WORDS' if bash else '_TYPER_COMPLETE_ARGS', '')
     # The last word may be only the start of one.
     return [*typed.split()[1:], *([''] if typed[-1:].isspace() else [])][:-1]
 

@@ -87,7 +87,7 @@ def evaluate(
       ugv-acceptance evaluate bags/packbot_pass
       ugv-acceptance evaluate run_0.mcap run_1.mcap --json r.json --csv m.csv
       ugv-acceptance evaluate run -c robot.yaml --urdf robot.urdf --compare-effort
-      ugv-acceptance evaluate run --criteria site.yaml --report r.html --junit r.xml
+      ugv-acceptance evaluate run --criteria site.yaml --report r.html -v
       ugv-acceptance evaluate run --annotate run_judged.mcap
       ugv-acceptance evaluate run --ground stairs=12s..40s
       ugv-acceptance evaluate run --drill ada.json --report r.html

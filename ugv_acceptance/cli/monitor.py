@@ -19,6 +19,7 @@ from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_argume
 from ugv_acceptance.cli.terminal_output import console_of, say
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.ground import ground_words
+from ugv_acceptance.report.format import short_name
 
 if TYPE_CHECKING:
     from ugv_acceptance.monitoring.diagnostics import Status
@@ -125,7 +126,7 @@ def table_of(monitor: 'Monitor') -> Table:
     for name, torque, limit in rows:
         if math.isfinite(limit):
             left = f'{limit - abs(torque):.1f}'
-            table.add_row(escape(name), f'{torque:.1f}', f'{limit:.1f}', left)
+            table.add_row(escape(short_name(name)), f'{torque:.1f}', f'{limit:.1f}', left)
     if settings.judges_tilt:
         table.add_row('ground', ground_words(settings.ground.kind), '', '')
     most = '<= ' if settings.ground.rough else ''

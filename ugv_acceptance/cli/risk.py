@@ -81,7 +81,8 @@ def risk(
         typer.echo(json.dumps(as_document(phases, results) | {'warnings': doubted}, indent=2))
         return
     texts = [phase_lines(phase, found) for phase, found in zip(phases, results, strict=True)]
-    texts += [mission_lines(phases, results)] if mission is not None else []
+    # The answer once more, where it does not scroll away.
+    texts += [mission_lines(phases, results)] if mission is not None else [texts[0][:1]]
     with while_read():
         for line in (line for text in texts for line in text):
             say(console_of(), escape(line), 0, len(line) - len(line.lstrip()) + 4)
