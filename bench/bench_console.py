@@ -1,6 +1,6 @@
 """The console beside a live robot: `python -m bench.bench_console`.
 
-A driver (100 Hz joints, 200 Hz IMU), a monitor and a console are processes; a real Chromium paints.
+A driver (200 Hz joints, 400 Hz IMU), a monitor and a console are processes; a real Chromium paints.
 Prints the time from a message's stamp to the screen, frames that were dropped while maps are made
 anew, the processor's share, and what ten, then 220 more clients change for the monitor.
 """
@@ -63,7 +63,7 @@ def main() -> None:
     """Measure and print."""
     size = sum(file.stat().st_size for file in (ROOT / 'ugv_acceptance/console/static').iterdir())
     print(f'page, style and scripts                      {size / 1000:6.1f} kB   (bar 100)')
-    os.environ['DRIVER_RATES'] = '100 200'
+    os.environ['DRIVER_RATES'] = '200 400'
     with live_console() as robot, chromium() as browser, browser.page() as page:
         page.open(robot.url)
         page.wait('document.body.dataset.level === "OK"')

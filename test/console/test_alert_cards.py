@@ -30,8 +30,8 @@ def row(code: str, subject: str, level: int = WARN, **changes: Any) -> AlertRow:
 
 def called(code: str, subject: str, level: int = WARN, **changes: Any) -> AlertRow:
     """Return an active alert that nobody has seen."""
-    state, offers = 'active, not acknowledged', ('acknowledge',)
-    offers += ('shelve',) * (level == WARN)
+    state = 'active, not acknowledged'
+    offers = ('acknowledge', *('shelve',) * (level == WARN))
     return replace(row(code, subject, level, state=state, unseen=True, offers=offers), **changes)
 
 

@@ -26,7 +26,7 @@ from ugv_acceptance.evaluation.inputs.payload import payload_from
 from ugv_acceptance.evaluation.rough_ground import cautious_angles, cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
-from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.shortened_tracks import has_tracks
 from ugv_acceptance.model.stability import RAISED
 from ugv_acceptance.offline.evaluate import evaluate
@@ -126,7 +126,7 @@ class ShownRecording:
             alerts=alerts,
             level=max([*active, OK]),
             known=True,
-            gravity=_numbers(track.gravity[k]),
+            gravity=_vector(track.gravity[k]),
             torque=_numbers(track.torque[k]),
             angle=_numbers(track.angle[k]),
             state=int(track.state[k]),
@@ -290,6 +290,11 @@ def _payloads(
                 load = payload_from(settings.robot, float(mass), com.tolist(), frame)
                 found += [(int(when), load)] if load else []
     return np.array(sorted(times), np.int64), tuple(sorted(found, key=lambda entry: entry[0]))
+
+
+def _vector(row: np.ndarray[Any, Any]) -> Vector:
+    x, y, z = row.tolist()
+    return x, y, z
 
 
 def _numbers(row: np.ndarray[Any, Any]) -> tuple[float, ...]:
