@@ -308,9 +308,9 @@ def test_it_hears_a_real_robot(live: Live) -> None:
     live.until(lambda: process.poll() is not None or time.monotonic() > end, send)
     text, _ = process.communicate(timeout=60)
     assert process.returncode == 0, text
-    assert 'OK   joint names: all 4' in text
-    assert 'OK   imu gravity' in text
-    assert 'OK   imu orientation' in text
+    assert 'OK      joint names: all 4' in text
+    assert 'OK      imu gravity' in text
+    assert 'OK      imu orientation' in text
 
 
 @pytest.mark.parametrize(

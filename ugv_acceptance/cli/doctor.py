@@ -15,7 +15,7 @@ from ugv_acceptance.cli.terminal_output import console_of, said_of_work, say
 if TYPE_CHECKING:
     from ugv_acceptance.nodes.doctor.checks import Finding
 
-COLOURS = {'OK': 'bold green', 'WARN': 'bold yellow', 'FAIL': 'bold red'}
+COLOURS = {'OK': 'bold green', 'CAUTION': 'bold yellow', 'FAIL': 'bold red'}
 FINE, AILING = 0, 1
 _NO_ROS = (
     'no rclpy: source /opt/ros/jazzy/setup.bash, or install the wheels: '
@@ -47,8 +47,8 @@ def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[s
 def _outcome(findings: 'Sequence[Finding]') -> str:
     """Return what the checks came to, as markup: how many, and which have failed."""
     failed = [finding.about for finding in findings if finding.level == 'FAIL']
-    warned = sum(finding.level == 'WARN' for finding in findings)
-    colour = COLOURS['FAIL' if failed else 'WARN' if warned else 'OK']
+    warned = sum(finding.level == 'CAUTION' for finding in findings)
+    colour = COLOURS['FAIL' if failed else 'CAUTION' if warned else 'OK']
     named = f': {", ".join(failed)}' if failed else ''
     counts = f'{len(failed)} failed{named}; {warned} warning{"s" * (warned != 1)}'
     return f'[{colour}]{len(findings)} checks[/]: {escape(counts)}'
@@ -57,8 +57,8 @@ def _outcome(findings: 'Sequence[Finding]') -> str:
 def tell(console: Console, level: str, about: str, seen: str, do: str) -> None:
     """Print one finding."""
     advice = f' [dim]->[/] {escape(do)}' if do else ''
-    text = f'[{COLOURS[level]}]{level:<4}[/] {escape(about)}: {escape(seen)}{advice}'
-    say(console, text, 0, 5)
+    text = f'[{COLOURS[level]}]{level:<7}[/] {escape(about)}: {escape(seen)}{advice}'
+    say(console, text, 0, 8)
 
 
 __all__ = ['CONTEXT', 'doctor']

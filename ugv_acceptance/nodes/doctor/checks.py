@@ -29,7 +29,7 @@ from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
 from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings, Told
 from ugv_acceptance.nodes.monitor.own_description import difference_of
 
-OK, WARN, FAIL = 'OK', 'WARN', 'FAIL'
+OK, WARN, FAIL = 'OK', 'CAUTION', 'FAIL'
 # Difference of clocks (s) that is not reported.
 CLOCK_SLACK = 1.0
 # The slowest input (Hz) that leaves time to react, and the tilt (rad) a floor may have.
