@@ -27,8 +27,8 @@ def followed() -> dict[str, Outcome]:
 
 @pytest.fixture(scope='module')
 def ignored() -> dict[str, Outcome]:
-    """Return the outcomes of an operator who goes on as planned."""
-    return outcomes('all: ignore')
+    """Return the outcomes of an operator who goes on as planned, and answers too late on stairs."""
+    return outcomes('all: ignore\nstairs: follow-advice at 30 s')
 
 
 def test_who_follows_the_advice_passes_every_situation(followed: dict[str, Outcome]) -> None:
@@ -53,6 +53,12 @@ def test_a_wrong_answer_is_told_what_happened_and_why(ignored: dict[str, Outcome
     assert slope.happened.startswith('It tipped over to the ')
     assert 'the tilt left shrinks' in slope.lesson.lower()
     assert slope.least_deg < -10.0
+
+
+def test_an_answer_after_the_fall_comes_too_late(ignored: dict[str, Outcome]) -> None:
+    """The question stands only as long as the robot does; the record then has no answer."""
+    assert (ignored['stairs'].passed, ignored['stairs'].answers) == (False, ())
+    assert ignored['stairs'].lesson.startswith('No answer is an answer too')
 
 
 def test_the_same_seed_and_script_give_the_same_outcome(ignored: dict[str, Outcome]) -> None:

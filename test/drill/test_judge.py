@@ -77,5 +77,7 @@ def test_somebody_near_a_robot_that_is_on_is_a_fault_and_near_one_that_is_off_is
     moving = [truth(x=0.0), truth(x=0.3)]
     nobody = cast('DrillRobot', None)
     on, off = Scene(nobody, near=True), Scene(nobody, near=True, off=True)
-    assert (facts(moving, on).near_on, facts(moving, on).beside) == (True, pytest.approx(0.3))
+    beside = facts(moving, on)
+    assert beside.near_on
+    assert beside.beside == pytest.approx(0.3)
     assert not facts(moving, off).near_on

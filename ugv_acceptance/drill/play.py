@@ -129,7 +129,7 @@ class Play:
             return
         since = self.robot.time - self._asked
         self.facts.take(self.truth, self.scene, since, answered=bool(self.answers))
-        if self.phase == ASK and self.robot.time >= self._until:
+        if self.phase == ASK and (self.robot.time >= self._until or self._failed()):
             self._act((), halt=False)
             if self._halted:
                 self._until = self.robot.time + STANDS
@@ -222,11 +222,19 @@ class Play:
             self._general = True
             self._schedule(self.case.advised)
 
+    def _failed(self) -> bool:
+        """Return whether the robot tipped or gave in since the question: it is too late."""
+        return not self._fell and math.isfinite(self._failed_at())
+
+    def _failed_at(self) -> float:
+        """Return when (s after the question) it did so; infinite: it did not."""
+        ends = self.facts.tipped, self.facts.gave_in[1]
+        return min((at for at in ends if not math.isnan(at)), default=math.inf)
+
     def _is_over(self) -> bool:
         """Return whether it is over: the robot failed, time is up, or all has become well."""
-        now, ends = self.robot.time, (self.facts.tipped, self.facts.gave_in[1])
-        first = min((at for at in ends if not math.isnan(at)), default=math.inf)
-        if not self._fell and now - self._asked >= first + FALLS:
+        now = self.robot.time
+        if self._failed() and now - self._asked >= self._failed_at() + FALLS:
             return True
         if self.phase != ACTING:
             return False

@@ -77,6 +77,7 @@ def slope(robot: Robot, rng: Rng) -> Case:
         (STOP, *FOLD),
         ('ended',),
         'On a slope stop first; then bring the load back over the tracks, or set it down.',
+        patience=10.0,
     )
 
 
@@ -114,6 +115,7 @@ def load(_: Robot, rng: Rng) -> Case:
         (STOP, Act('joint_to', 1.5, 'elbow_joint', radians(-140))),
         ('ended',),
         'Bring the load closer to the joint that is at its limit, or set it down.',
+        patience=9.0,
     )
 
 
@@ -177,6 +179,7 @@ def sensor(robot: Robot, rng: Rng) -> Case:
         f'NO DATA means stop: see to the {what} first; it moves when the numbers are back.',
         check,
         sensor=(fault,),
+        patience=8.0,
     )
 
 
@@ -219,7 +222,7 @@ def braking(_: Robot, rng: Rng) -> Case:
         (STOP, *FOLD, *again),
         ('ended',),
         'Fold the arm over the tracks before you drive fast, and brake gently.',
-        patience=12.0,
+        patience=11.0,
     )
 
 
@@ -269,7 +272,7 @@ def false_alarm(robot: Robot, rng: Rng) -> Case:
         (STOP, *FOLD),
         ('ended', 'heard'),
         'Treat an alert as true until you have looked; then correct what it was told.',
-        patience=14.0,
+        patience=13.0,
     )
 
 
@@ -362,7 +365,7 @@ def on_stairs(_: Robot, rng: Rng) -> Case:
         (STOP, *back, *(Act('joint_to', 9.0, name, at) for name, at in FOLDED)),
         ('ended', 'true_ground'),
         'On stairs stop at the first warning, drive back slowly, bring the arm to the high side.',
-        patience=10.0,
+        patience=8.0,
     )
 
 
