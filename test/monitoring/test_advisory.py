@@ -15,7 +15,7 @@ from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
-from ugv_acceptance.evaluation.alerts.alarms import State
+from ugv_acceptance.evaluation.alerts.alarms import Change, State
 from ugv_acceptance.evaluation.alerts.messages import ALERTS, suspect_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
 from ugv_acceptance.evaluation.settings import Settings
@@ -113,6 +113,24 @@ def test_the_verdict_tells_the_margin_of_now() -> None:
         said.append(verdict_of(session).message.split(' (and ')[0])
     assert said[0] == said[1]
     assert raised(session, 'TIP_OVER', level=ERROR)[0].peak > math.radians(9.0)
+
+
+def test_the_worst_value_comes_with_its_own_time() -> None:
+    """In the verdict and in the alert list: when it was worst, which was before it got better."""
+    session = session_with()
+    for q in (STRETCHED, NEARER):
+        wait_until(lambda q=q: _tells(session, q), lambda q=q: give(session, q))
+    verdict = verdict_of(session)
+    alert = raised(session, 'TIP_OVER', level=ERROR)[0]
+    change = Change(session.clock.now(), alert, 'raised', State.ACTIVE_UNACKNOWLEDGED)
+    told = alert_status(change, session).values
+    margins = session.evaluator.margins
+    assert margins is not None
+    assert alert.worst_at is not None
+    assert alert.worst_at < margins.time
+    assert told['worst_ns'] == alert.worst_at
+    if verdict.values['code'] == 'TIP_OVER':
+        assert verdict.values['peak'] == alert.peak
 
 
 def _tells(session: Session, q: tuple[float, ...]) -> bool:
