@@ -128,6 +128,17 @@ def test_every_screen_fits_a_small_terminal_without_colour(
     assert '[OK] PASSED' in shown[JUDGED]
 
 
+def test_a_long_cause_leaves_the_answers_on_the_screen(frames: dict[str, dict[str, Any]]) -> None:
+    """A cause of many lines is cut, with dots; every answer can still be read."""
+    frame = frames[ASK]
+    long = {**frame, 'headline': {**frame['headline'], 'cause': 'a joint is missing; ' * 40}}
+    lines = screen(long)
+    assert len(lines) < HEIGHT
+    assert any(line.endswith(' ...') for line in lines)
+    last = len(frame['drill']['choices'])
+    assert any(line.startswith(f'  {last} ') for line in lines)
+
+
 def test_colour_adds_nothing_but_colour(frames: dict[str, dict[str, Any]]) -> None:
     """Only the line with the word is coloured."""
     lines = screen(frames[ASK])

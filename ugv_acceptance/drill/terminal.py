@@ -19,6 +19,8 @@ from ugv_acceptance.monitoring.drawing import figure_of
 
 # Columns, lines, and seconds between two drawings.
 WIDTH, HEIGHT, PERIOD = 80, 24, 0.1
+# Lines that one part of the headline may take.
+MOST = 2
 # Level -> sign and colour (SGR): the sign says the same without colour.
 LOOKS = {
     'OK': ('(OK)', '32'),
@@ -66,7 +68,7 @@ def screen(frame: dict[str, Any], said: str = '') -> list[str]:
     top = [_title(drill), '', *_headline(frame), *_margins(frame), '-' * WIDTH]
     story = [*_wrap(drill['story']), ''] if drill['phase'] == WATCH else []
     body = [*story, *_asked(drill)]
-    return [line[:WIDTH] for line in [*top, *body, said][:HEIGHT]]
+    return [line[:WIDTH] for line in [*top, *body, said][: HEIGHT - 1]]
 
 
 def _title(drill: dict[str, Any]) -> str:
@@ -78,12 +80,14 @@ def _title(drill: dict[str, Any]) -> str:
 def _headline(frame: dict[str, Any]) -> list[str]:
     """Return the word with what and how much, action, time, cause, what was known last."""
     head, (sign, _) = frame['headline'], LOOKS[frame['level']]
-    what = '  '.join(part for part in (head['what'], head['number']) if part)
+    said = '' if head['what'] == frame['word'] else head['what']
+    what = '  '.join(part for part in (said, head['number']) if part)
     action = '  '.join(part for part in (head['action'], head['detail']) if part)
     seconds = f'{frame["seconds"]:.1f} s to {frame["seconds_to"]}' if frame['seconds_to'] else ''
     lines = [f'{sign} {frame["word"]}   {what}']
     for text in (action, seconds, head['cause'], *head['notes'][:1]):
-        lines += _wrap(text, '    ') if text else ['']
+        # What an integrator needs must not push the answers off the screen.
+        lines += _wrap(text, '    ', MOST)
     return lines
 
 
@@ -122,10 +126,18 @@ def _asked(drill: dict[str, Any]) -> list[str]:
     ]
 
 
-def _wrap(text: str, first: str = '') -> list[str]:
-    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=' ' * len(first)) or [
-        ''
-    ]
+def _wrap(text: str, first: str = '', most: int | None = None) -> list[str]:
+    """Return text in lines, at least one and at most so many, the first after `first`."""
+    indent = ' ' * len(first)
+    lines = textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=first,
+        subsequent_indent=indent,
+        max_lines=most,
+        placeholder=' ...',
+    )
+    return lines or ['']
 
 
 def coloured(lines: Sequence[str], level: str) -> list[str]:
