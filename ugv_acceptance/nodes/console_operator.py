@@ -23,8 +23,9 @@ from ugv_acceptance.nodes.monitor.operator_desk import HAND, load_message
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.nodes.operator_client import Answer, Command, OperatorClient
 
-# Seconds in which the monitor answers a command; the page stands still until it does.
-ANSWER_WITHIN = 1.0
+# Seconds for the monitor to answer a command; less than the silence after which a page says NO DATA,
+# for it stands still meanwhile.
+ANSWER_WITHIN = 0.35
 # Seconds after which the verdict's payload is newer than one that was told.
 SETTLED = 1.5
 
