@@ -47,7 +47,6 @@ def slope(robot: Robot, rng: Rng) -> Case:
     while left(90.0) > radians(-7.0):
         tilt += radians(1.0)
     start = next(a for a in range(90, -91, -5) if left(a) > radians(12.0) or a == -90)
-    swing = Act('joint_to', 1.5, 'turret_joint', low, rate=0.06)
     wrong = (
         Choice(
             'faster',
@@ -71,7 +70,7 @@ def slope(robot: Robot, rng: Rng) -> Case:
         ' load over.',
         'The alert is there and the arm still moves. What do you do?',
         Setup(posture(shoulder, elbow, sign * start), (tilt, low), load),
-        (swing,),
+        (Act('joint_to', 1.5, 'turret_joint', low, rate=0.06),),
         Trouble(frozenset({'TIP_OVER'})),
         (ADVISED, *wrong, _going_on('the tilt left shrinks as long as the arm moves downhill')[0]),
         (STOP, *FOLD),

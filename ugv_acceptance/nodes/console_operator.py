@@ -23,8 +23,8 @@ from ugv_acceptance.nodes.monitor.operator_desk import HAND, load_message
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.nodes.operator_client import Answer, Command, OperatorClient
 
-# Seconds for the monitor to answer a command; less than the silence after which a page says NO DATA,
-# for it stands still meanwhile.
+# Seconds for the monitor to answer a command; a page stands still meanwhile, and says NO DATA after
+# 0.45 s of that.
 ANSWER_WITHIN = 0.35
 # Seconds after which the verdict's payload is newer than one that was told.
 SETTLED = 1.5
