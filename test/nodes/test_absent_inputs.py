@@ -100,7 +100,8 @@ def test_the_console_shows_what_is_known(
     finally:
         console.close()
     frame = frames[-1]
-    assert 'checked' in frame['headline']['cause']
+    head = frame['headline']
+    assert 'checked' in f'{head["what"]} {head["cause"]}'.lower()
     assert absent not in [row['name'] for row in frame['inputs']]
     known = [row['left_deg'] is not None for row in frame['tilt']]
     assert any(known) == (absent != 'imu')
