@@ -1,7 +1,8 @@
 """A margin in the few words that every surface for people says: page, terminal, log, report, card.
 
-Numbers are cut towards less margin, never rounded, so that none reads as a limit which it has not
-reached: 99.6 % of a limit is "99 %" and never "100 %"; 9.96 deg to tipping is "9.9 deg".
+Numbers are cut downwards, never rounded, so that none reads as a limit which it has not reached:
+99.6 % of a limit is "99 %" and never "100 %"; 9.96 deg to tipping is "9.9 deg". Only far past
+tipping, where no limit is, the nearest whole degree is said.
 """
 
 import math
@@ -19,14 +20,21 @@ def degrees_words(angle: float) -> str:
     degrees = math.degrees(angle)
     if not math.isfinite(degrees):
         return '-'
-    if abs(degrees) >= _FINE:
+    if degrees <= -_FINE:
+        return f'{round(degrees)} deg'
+    if degrees >= _FINE:
         return f'{math.floor(degrees + _SLACK)} deg'
     return f'{math.floor(10.0 * degrees + _SLACK) / 10.0:g} deg'
 
 
 def excess_words(angle: float) -> str:
     """Return by how much (rad) something is too far, cut towards more: 3.41 deg is "3.5 deg"."""
-    return degrees_words(-angle).removeprefix('-') or '-'
+    degrees = math.degrees(angle)
+    if not math.isfinite(degrees):
+        return '-'
+    if abs(degrees) >= _FINE:
+        return f'{math.ceil(degrees - _SLACK)} deg'
+    return f'{math.ceil(10.0 * degrees - _SLACK) / 10.0:g} deg'
 
 
 def tenths_words(angle: float) -> str:
@@ -38,7 +46,7 @@ def tenths_words(angle: float) -> str:
 def tipping_words(side: str, angle: float) -> str:
     """Return the tilt left (rad): "6 deg to tipping: RIGHT", or "1.4 deg past tipping: RIGHT"."""
     if angle < 0.0:
-        return f'{excess_words(-angle)} past tipping: {side.upper()}'
+        return f'{degrees_words(angle).removeprefix("-")} past tipping: {side.upper()}'
     return f'{degrees_words(angle)} to tipping: {side.upper()}'
 
 
