@@ -53,6 +53,14 @@ def test_one_tip_event_is_one_card() -> None:
     assert card['parts'] == [f'{code} is' for code in sorted(codes[:4])]
 
 
+@pytest.mark.parametrize(('peak', 'told'), [(-0.02, ['TIP_AHEAD is']), (0.02, [])])
+def test_what_has_come_is_no_longer_foretold(peak: float, told: list[str]) -> None:
+    """A robot past its edge is not said to tip within a second; one before it is."""
+    over = row('TIP_OVER', 'left', ERROR, peak=peak)
+    (card,) = cards(over, row('TIP_AHEAD', 'left'))
+    assert card['parts'] == told
+
+
 def test_two_sides_are_two_cards() -> None:
     """Sides are never merged, whatever they share."""
     rows = [row(code, side) for side in SIDES for code in ('TIP_OVER', 'TIP_MOVING')]

@@ -13,7 +13,7 @@ from typing import Any
 from ugv_acceptance.console.snapshot import AlertRow, Snapshot
 from ugv_acceptance.evaluation.alerts.messages import level_words
 from ugv_acceptance.evaluation.alerts.rules import urgency
-from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, WARN
+from ugv_acceptance.evaluation.alerts.state_machine import ERROR, LEVELS, WARN
 from ugv_acceptance.evaluation.margin_words import degrees_words, share_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
@@ -68,6 +68,8 @@ CAUSES = {
     'SECOND_PUBLISHER': PUBLISHERS,
     'FOREIGN_PUBLISHER': PUBLISHERS,
 }
+# The alert that foretells another.
+_FORETOLD = {'TIP_OVER': 'TIP_AHEAD', 'TORQUE_LIMIT': 'TORQUE_AHEAD'}
 # The commands a card may offer, in this order.
 OFFERS = ('acknowledge', 'shelve', 'unshelve', 'reset')
 
@@ -182,14 +184,23 @@ def offers_of(rows: Sequence[AlertRow]) -> list[str]:
 
 
 def parts_of(rows: Sequence[AlertRow]) -> list[str]:
-    """Return the texts of a card's other alerts, without a caution under its own danger."""
+    """Return the texts of a card's other alerts, without a caution under its own danger.
+
+    What was foretold is no news once it has come.
+    """
     first, *others = rows
     told, texts = {(first.code, first.subject)}, []
+    come = {_FORETOLD.get(row.code) for row in rows if _reached(row)}
     for row in others:
-        if (row.code, row.subject) not in told:
+        if row.code not in come and (row.code, row.subject) not in told:
             told.add((row.code, row.subject))
             texts.append(row.text)
     return texts
+
+
+def _reached(row: AlertRow) -> bool:
+    """Return whether an alert says that the edge, or a motor's limit, is not ahead but passed."""
+    return row.level == ERROR and (row.code != 'TIP_OVER' or row.peak > 0.0)
 
 
 def worst_words(rows: Sequence[AlertRow], snapshot: Snapshot, settings: Settings) -> str:
