@@ -227,6 +227,9 @@ def test_a_declared_payload_reaches_the_monitor(shown: Page, robot: Live) -> Non
 def test_the_ground_is_told_from_the_page(shown: Page) -> None:
     """Stairs chosen in the page are what the monitor takes the ground for, until flat is chosen."""
     assert shown.text('#assumed').startswith('Assumed: ground taken as flat')
+    # What somebody else tells the monitor is chosen here as well.
+    shown.run('console_page.socket.send(\'{"do": "ground", "kind": "uneven"}\')')
+    shown.wait('document.getElementById("ground-kind").value === "uneven"')
     shown.click('#tell summary')
     for kind, rough in (('stairs', True), ('flat', False)):
         shown.run(f'document.getElementById("ground-kind").value = "{kind}"')

@@ -97,6 +97,7 @@ function draw() {
   if (silent) return;
   page.fresh = false;
   showStatus(frame);
+  tell.show(frame);
   showInputs(frame);
   showLoad(frame, hello);
   playback.show(frame);

@@ -23,4 +23,11 @@ export class Tell {
     $('tell').hidden = hello.source !== 'live'; // a recording cannot be told anything
     $('load-form').hidden = !hello.payload_link;
   }
+
+  // The choice is the ground in force, whoever told it, until somebody chooses another.
+  show(frame) {
+    const kind = frame.ground.words.split(' ')[0];
+    if (kind === this.kind || !KINDS.includes(kind)) return;
+    this.kind = $('ground-kind').value = kind;
+  }
 }
