@@ -65,8 +65,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/inputs/joints.py', 'JointMerger.layout',
      '64 -> 65'): "a cache's size changes no value",
     ('evaluation/inputs/joint_rows.py', '', '1 -> 2'): 'no time is below 0',
-    ('evaluation/advice/search.py', 'joint_words',
-     'amount * upright -> amount / upright'): 'only the sign counts',
     ('evaluation/recorded.py', 'RecordedEvaluator._table', '0.0 -> 1.0'):
         'what stands in for a posture that is not whole is not read',
     ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', 'never < 0 -> never <= 0'):

@@ -34,7 +34,8 @@ def test_an_effort_at_the_limit_is_a_failure(effort: float, tmp_path: Path) -> N
     result = evaluate(tmp_path / 'run').result
     (failure,) = from_result('run', result)
     assert (failure.alert, failure.path) == ('EFFORT_LIMIT', 'physical / effector')
-    assert f'shoulder_joint is {abs(effort):.1f} N m; its limit is 50.0 N m' in failure.what
+    assert f'{2.0 * abs(effort):.0f} % of its limit at 1.60 s' in failure.what
+    assert f'{abs(effort):.1f} of 50.0 N m' in failure.what
     assert failure.at_s == pytest.approx(1.7, abs=0.1)
 
 
@@ -62,7 +63,7 @@ def test_a_failed_campaign_says_the_effort(tmp_path: Path) -> None:
     found = said(tmp_path / 'out')
     assert found['failures']['class'] == {'physical / effector': 1}
     assert found['mtbf_h']['value'] == pytest.approx(3.98 / 3600.0, rel=0.01)
-    assert 'its limit is 50.0 N m' in (tmp_path / 'out' / 'campaign.html').read_text()
+    assert '70.0 of 50.0 N m' in (tmp_path / 'out' / 'campaign.html').read_text()
 
 
 def failing(name: str, **values: Any) -> dict[str, Any]:

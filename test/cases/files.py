@@ -160,7 +160,7 @@ def _plain(folder: Path) -> Path:
 
 ADVICE = Expected(
     (FAIL,),
-    ('past the tipping point to the front', '(raise|lower|fold) the (elbow|shoulder|arm)'),
+    ('past tipping: FRONT', '(raise|lower|fold) the (elbow|shoulder|arm)'),
     ('(elbow|shoulder)[^;:]*to the (left|right)',),
 )
 SAYS_WHICH = ('/r1/joint_states', '/r2/joint_states')

@@ -81,7 +81,7 @@ IMU_CASES: dict[str, tuple[Made, Expected]] = {
     'imu_disagree_then_fail': (_imu_disagree, Expected(UNKNOWN, ('disagree',))),
     'imu_dropout': (
         _imu_dropout,
-        Expected(UNKNOWN, (r'no message from imu|imu.*stale|stale.*imu', r'7[01]\.\d%|3\.\d+ s')),
+        Expected(UNKNOWN, (r'no message from imu|imu.*stale|stale.*imu', r'7[01]\.\d %|3\.\d+ s')),
     ),
     'imu_frame_slash': (lambda: _imu(frame='/imu_link'), OK),
     'imu_in_g': (

@@ -46,7 +46,7 @@ ANGLES: list[tuple[str, tuple[str, ...], str, str]] = [
 ]
 IDS = [f'{verb}-{option.strip("-")}-{text}' for verb, _, option, text in ANGLES]
 # A file, with a test of its own; and a word: real or not-real.
-NO_ANGLE = {('risk', '--mission'), ('init', '--tilt')}
+NO_ANGLE = {('risk', '--mission'), ('init', '--tilt'), ('drill', '--seed')}
 # Options of which some part is an angle, by what their help says.
 TOLD = re.compile(r'\bangle|\btilt|slope|deg\b|degree|radian', re.IGNORECASE)
 

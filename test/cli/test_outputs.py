@@ -45,13 +45,14 @@ FILES = {
     ('map', '--out'): '.svg',
     ('init', '--out'): '.yaml',
     ('init', '--picture'): '.png',
+    ('drill', '--out'): '.json',
 }
 MAPS = ('.svg', '.png', '.csv', '.npz')
 FOLDERS = {('campaign', '--out'), ('paper', '--out'), ('simulate', '--bag'), ('run', '--out')}
 # Paths that verbs read; whatever else is a path is written, and stands in one of the tables above.
 READ = {
     'config', 'urdf', 'bag', 'bags', 'criteria', 'result_file', 'failures', 'mission', 'existing',
-    'from_bag', 'plan', 'sources', 'meshes', 'check',
+    'from_bag', 'plan', 'sources', 'meshes', 'check', 'drill', 'script',
 }  # fmt: skip
 # Parameters that are called otherwise than their options.
 NAMES = {'json_file': '--json', 'csv_file': '--csv', 'init_criteria': '--init-criteria'}
@@ -102,6 +103,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / 'site.yaml').write_text(SITE)
     (tmp_path / 'who.yaml').write_text('operator: A. Smith\n')
     shutil.copy(REPOSITORY / 'bags' / 'packbot_short_plan.yaml', tmp_path / 'mine.yaml')
+    (tmp_path / 'answers.txt').write_text('all: ignore\n')
     (tmp_path / 'failures.yaml').write_text('failures: []\n')
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -131,6 +133,7 @@ GIVEN: dict[str, tuple[list[str], dict[str, str]]] = {
         ['packbot.urdf', 'run'],
         {'the description': 'packbot.urdf', 'the recording': 'run/packbot_pass_0.mcap'},
     ),
+    'drill': (['--script', 'answers.txt'], {'the script': 'answers.txt'}),
     'map': (
         ['torque', '--steps', '11', '-c', 'robot.yaml', '--from-bag', 'flat/alone.mcap'],
         {
@@ -278,7 +281,6 @@ WRONG = {
     ('evaluate', '--csv'): [
         ('m.parquet', 'expected .csv; for Parquet use --parquet'),
         ('m', 'expected .csv'),
-        ('-', 'expected .csv'),
     ],
     ('evaluate', '--parquet'): [('m.csv', 'expected .parquet; for CSV use --csv')],
     ('evaluate', '--junit'): [('m.json', 'expected .xml; for JSON use --json')],
@@ -289,6 +291,7 @@ WRONG = {
     ('plan', '-o'): [('m.json', 'expected .yaml or .yml')],
     ('map', '--out'): [('m.gif', 'expected .svg, .png, .csv or .npz')],
     ('init', '--out'): [('m.png', 'expected .yaml or .yml; for pictures use --picture')],
+    ('drill', '--out'): [('m.xml', 'expected .json')],
     ('init', '--picture'): [('m.yaml', 'expected .png, .html or .htm; for YAML use --out')],
 }
 

@@ -104,7 +104,7 @@ def test_a_record_changed_afterwards_is_found_by_verify(trained: Path, tmp_path:
     ada = edited(Path(shutil.copy(trained / 'ada.json', tmp_path)))
     done = run(verify.verify, trained / 'r.json', '--drill', ada, '--drill', trained / 'bob.json')
     assert done.exit_code == 1
-    first = next(line for line in done.output.splitlines() if line.startswith('  '))
+    first = next(line for line in done.output.splitlines() if 'operator_training' in line)
     assert first.startswith('  operator_training.records.0.file_sha256')
 
 

@@ -129,7 +129,7 @@ def test_every_output_copes_with_an_absent_input(
     options = ('--report', '--json', '--csv', '--annotate')
     files = [x for o, path in zip(options, out.values(), strict=True) for x in (o, str(path))]
     robot = str(packbot(tmp_path, repository, absent))
-    code, said = command('evaluate', str(run), '-c', robot, *files)
+    code, said = command('evaluate', str(run), '-c', robot, '-v', *files)
     assert code in {0, 1}, said
     schema = json.loads((repository / 'schema' / 'result.schema.json').read_text('utf-8'))
     jsonschema.Draft202012Validator(schema).validate(json.loads(out['json'].read_text('utf-8')))
