@@ -157,6 +157,10 @@ def test_who_has_fallen_is_left_alone(shown: Page) -> None:
     )
     assert all('do not move the arm' in line for line in advice if line)
     assert len(advice) > 1
+    over = 'getComputedStyle(document.getElementById("safe-map"), "::after").content'
+    assert shown.run(over) == '"DO NOT MOVE THE ARM"'
+    seek(shown, DANGER)
+    shown.wait(f'{over} === "none"')
 
 
 def test_a_recording_is_not_spoken_to(shown: Page) -> None:

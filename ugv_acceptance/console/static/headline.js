@@ -14,6 +14,8 @@ let spoken = '';
 export function showHeadline(shown) {
   const level = shown.level, line = { ...NOTHING, ...shown.headline };
   document.body.dataset.level = level;
+  // The map of where the arm may go is of a robot that stands.
+  document.body.toggleAttribute('data-fallen', line.action === 'STAND CLEAR');
   sign(level);
   text($('word'), shown.word);
   const what = line.what === shown.word ? '' : line.what;
