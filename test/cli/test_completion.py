@@ -105,3 +105,17 @@ def test_a_tab_imports_nothing_heavy() -> None:
     offered, *others = done.stdout.split()
     assert offered == 'level', done.stderr
     assert not {'numpy', 'mujoco', 'rclpy'} & set(others)
+
+
+def test_a_start_reads_no_configuration() -> None:
+    """Every start and every TAB pays for what the verbs import: half a second with pydantic."""
+    code = (
+        'import sys\nfrom ugv_acceptance.cli import main\n'
+        'sys.argv = ["ugv-acceptance", "--version"]\ntry: main()\nfinally: print(*sys.modules)'
+    )
+    known = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    done = subprocess.run(
+        [sys.executable, '-c', code], env=known, capture_output=True, text=True, check=False
+    )
+    assert 'ugv_acceptance.cli' in done.stdout.split(), done.stderr
+    assert not {'pydantic', 'rclpy', 'textual'} & set(done.stdout.split())

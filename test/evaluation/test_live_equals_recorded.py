@@ -38,10 +38,20 @@ from ugv_acceptance.model.robot import Joint, Link, Vector
 LIVE_INPUTS = ('auto', 'orientation', 'accelerometer')
 
 
-def facts(alerts: list[Alert]) -> Counter[tuple[Any, ...]]:
-    """Return what an alert says, as something to compare without its order."""
+def facts(alerts: list[Alert], *, balanced: bool = False) -> Counter[tuple[Any, ...]]:
+    """Return what an alert says, as something to compare without its order.
+
+    Of a robot `balanced` on its back nobody knows by how much it is past an edge, or when.
+    """
     return Counter(
-        (*key_of(a.rule), a.start, a.end, f'{a.peak:.9g}', a.worst_at, a.detail) for a in alerts
+        (
+            *key_of(a.rule),
+            a.start,
+            a.end,
+            *(() if balanced and a.rule.code == 'TIP_OVER' else (f'{a.peak:.9g}', a.worst_at)),
+            a.detail,
+        )
+        for a in alerts
     )
 
 
@@ -53,7 +63,7 @@ def compare(
     seen, alerts = live(told, messages, end, ticks)
     rows, evaluator = recorded(told, split(messages, cuts), end)
     of_rows = {int(t): (part, k) for part in rows for k, t in enumerate(part.time)}
-    events = 0
+    events, balanced = 0, False
     for message, margins in seen:
         if message.time not in of_rows:
             continue
@@ -69,13 +79,15 @@ def compare(
             # On its back, right above an edge: past it by half a turn or not at all, as one rounds.
             if margins.gravity[2] < 0.0 or moment != 0.0:
                 one, many = [*one, angle], [*many, np.array([other])]
+            else:
+                balanced = True
         # The ZMP runs away to infinity as gravity turns parallel to the ground.
         if margins.gravity[2] < -1.0:
             one, many = [*one, s.zmp], [*many, part.zmp[k : k + 1]]
         np.testing.assert_allclose(np.array(one), np.concatenate(many), rtol=1e-12, atol=1e-12)
         assert (margins.stamp, s.state) == (part.stamp[k], part.state[k])
     assert events == len(of_rows)
-    assert facts(alerts) == facts(evaluator.watch.log)
+    assert facts(alerts, balanced=balanced) == facts(evaluator.watch.log, balanced=balanced)
 
 
 @hypothesis.settings(max_examples=200)

@@ -6,14 +6,14 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from robots import paper_arm
 
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.advice.tipped import has_tipped
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.stability import margins
+from ugv_acceptance.model.stability import STANDING, margins
 from ugv_acceptance.report.side_view import Standing, side_view, view_words
 from ugv_acceptance.simulation.vehicle import gravity_on_slope
 
@@ -56,10 +56,15 @@ def ground_of(view: ET.Element) -> tuple[float, float]:
 def test_the_plumb_line_falls_inside_the_edge_while_the_tilt_is_positive(
     q: tuple[float, ...], slope: float, heading: float, mass: float
 ) -> None:
-    """Vertical, down to the ground line; beyond the triangle of an edge it has tipped over."""
+    """Vertical, down to the ground line; beyond the triangle of an edge it has tipped over.
+
+    On its tracks: raised on its flippers, what it may rock to counts as well and is not drawn.
+    """
     down = gravity_on_slope(9.81, slope, heading)
     at = Standing(q, tuple(down.tolist()), Payload(mass))
-    angle = margins(PACKBOT.robot, [q], [down], at.payload).angle[0]
+    now = margins(PACKBOT.robot, [q], [down], at.payload)
+    assume(int(now.state[0]) == STANDING)
+    angle = now.angle[0]
     drawn = views(side_view(at, PACKBOT, 'one'))
     for view, (left, right) in zip(drawn, ((2, 0), (1, 3)), strict=True):
         plumb = next(e for e in view.iter(f'{SVG}path') if e.get('class') == 'plumb')
@@ -67,6 +72,8 @@ def test_the_plumb_line_falls_inside_the_edge_while_the_tilt_is_positive(
         edge = next(e for e in view.iter(f'{SVG}polygon') if e.get('class') == 'edge')
         tip = numbers(edge, 'points')[0]
         feet = next(e for e in view.iter(f'{SVG}line') if e.get('stroke') == '#0047b3')
+        # Beside a corner of the support the section is a point, with no inside.
+        assume(float(feet.get('x2', 'nan')) - float(feet.get('x1', 'nan')) > 1.0)
         k = right if abs(tip - float(feet.get('x2', 'nan'))) < 0.11 else left
         assert angle[k] == pytest.approx(min(angle[left], angle[right]))
         assert (x0, y0 < y1) == (x1, True)

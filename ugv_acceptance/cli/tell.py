@@ -6,7 +6,6 @@ import typer
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.cli.options import CONTEXT
-from ugv_acceptance.config import quantity
 from ugv_acceptance.evaluation.alerts.messages import ALERTS
 from ugv_acceptance.evaluation.ground import KINDS
 
@@ -117,6 +116,8 @@ def values_of(what: str, words: list[str], length: str = '', at: str = '') -> di
     if not least <= len(words) <= most:
         raise BadConfig(f'tell {what}: expected {names}, got {" ".join(words) or "nothing"}')
     if what == 'payload':
+        from ugv_acceptance.config import quantity
+
         found = {'mass_kg': repr(quantity(words[0], 'mass', 'tell payload'))}
         from ugv_acceptance.console.typed import place_from
 
@@ -134,6 +135,8 @@ def values_of(what: str, words: list[str], length: str = '', at: str = '') -> di
 
 def seconds_of(text: str) -> float:
     """Return a time of a command line in s: 5min, 90s. Raises BadConfig where it is none."""
+    from ugv_acceptance.config import quantity
+
     number = text.strip().removesuffix('min')
     if number == text.strip():
         return quantity(text, 'time', '--for')

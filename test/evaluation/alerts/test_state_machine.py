@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import hypothesis
@@ -232,6 +233,19 @@ def test_runs_are_the_stretches_on_one_side(
 def test_the_first_value_of_a_part_may_be_the_worst() -> None:
     """The peak of an alert from the part before may be the first value of the next part."""
     assert fed(rule(0, 0), [1, 2, 3], [2.0, 9.0, 3.0], 5, [1]) == [(1, None, 9.0, 2)]
+
+
+@pytest.mark.parametrize('way', [stepped, fed])
+@pytest.mark.parametrize('size', [1.0, 50.0, 1e6])
+@pytest.mark.parametrize('error', [-1.0, 0.0, 1.0])
+def test_rounding_does_not_move_the_worst(
+    way: Callable[..., Found], size: float, error: float
+) -> None:
+    """Of values that differ in their last bits, as live and columns do, the first is the worst."""
+    told = rule(100, 100)
+    values = [0.5 * size, size, size * (1.0 + error * 1e-15), 0.0]
+    ((_, _, _, worst),) = way(replace(told, on=0.1, off=0.05), [0, 50, 200, 300], values, 1000)
+    assert worst == 50
 
 
 @pytest.mark.parametrize('way', [stepped, fed])

@@ -4,6 +4,7 @@ The machine has no clock. An alert that becomes due between two samples is dated
 due, so the same data give the same alerts whether they come one at a time or in columns.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 OK, WARN, ERROR, STALE = range(4)
+# Values this close, of 1 and of themselves, are one: what is computed one by one and in columns
+# differs in the last bits, and the first of equal values is when the worst came.
+_SAME = 1e-9
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 
@@ -58,9 +62,9 @@ class Signal:
 
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
     when the state changes unless the value does first. `peak` is the worst value since it was good,
-    `peak_at` (ns) when that came first. While `quiet`, only a value of `on` or more
-    can change anything, so callers may skip smaller ones. `detail` is what an alert raised next
-    says in words: set it before a value that is bad while `raw` is not.
+    `peak_at` (ns) when that came first, but for rounding. While `quiet`, only a value of `on` or
+    more can change anything, so callers may skip smaller ones. `detail` is what an alert raised
+    next says in words: set it before a value that is bad while `raw` is not.
     """
 
     rule: Rule
@@ -73,6 +77,7 @@ class Signal:
     quiet: bool = True
     detail: str = ''
     on: float = field(init=False)
+    _dated: float = field(default=-np.inf)
 
     def __post_init__(self) -> None:
         self.on = self.rule.on
@@ -107,7 +112,7 @@ class Signal:
             self.raw = True
             if self.alert is None:
                 self.due = now + self.rule.on_delay
-                self.peak, self.peak_at = peak, at
+                self.peak, self.peak_at, self._dated = peak, at, peak
             else:
                 self.due = None
         if peak > self.peak:
@@ -136,9 +141,12 @@ class Signal:
         self.quiet = not self.raw and self.alert is None and self.due is None
 
     def _rise(self, peak: float, at: int) -> None:
-        self.peak, self.peak_at = peak, at
+        self.peak = peak
+        # Of infinities the difference is NaN, which is no small one.
+        if not abs(peak - self._dated) <= _SAME * (1.0 + abs(peak)):
+            self.peak_at, self._dated = at, peak
         if self.alert is not None:
-            self.alert.peak, self.alert.worst_at = peak, at
+            self.alert.peak, self.alert.worst_at = peak, self.peak_at
 
 
 def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, int, bool]]:
@@ -184,6 +192,7 @@ def feed(
 
 
 def _worst(times: NDArray[np.int64], values: NDArray[Any]) -> tuple[float, int]:
-    """Return the largest value (NaN only if all are) and when it first came (ns)."""
+    """Return the largest value (NaN: all are) and when it came first (ns), but for rounding."""
     worst = float(np.fmax.reduce(values))
-    return worst, int(times[np.argmax(values == worst)])
+    near = worst - _SAME * (1.0 + abs(worst)) if math.isfinite(worst) else worst
+    return worst, int(times[np.argmax(values >= near)])
