@@ -144,3 +144,21 @@ def test_colour_adds_nothing_but_colour(frames: dict[str, dict[str, Any]]) -> No
     lines = screen(frames[ASK])
     differ = [k for k, line in enumerate(coloured(lines, 'ERROR')) if line != lines[k]]
     assert differ == [2]
+
+
+def test_the_answer_offered_is_the_advice_shown() -> None:
+    """While the arm goes on moving the advice changes: header and answer change as one."""
+    wall = Wall()
+    shown = Shown(wall, DrillFeed(Course(load('packbot'), 7, ('slope',)), wall.now))
+    frame, told = shown.until(ASK), set()
+    while frame['drill']['phase'] == ASK:
+        (offered,) = (c['words'] for c in frame['drill']['choices'] if c['key'] == 'advice')
+        line = frame['headline']
+        # General advice is for what is not computed, such as a robot that has all but tipped.
+        if ':' in line['detail']:
+            said = f'{line["action"]} {line["detail"]}'.partition(':')[0]
+            # The header says the same words in another order.
+            assert sorted(offered.lower().split()) == sorted(said.lower().split())
+            told.add(offered)
+        frame = shown.frame()
+    assert len(told) > 1

@@ -128,6 +128,8 @@ class Play:
             self._wait_for_trouble()
             return
         since = self.robot.time - self._asked
+        if self.phase == ASK:
+            self._renew()
         self.facts.take(self.truth, self.scene, since, answered=bool(self.answers))
         if self.phase == ASK and (self.robot.time >= self._until or self._failed()):
             self._act((), halt=False)
@@ -161,6 +163,15 @@ class Play:
         offered = [replace(c, words=told) if c.key == ADVICE else c for c in self.case.choices]
         order = self._rng.permutation(len(offered))
         self.choices = (*(offered[k] for k in order), *FREE)
+
+    def _renew(self) -> None:
+        """Offer what the monitor advises now: header and answers never differ."""
+        newest = self._computed()
+        if self._advice is None or newest is None or newest == self._advice:
+            return
+        self._advice = newest
+        told = self._words()
+        self.choices = tuple(replace(c, words=told) if c.key == ADVICE else c for c in self.choices)
 
     def _words(self) -> str:
         """Return what the monitor says is to be done now, as an answer."""
@@ -203,12 +214,8 @@ class Play:
         self.phase, self._until = ACTING, self.robot.time + self.case.watched
 
     def _advised(self) -> tuple[Act, ...]:
-        """Return what following the monitor means now: its newest advice of the kind shown."""
-        if self._advice is None:
-            return self.case.advised
-        newest = self._computed()
-        same = newest is not None and newest.subject == self._advice.subject
-        return acts_of(newest if newest is not None and same else self._advice)
+        """Return what following the monitor means now: the advice that is shown."""
+        return self.case.advised if self._advice is None else acts_of(self._advice)
 
     def _follow(self) -> None:
         """Go on as the monitor advises: by computed advice, and where none is left, by general."""
