@@ -27,7 +27,7 @@ print((seen.urdf, seen.transforms, seen.joint_states, seen.joints, seen.imus, se
 
 def rounded(text: str) -> str:
     """A text with its numbers to six digits: means of other numbers of messages."""
-    return re.sub(r'\d+\.\d{7,}', lambda found: f'{float(found[0]):.6f}', text)
+    return re.sub(r'\d+\.\d+', lambda found: f'{float(found[0]):.6f}', text)
 
 
 class Robot(Node):
