@@ -127,10 +127,11 @@ def test_a_record_is_never_overwritten_by_the_result(tmp_path: Path) -> None:
 
 
 LATER, OLD = '2025-06-02T09:00:01Z', '2024-05-01T09:00:00Z'
-SAYS = {
+SAYS: dict[str, tuple[dict[str, Any], tuple[Any, ...], str]] = {
     'old': ({'started': OLD}, ALL, 'old: the drill was 397 days before the run'),
     'after': ({'started': LATER}, ALL, 'the drill was after the run'),
     'person': ({'operator': 'Bob'}, ALL, 'of another person: the operator entered for this run is'),
+    'script': ({'scripted': True}, ALL, 'answered by a script, not by a person'),
     'failed': ({}, ONE_FAILED, ''),
     'part': ({}, ALL[:2], ''),
 }
@@ -138,7 +139,7 @@ SAYS = {
 
 @pytest.mark.parametrize('name', SAYS)
 def test_a_record_that_says_nothing_of_this_run_does_not_count(name: str, tmp_path: Path) -> None:
-    """Old, later than the run, somebody else's, not passed or not whole: said, and not counted.
+    """Old, later than the run, somebody else's, a script's, not passed or whole: said, not counted.
 
     The verdict stays: no criterion asked.
     """
@@ -174,6 +175,20 @@ def test_criteria_can_require_a_trained_operator(tmp_path: Path) -> None:
     ]
     assert JUnitXml.fromfile(str(report)).errors == 1
     assert run(verify.verify, tmp_path / 'result.json').exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ('identity', 'said'), [((), True), (('--identity', 'operator=Ada'), False)]
+)
+def test_who_drove_is_not_checked_where_nobody_entered_it(
+    identity: tuple[str, ...], *, said: bool, tmp_path: Path
+) -> None:
+    """A record of somebody is no record of whoever drove, and a PASS says so."""
+    ada = written(tmp_path / 'ada.json', *ALL)
+    rules = site(tmp_path, 'this_robot')
+    result = told(tmp_path, GOOD, '--criteria', rules, '--drill', ada, *identity)
+    unchecked = [one['what'] for one in result['not_checked']]
+    assert (result['verdict'], 'who operated the robot' in unchecked) == ('PASS', said)
 
 
 def test_a_missing_drill_softens_no_failure(tmp_path: Path) -> None:

@@ -25,10 +25,12 @@ def outcome(name: str, *, passed: bool = True, least: float = 12.5) -> Outcome:
     )
 
 
-def drill(*outcomes: Outcome, operator: str = 'Ada', started: str = STARTED) -> Drill:
+def drill(
+    *outcomes: Outcome, operator: str = 'Ada', started: str = STARTED, scripted: bool = False
+) -> Drill:
     """Return a drill on the PackBot that ships."""
     robot = load('packbot')
-    return Drill(operator, robot.name, robot.sha256, 3, started, 24.0, outcomes)
+    return Drill(operator, robot.name, robot.sha256, 3, started, 24.0, outcomes, scripted)
 
 
 ALL = tuple(outcome(name) for name in SITUATIONS)

@@ -26,6 +26,7 @@ def test_a_scripted_drill_prints_the_outcome_and_leaves_a_record(
     schema = json.loads((repository / 'schema/drill.schema.json').read_text('utf-8'))
     jsonschema.validate(record, schema)
     assert (record['operator'], record['seed'], record['outcome']) == ('Ada', 5, 'incomplete')
+    assert record['scripted'] is True
     again = ugv('drill', *told)
     assert again.returncode == 2
     assert f'--out {out}: it exists' in again.stderr

@@ -89,7 +89,7 @@ def drill(
             f'expected one of {known}, got {unknown[0]!r}', param_hint='--only'
         )
     course = Course(config, seed, tuple(only or SITUATIONS))
-    result = _Clock(course, operator)
+    result = _Clock(course, operator, scripted=script is not None)
     if script is not None:
         _by_script(course, script)
     elif page:
@@ -102,17 +102,19 @@ def drill(
 class _Clock:
     """The result of a drill so far; its time is measured from when this was made."""
 
-    def __init__(self, course: 'Course', operator: str) -> None:
+    def __init__(self, course: 'Course', operator: str, *, scripted: bool) -> None:
         import time
         from datetime import datetime, timezone
 
         self._course, self._operator = course, operator.strip() or 'unknown'
+        self._scripted = scripted
         self._started = f'{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}'
         self._now, self._began = time.monotonic, time.monotonic()
 
     def __call__(self) -> 'Drill':
         minutes = (self._now() - self._began) / 60.0
-        return self._course.drill(self._operator, self._started, minutes)
+        who = self._operator, self._started, minutes
+        return self._course.drill(*who, scripted=self._scripted)
 
 
 def _by_script(course: 'Course', path: Path) -> None:

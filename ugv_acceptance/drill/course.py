@@ -81,7 +81,9 @@ class Course:
         if self.over or self.play.phase != JUDGED:
             raise BadSample('next, repeat: expected a situation that is judged')
 
-    def drill(self, operator: str, started: str, minutes: float) -> Drill:
+    def drill(
+        self, operator: str, started: str, minutes: float, *, scripted: bool = False
+    ) -> Drill:
         """Return what came of it so far, for its record."""
         config = self.config
         return Drill(
@@ -92,4 +94,5 @@ class Course:
             started,
             round(minutes, 1),
             tuple(self.outcomes),
+            scripted,
         )

@@ -26,7 +26,8 @@ class Outcome:
 class Drill:
     """A whole drill of one operator: `robot` by name, `started` as ISO 8601 time in UTC.
 
-    The last outcome of each situation counts; `minutes` is how long the drill took.
+    The last outcome of each situation counts; `minutes` is how long the drill took. A `scripted`
+    one was answered by a file: it shows nothing of its operator.
     """
 
     operator: str
@@ -36,6 +37,7 @@ class Drill:
     started: str
     minutes: float
     outcomes: tuple[Outcome, ...]
+    scripted: bool = False
 
     @property
     def to_repeat(self) -> tuple[str, ...]:

@@ -45,6 +45,7 @@ def record_json(drill: Drill) -> Json:
         'robot': {'name': drill.robot, 'sha256': drill.configuration_sha256},
         'software': __version__,
         'seed': drill.seed,
+        'scripted': drill.scripted,
         'situations': situations,
         **_sums(situations),
     }
@@ -212,6 +213,7 @@ FIELDS: Fields = {
     'robot': ('a robot: name and sha256', lambda value: isinstance(value, dict)),
     'software': ('the version of the software', _is_text),
     'seed': ('a whole number', _is_integer),
+    'scripted': ('true or false', lambda value: isinstance(value, bool)),
     'situations': ('a list', _is_list),
     'outcome': (f'{PASSED}, {TO_REPEAT} or {INCOMPLETE}', _is_text),
     'to_repeat': ('a list', _is_list),
@@ -289,11 +291,11 @@ def headline(record: Json) -> str:
         return f'[X] EDITED  {whose}: this is not what the drill wrote, so it counts for nothing'
     tries = by_situation(record['situations'])
     passed = sum(of[-1]['passed'] for of in tries.values())
-    mark = '[OK]' if record['outcome'] == PASSED else '[X]'
+    mark = '[OK]' if record['outcome'] == PASSED and not record['scripted'] else '[X]'
     total = len(tries) + len(record['not_done'])
     return (
         f'{mark} {record["outcome"].upper()}  {whose}: {passed} of {total} situations passed, '
-        f'{record["minutes"]:.0f} min'
+        f'{record["minutes"]:.0f} min{", by a script" * record["scripted"]}'
     )
 
 

@@ -33,6 +33,14 @@ class TrainingRecord:
     edited: bool
 
 
+# Said of a run whose criteria ask for a trained operator.
+_WHO: Json = {
+    'what': 'who operated the robot',
+    'why': "nobody entered it (--identity operator=NAME), so a record may be another person's",
+    'seconds': None,
+}
+
+
 def with_training(
     result: Json, records: Sequence[TrainingRecord], required: str | None, start_ns: int
 ) -> Json:
@@ -49,6 +57,8 @@ def with_training(
         counting = [one for one in counting if one['same_robot']]
     met = None if required is None else bool(counting)
     found: Json = {'operator_training': {'required': required, 'met': met, 'records': entries}}
+    if met and result['identity'].get('operator') is None:
+        found['not_checked'] = [*result['not_checked'], _WHO]
     if met is not False:
         return found
     reason = f'operator training: {_why_not(entries)}'
@@ -72,6 +82,7 @@ def _entry(one: TrainingRecord, result: Json, start_ns: int) -> Json:
     days = _days_before(one.started, start_ns)
     speaks_against = [
         *(['edited: this is not what the drill wrote, so it counts for nothing'] * one.edited),
+        *(['answered by a script, not by a person'] * record['scripted']),
         *_whose(record['operator'], result['identity'].get('operator')),
         *_when(days),
     ]
