@@ -350,3 +350,10 @@ def test_whatever_comes_has_a_headline(
     if not known:
         assert head.action in {'STOP', 'STAND CLEAR'}
         assert '%' not in words_of(head)
+
+
+@pytest.mark.parametrize('angle', [math.nan, math.inf])
+def test_nothing_is_ok_where_no_tilt_is_known(angle: float) -> None:
+    """In free fall, or on no edge, no margin is kept, whatever the verdict of a moment ago."""
+    view = view_of(tilted(45.0, angle=(angle,) * 4), SETTINGS)
+    assert (view.level, headline_of(view).action) == (STALE, 'STOP')

@@ -128,6 +128,7 @@ def view_of(snapshot: Snapshot, settings: Settings) -> View:
 
     The level is the monitor's verdict, but never better than a danger that is active, or than the
     numbers of a robot that has tipped: their alerts come a moment before the verdict, or after.
+    Where tilt is judged and none is known, as in free fall, nothing is OK.
     """
     groups = groups_of(snapshot.alerts)
     active = tuple(group for group in groups if group.active)
@@ -136,12 +137,13 @@ def view_of(snapshot: Snapshot, settings: Settings) -> View:
     judged = snapshot.known and settings.judges_tilt
     tipped = judged and has_tipped(snapshot.angle)
     level = max(snapshot.level, ERROR if tipped else OK, worst if worst >= ERROR else OK)
-    level = level if snapshot.known else STALE
+    least = least_tilt(snapshot.angle) if settings.judges_tilt else ('', math.nan)
+    untold = level == OK and judged and not least[0]
+    level = level if snapshot.known and not untold else STALE
     asked = bool(settings.unknown) and snapshot.known and ERROR not in {level, worst}
     unanswered = asked and worst != STALE
     dead = level == STALE and not unanswered
     doubted = any(_contradicts(group.first) for group in active)
-    least = least_tilt(snapshot.angle) if settings.judges_tilt else ('', math.nan)
     return View(
         snapshot,
         settings,
