@@ -38,6 +38,8 @@ class Config:
     if the file does not say which those are. `urdf_text` is the URDF in force as it was read,
     `urdf` what it means, and `description` says where it came from: a file, or the robot's own
     topic (then `urdf_path` is that topic's name). `defaulted`: nobody named a configuration.
+    `operators` are the nodes that may command the monitor, a name without a leading / in its own
+    namespace; None: anybody may.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Config:
     urdf_text: bytes = field(repr=False, default=b'')
     description: Literal['file', 'robot_description'] = 'file'
     defaulted: bool = field(compare=False, default=False)
+    operators: tuple[str, ...] | None = None
 
     @property
     def urdf_sha256(self) -> str:
@@ -111,6 +114,7 @@ def load(
         urdf_text=urdf_bytes,
         description='robot_description' if described else 'file',
         defaulted=path is None,
+        operators=file.operators,
     )
 
 

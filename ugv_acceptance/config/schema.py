@@ -19,6 +19,8 @@ from ugv_acceptance.model.robot import Robot
 
 # What a file says of a value that nobody knows: what hangs on it is not checked, nothing passes.
 UNKNOWN = 'unknown'
+# A node's full name, or one in the monitor's namespace.
+NODE = r'/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*'
 _IMU = ImuInput()
 _LIMITS = Limits(())
 _DELAYS = Delays()
@@ -81,6 +83,20 @@ def _pose_name(name: str) -> str:
     return name
 
 
+def _operators(names: object) -> object:
+    """Refuse what are not names of nodes; an empty list, which could mean nobody or anybody."""
+    if not isinstance(names, list) or not names:
+        raise ValueError(
+            'expected the nodes that may command, such as [acceptance_console, acceptance_tell]; '
+            f'left out, anybody may; got {shown(names)}'
+        )
+    for name in names:
+        if not isinstance(name, str) or not re.fullmatch(NODE, name):
+            text = 'expected the name of a node, such as /acceptance_tell'
+            raise ValueError(f'{text}, got {shown(name)}')
+    return tuple(names)
+
+
 def _pose(joints: object) -> object:
     if not isinstance(joints, dict):
         raise ValueError(  # noqa: TRY004 - pydantic reports ValueError only
@@ -109,6 +125,7 @@ TopicName = Annotated[
 PoseName = Annotated[str, AfterValidator(_pose_name)]
 PoseSection = Annotated[dict[Name, object], BeforeValidator(_pose)]
 Reason = Annotated[str, Field(strict=True), AfterValidator(checked_reason)]
+Operators = Annotated[tuple[str, ...], BeforeValidator(_operators)]
 
 
 class Section(BaseModel):
@@ -328,6 +345,7 @@ class File(Section):
     limits: LimitsSection = LimitsSection()
     delays: DelaysSection = DelaysSection()
     unsafe_limits: Reason | None = None
+    operators: Operators | None = None
     gravity: Annotated[Positive, _number('acceleration')] = _ROBOT.gravity
     uncertainty: dict[str, Annotated[NotNegative, _number()]] = {}
     assumed: dict[str, Reason] | None = None

@@ -197,6 +197,7 @@ def alert_status(change: Change, session: Session) -> Status:
         'shelved': shelved,
         'time_ns': change.time,
         'who': change.who,
+        'from': change.sender,
         'note': change.note,
         'limits_hash': session.limits_hash,
     }
@@ -345,6 +346,7 @@ def _monitor(verdict: Status, config: Config | None, session: Session | None) ->
             'urdf_sha256': config.urdf_sha256,
             'description': config.description,
             'warnings': len(config.warnings),
+            'operators': ', '.join(config.operators or ['anybody']),
         }
     if session is not None:
         values |= {

@@ -67,7 +67,8 @@ class Change:
     """A change of an alarm: what happened at `time` (ns), and the state that followed.
 
     `how` is raised, cleared, acknowledged, reset, shelved or unshelved; `who` is the person who did
-    it, `note` what that person wrote.
+    it, as the command claims, `note` what that person wrote, `sender` the node that sent the
+    command, or several of which it was one.
     """
 
     time: int
@@ -76,6 +77,7 @@ class Change:
     state: State
     who: str = ''
     note: str = ''
+    sender: str = ''
 
 
 @dataclass(slots=True)

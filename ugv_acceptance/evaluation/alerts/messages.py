@@ -193,6 +193,12 @@ ALERTS = {
         FailureSource.CONTROL_SYSTEM,
         level=WARN,
     ),
+    'FOREIGN_OPERATOR': AlertText(
+        'a command from {detail} was refused: the configuration names others as operators',
+        'command from a node that `operators` names, or add this one to it; else find who sent it',
+        FailureSource.INTERACTION,
+        level=WARN,
+    ),
     'CONFIG_DIFFERS': AlertText(
         'the robot is not the configured one, by its own description: {detail}',
         "configure the robot's own URDF, or none, and activate the monitor again",

@@ -40,6 +40,7 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,
     black_box_of,
     by_service,
+    service_refusal,
 )
 from ugv_acceptance.nodes.monitor.operator_desk import INACTIVE, OperatorDesk
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
@@ -48,6 +49,10 @@ from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, 
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 
 NAME = 'acceptance_monitor'
+UNLOCKED = (
+    'operators: only they may command, but anybody may set limits, delays and thresholds by'
+    ' parameter services: set lock_parameters as well'
+)
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
@@ -79,9 +84,20 @@ class Monitor(LifecycleNode):
         self.create_service(Trigger, '~/acknowledge', self._acknowledge)
         self.create_service(Trigger, '~/reset', self._reset)
         self.desk = OperatorDesk(
-            self, lambda: self.session, lambda: self._inputs, self._tell, self.say
+            self,
+            lambda: self.session,
+            lambda: self._inputs,
+            self._tell,
+            self.say,
+            self.parameter_desk.declare,
+            self._operators,
         )
         self.say()
+
+    def destroy_node(self) -> None:
+        """Destroy the node and what rclpy does not know of it."""
+        self.desk.destroy()
+        super().destroy_node()
 
     # Lifecycle
 
@@ -155,6 +171,9 @@ class Monitor(LifecycleNode):
         for warning in config.warnings:
             self.get_logger().warning(warning)
         settings = self.parameter_desk.adopt(config.settings)
+        self.parameter_desk.only_operators = config.operators is not None
+        if config.operators and not self.parameter_desk.value('lock_parameters'):
+            self.get_logger().warning(UNLOCKED)
         self.output.hardware_id = config.serial or config.name
         self._margins = MarginOutput(self, settings)
 
@@ -243,6 +262,7 @@ class Monitor(LifecycleNode):
             self._try_again()
         if self.session is not None and self._inputs is not None:
             self._inputs.look_around(self.parameter_desk.value('allowed_publishers'))
+            self.desk.look()
             self.session.measure_rates()
             self.session.feel()
             if self.config is not None:
@@ -287,9 +307,14 @@ class Monitor(LifecycleNode):
 
     # Services
 
+    def _operators(self) -> tuple[str, ...] | None:
+        return self.config.operators if self.config is not None else None
+
     def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self.session is not None, INACTIVE
-        if self.session is not None:
+        refusal = service_refusal(self._operators(), 'use `ugv-acceptance tell acknowledge`')
+        response.success, response.message = False, refusal or INACTIVE
+        if self.session is not None and not refusal:
+            response.success = True
             seen = by_service(self.session)
             self._tell(seen)
             response.message = f'acknowledged {len(seen)} alerts'
@@ -297,8 +322,10 @@ class Monitor(LifecycleNode):
         return response
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success, response.message = self.session is not None, INACTIVE
-        if self.session is not None:
+        refusal = service_refusal(self._operators(), 'use `ugv-acceptance tell reset`')
+        response.success, response.message = False, refusal or INACTIVE
+        if self.session is not None and not refusal:
+            response.success = True
             self._deactivate()
             self._start()
             response.message = 'started a new evaluation: filters, alerts and clock are fresh'

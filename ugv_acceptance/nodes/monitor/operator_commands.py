@@ -5,8 +5,8 @@ the note, `values` the alert: code, subject, level (without a subject or level: 
 fits), and for shelve seconds. Without an alert: all. The desk (operator_desk.py) takes them there.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -93,11 +93,25 @@ def by_service(session: Session) -> list[Change]:
     return session.alarm_tracker.alarms.acknowledge(session.clock.now(), SERVICE)
 
 
-def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
+def service_refusal(operators: Collection[str] | None, instead: str) -> str:
+    """Return why a service is refused where only `operators` may command; '': it is not.
+
+    `instead` says what to do instead.
+    """
+    if operators is None:
+        return ''
+    return f'`operators` is set, and a service does not tell who calls it: {instead}'
+
+
+def operate(session: Session, message: DiagnosticStatus, sender: str = '') -> list[Change]:
     """Carry out the command in a message; return the changes. Raises AcceptanceError if refused.
 
-    A command about a named alert that would change nothing is refused, with what its state is.
+    `sender` is the node that sent it. A command about a named alert that would change nothing is refused, with what its state is.
     """
+    return [replace(change, sender=sender) for change in _changes(session, message)]
+
+
+def _changes(session: Session, message: DiagnosticStatus) -> list[Change]:
     alarms, now, o = session.alarm_tracker.alarms, session.clock.now(), operation_from(message)
     if o.code is None:
         return _operate_all(alarms, now, o)

@@ -1,8 +1,9 @@
 """The operator's desk: takes every command on `~/operator` and answers it on `~/operator_answer`.
 
-An answer is a DiagnosticStatus as well: `name` is the command, `hardware_id` who gave it, `level`
-OK or, if it was refused, WARN; `message` what was done or why not, in a sentence. Its values have
-the `id` of the command and `result`: done or refused. A command that comes twice with one id, from
+An answer is a DiagnosticStatus as well: `name` is the command, `hardware_id` who gave it, as the
+command claims, `level` OK or, if it was refused, WARN; `message` what was done or why not, in a
+sentence. Its values have the `id` of the command, `result`: done or refused, and `from`: the node
+that sent it. Where the configuration names `operators`, only their commands are taken. A command that comes twice with one id, from
 a client that heard no answer, is carried out once and answered twice.
 """
 
@@ -12,7 +13,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 
 from ugv_acceptance import AcceptanceError, BadSample
@@ -20,6 +20,7 @@ from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.alerts.state_machine import OK, WARN
 from ugv_acceptance.evaluation.ground import KINDS, ground_words
 from ugv_acceptance.evaluation.inputs.payload import payload_fault
+from ugv_acceptance.monitoring.senders import Sender, check_operator, full_names
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.operator_commands import (
     DOINGS,
@@ -28,6 +29,7 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
     operate,
     operation_from,
 )
+from ugv_acceptance.nodes.monitor.operator_topic import OperatorTopic
 from ugv_acceptance.nodes.monitor.publishers import key_values
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 
@@ -39,6 +41,9 @@ DONE, REFUSED = 'done', 'refused'
 DEPTH = 50
 # Answers that are kept for a command that comes again; letters of an id.
 _KEPT, _LONGEST_ID = 50, 80
+# The alert that somebody commanded who may not, its subject, and ns for which it stands.
+FOREIGN, SUBJECT = 'FOREIGN_OPERATOR', 'operator'
+_STANDS = 10_000_000_000
 
 Values = dict[str, str]
 
@@ -46,7 +51,8 @@ Values = dict[str, str]
 class OperatorDesk:
     """Carries out commands on a monitor's session; None: the monitor is not active.
 
-    `tell` publishes changes of alerts, `say` the verdict; both before the answer.
+    `tell` publishes changes of alerts, `say` the verdict; both before the answer. `declare` sets a
+    parameter in the name of an operator. `operators` are the nodes that may command, as configured.
     """
 
     def __init__(
@@ -56,57 +62,101 @@ class OperatorDesk:
         inputs: Callable[[], Inputs | None],
         tell: Callable[[list[Change]], None],
         say: Callable[[], None],
+        declare: Callable[[str, Any], None],
+        operators: Callable[[], tuple[str, ...] | None],
     ) -> None:
         self._node, self._session, self._inputs = node, session, inputs
-        self._tell, self._say = tell, say
+        self._tell, self._say, self._declare = tell, say, declare
+        self._operators = operators
         self._answers: dict[str, DiagnosticStatus] = {}
+        self._refused_at = 0
         self._out = node.create_publisher(DiagnosticStatus, '~/operator_answer', DEPTH)
-        node.create_subscription(DiagnosticStatus, '~/operator', self._take, DEPTH)
+        self._topic = OperatorTopic(node, DEPTH, self._take)
 
-    def _take(self, message: DiagnosticStatus) -> None:
+    def destroy(self) -> None:
+        """Hear no commands any more."""
+        self._topic.destroy()
+
+    def look(self) -> None:
+        """Clear the alert about a refused sender that is long over; to be called once a second."""
+        session = self._session()
+        if session is not None and session.clock.now() - self._refused_at > _STANDS:
+            session.faults.clear(session.clock.now(), FOREIGN, SUBJECT)
+
+    def _take(self, message: DiagnosticStatus, sender: Sender) -> None:
         """Carry out a command and answer it, whatever is in it."""
         asked = {pair.key: pair.value for pair in message.values}.get('id', '')[:_LONGEST_ID]
+        try:
+            check_operator(sender, full_names(self._operators(), self._node.get_namespace()))
+        except BadSample as error:
+            # Not kept for its id: another node, which may, can have that too.
+            self._out.publish(self._answer(message, sender, asked, REFUSED, str(error)))
+            self._report(sender)
+            return
         answer = self._answers.get(asked)
         if answer is None:
-            answer = self._answered(message, asked)
+            answer = self._answered(message, sender, asked)
             if asked:
                 self._answers[asked] = answer
                 while len(self._answers) > _KEPT:
                     del self._answers[next(iter(self._answers))]
         self._out.publish(answer)
 
-    def _answered(self, message: DiagnosticStatus, asked: str) -> DiagnosticStatus:
-        log, who = self._node.get_logger(), message.hardware_id[:LONGEST_TEXT] or 'unknown'
+    def _report(self, sender: Sender) -> None:
+        """Raise the alert that names a sender who may not command."""
+        session = self._session()
+        if session is not None:
+            self._refused_at = session.clock.now()
+            session.faults.set(self._refused_at, FOREIGN, SUBJECT, 1.0, sender.words)
+            session.tick()
+
+    def _answered(self, message: DiagnosticStatus, sender: Sender, asked: str) -> DiagnosticStatus:
         found: dict[str, object] = {}
         try:
-            said, found = self._do(message)
+            said, found = self._do(message, sender.words)
             result = DONE
         except AcceptanceError as error:
             said, result = str(error), REFUSED
         except Exception as error:  # noqa: BLE001 - no message may end the node
             said, result = f'fault of the monitor: {error!r}', REFUSED
+        self._say()
+        return self._answer(message, sender, asked, result, said, found)
+
+    def _answer(  # noqa: PLR0913 - all that an answer has
+        self,
+        message: DiagnosticStatus,
+        sender: Sender,
+        asked: str,
+        result: str,
+        said: str,
+        found: dict[str, object] | None = None,
+    ) -> DiagnosticStatus:
+        """Log what came of a command and return it as a message."""
+        log, who = self._node.get_logger(), message.hardware_id[:LONGEST_TEXT] or 'unknown'
         note = ' '.join(message.message[:LONGEST_TEXT].split())
-        line = f'operator {" ".join(who.split())}: {said}{f"; note: {note}" if note else ""}'
+        name = ' '.join(who.split())
+        line = f'operator {name} (from {sender.words}): {said}{f"; note: {note}" if note else ""}'
         if result == DONE:
             log.info(line)
         else:
             log.warning(f'{line} (refused)')
-        self._say()
         return DiagnosticStatus(
             level=bytes([OK if result == DONE else WARN]),
             name=message.name,
             hardware_id=who,
             message=said,
-            values=key_values({'id': asked, 'result': result, **found}),
+            values=key_values(
+                {'id': asked, 'result': result, 'from': sender.words, **(found or {})}
+            ),
         )
 
-    def _do(self, message: DiagnosticStatus) -> tuple[str, dict[str, object]]:
+    def _do(self, message: DiagnosticStatus, sender: str) -> tuple[str, dict[str, object]]:
         """Carry out a command; return what was done and values for the answer."""
         session = self._session()
         if session is None:
             raise BadSample(INACTIVE)
         if message.name in DOINGS:
-            changes = operate(session, message)
+            changes = operate(session, message, sender)
             self._tell(changes)
             return done_words(operation_from(message), changes), {'changes': len(changes)}
         others: dict[str, Callable[[Session, Values], tuple[str, dict[str, object]]]] = {
@@ -123,14 +173,14 @@ class OperatorDesk:
         kind, before = values.get('kind', ''), ground_words(session.settings.ground.kind)
         if kind not in KINDS:
             raise BadSample(f'ground: expected one of {", ".join(KINDS)}, got {kind[:80]!r}')
-        self._set('ground.kind', kind)
+        self._declare('ground.kind', kind)
         return f'ground is now {kind}; before: {before}', {'ground': kind}
 
     def _hand(self, _: Session, values: Values) -> tuple[str, dict[str, object]]:
         allowed = values.get('allowed', '')
         if allowed not in ('true', 'false'):
             raise BadSample(f'{HAND}: expected allowed: true or false, got {allowed[:80]!r}')
-        self._set(HAND, value=allowed == 'true')
+        self._declare(HAND, allowed == 'true')
         if allowed == 'true':
             words = 'the arm may touch the ground; no torque is judged while it does'
         else:
@@ -186,11 +236,6 @@ class OperatorDesk:
             return ''
         topic = inputs.subscriptions['payload'].topic_name
         return '' if self._node.count_publishers(topic) else topic
-
-    def _set(self, name: str, value: Any) -> None:  # noqa: ANN401 - a parameter's value
-        result = self._node.set_parameters_atomically([Parameter(name, value=value)])
-        if not result.successful:
-            raise BadSample(result.reason)
 
 
 def load_message(link: str, mass: float, cog: tuple[float, float, float]) -> InertiaStamped:

@@ -11,7 +11,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ugv_acceptance import BadConfig
+from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.monitor.parameters import (
@@ -19,6 +19,7 @@ from ugv_acceptance.nodes.monitor.parameters import (
     TunableParameter,
     changed,
     check_at_rest,
+    check_declared,
     check_locked,
     declare_all,
     knobs_of,
@@ -31,7 +32,8 @@ class ParameterDesk:
     """Keeps a node's parameters and its settings the same.
 
     `settings` are None, and `tunables` none, until a robot's configuration is adopted. `session`
-    and `margins` return those of the node; None: it is not active, not configured.
+    and `margins` return those of the node; None: it is not active, not configured. With
+    `only_operators` what an operator declares cannot be set by services, but by `declare` alone.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class ParameterDesk:
         self._node, self._session, self._margins = node, session, margins
         self.settings: Settings | None = None
         self.tunables: tuple[TunableParameter, ...] = ()
+        self.only_operators = False
         declare_all(node)
         node.add_on_set_parameters_callback(self._judge)
         node.add_post_set_parameters_callback(self._take)
@@ -80,6 +83,16 @@ class ParameterDesk:
         ]
         self._node.set_parameters_atomically(told)
 
+    def declare(self, name: str, value: Any) -> None:  # noqa: ANN401 - a parameter's value
+        """Set what an operator who may do so declares. Raises BadSample with the reason if not."""
+        only, self.only_operators = self.only_operators, False
+        try:
+            result = self._node.set_parameters_atomically([Parameter(name, value=value)])
+        finally:
+            self.only_operators = only
+        if not result.successful:
+            raise BadSample(result.reason)
+
     def take_rates(self) -> None:
         """Hand the rate of publishing and the limits in force on to the margin topics."""
         rate, margins = self.value('publish_rate'), self._margins()
@@ -95,6 +108,8 @@ class ParameterDesk:
                 check_at_rest(values)
                 if self.value('lock_parameters'):
                     check_locked(values, self.tunables)
+                if self.only_operators and self.settings is not None:
+                    check_declared(values, self.tunables, self._in_force(self.settings))
             if self.settings is not None:
                 changed(self._in_force(self.settings), self.tunables, values)
         except (BadConfig, TypeError, ValueError) as error:

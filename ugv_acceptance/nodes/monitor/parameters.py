@@ -93,6 +93,19 @@ def check_locked(values: Mapping[str, Any], tunables: Sequence[TunableParameter]
         raise BadConfig(f'{found[0]}: locked by lock_parameters while active: deactivate first')
 
 
+def check_declared(
+    values: Mapping[str, Any], tunables: Sequence[TunableParameter], settings: Settings
+) -> None:
+    """Raise BadConfig where a set would change what an operator declares: a service names none."""
+    for tunable in tunables:
+        name, now = tunable.name, tunable.get(settings)
+        if name in FREE and list_of(values.get(name, now)) != list_of(now):
+            raise BadConfig(
+                f'{name}: `operators` in the configuration names who may set it, and a service '
+                'does not tell who calls: use `ugv-acceptance tell`'
+            )
+
+
 def declare_all(node: Node) -> None:
     """Declare the parameters that exist before the robot's files are read."""
     declare = node.declare_parameter

@@ -129,15 +129,7 @@ class Inputs:
 
     def _see_publishers(self, now: int) -> None:
         for name, subscription in self.subscriptions.items():
-            infos = self._node.get_publishers_info_by_topic(subscription.topic_name)
-            known = [
-                Publisher(
-                    _node_name(i.node_namespace, i.node_name),
-                    bytes(i.endpoint_gid),
-                    named=_UNKNOWN not in i.node_name,
-                )
-                for i in infos
-            ]
+            known = listed_publishers(self._node, subscription.topic_name)
             if self._nameless(name, now, [publisher.node for publisher in known]):
                 continue
             nodes = self.publishers[name] = self.voices[name].present(now, known)
@@ -188,6 +180,18 @@ def numbered(take: Callable[[bytes], None], voices: Voices) -> Callable[..., Non
     both = [Parameter(name, Parameter.POSITIONAL_ONLY) for name in ('data', 'information')]
     callback.__signature__ = Signature(both)  # type: ignore[attr-defined]
     return callback
+
+
+def listed_publishers(node: Node, topic: str) -> list[Publisher]:
+    """Return the publishers of a topic, by its full name, that ROS knows now."""
+    return [
+        Publisher(
+            _node_name(i.node_namespace, i.node_name),
+            bytes(i.endpoint_gid),
+            named=_UNKNOWN not in i.node_name,
+        )
+        for i in node.get_publishers_info_by_topic(topic)
+    ]
 
 
 def _node_name(namespace: str, name: str) -> str:
