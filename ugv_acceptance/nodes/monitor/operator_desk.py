@@ -43,7 +43,7 @@ DEPTH = 50
 _KEPT, _LONGEST_ID = 50, 80
 # The alert that somebody commanded who may not, its subject, and ns for which it stands.
 FOREIGN, SUBJECT = 'FOREIGN_OPERATOR', 'operator'
-_STANDS = 10_000_000_000
+_STANDS = 5_000_000_000
 
 Values = dict[str, str]
 

@@ -23,6 +23,8 @@ Take = Callable[[Any, bytes | None], None]
 # Where a rmw_message_info_t has the GID, and its length; room for one that has grown.
 _GID, _ROOM = slice(40, 56), 512
 _OK = 0
+# The libraries of ROS that have the functions; both are loaded already.
+RCL, UTILS = 'librcl.so', 'librcutils.so'
 
 
 class _Allocator(ctypes.Structure):
@@ -46,10 +48,10 @@ class _Rcl:
     """The C functions that take a message. Raises OSError or AttributeError without them."""
 
     def __init__(self) -> None:
-        utils = ctypes.CDLL('librcutils.so')
+        utils = ctypes.CDLL(UTILS)
         utils.rcutils_get_default_allocator.restype = _Allocator
         self._free = utils.rcutils_uint8_array_fini
-        self._take = ctypes.CDLL('librcl.so').rcl_take_serialized_message
+        self._take = ctypes.CDLL(RCL).rcl_take_serialized_message
         self._take.argtypes = [ctypes.c_void_p] * 4
         self._data = _Bytes(None, 0, 0, utils.rcutils_get_default_allocator())
         self._info = (ctypes.c_uint8 * _ROOM)()
