@@ -5,8 +5,7 @@ Any bytes give a trajectory or BadSample, nothing else.
 
 import hashlib
 import struct
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -27,36 +26,18 @@ class TrajectoryMessage:
     """A decoded trajectory_msgs/JointTrajectory as sent: SI, radians, the signs of messages.
 
     `stamp` is when it is to begin (ns; 0: at once), `times` (n,) when each point is reached after
-    that (ns). `positions` (n, m) is one a name; the others are that or, not given, (n, 0).
+    that (ns), `positions` (n, m) one a name. The others are None where no point has any; a point
+    without is a row of NaN. `sha256` names it by its contents, all but the header: see _Points.
     """
 
     stamp: int
     names: tuple[str, ...]
     times: Times
     positions: Floats
-    velocities: Floats
-    accelerations: Floats
-    effort: Floats
-
-    @property
-    def sha256(self) -> str:
-        """Its name: the hash of all but its header."""
-        fields = (self.positions, self.velocities, self.accelerations, self.effort)
-        return trajectory_sha256(self.names, self.times, fields)
-
-
-def trajectory_sha256(names: Sequence[str], times: Times, fields: Sequence[Floats]) -> str:
-    """Return the SHA-256 (hexadecimal) of a trajectory's contents.
-
-    Hashed are each name in UTF-8 with a zero byte, the `times` (n,) as int64 in ns, and the
-    `fields` (n, m or 0) positions, velocities, accelerations and effort as float64, point by point,
-    all little endian. The bytes of a message do not serve: what stands in its gaps is accidental.
-    """
-    found = hashlib.sha256(b''.join(name.encode() + b'\0' for name in names))
-    found.update(np.ascontiguousarray(times, dtype='<i8').tobytes())
-    for field in fields:
-        found.update(np.ascontiguousarray(field, dtype='<f8').tobytes())
-    return found.hexdigest()
+    velocities: Floats | None
+    accelerations: Floats | None
+    effort: Floats | None
+    sha256: str
 
 
 def stamp_of(data: bytes) -> int:
@@ -77,34 +58,19 @@ def trajectory_from(data: bytes) -> TrajectoryMessage:
     cursor.text('header.frame_id')
     number = _some(cursor.count('joint_names'), MOST_JOINTS, 'joint_names', 'joints')
     names = tuple(cursor.text(f'joint_names[{i}]') for i in range(number))
-    points = _some(cursor.count('points'), MOST_POINTS, 'points', 'points')
-    times = np.empty(points, np.int64)
-    rows: tuple[list[tuple[float, ...]], ...] = ([], [], [], [])
-    order = '<' if cursor.little else '>'
-    length, duration = struct.Struct(f'{order}I'), struct.Struct(f'{order}iI')
-    numbers, pos = struct.Struct(f'{order}{number}d'), cursor.pos
-    # Not by the cursor: a long trajectory would take three times as long.
-    for k in range(points):
-        field = FIELDS[0]
-        try:
-            for field, kept in zip(FIELDS, rows, strict=True):
-                pos += -pos & 3
-                (count,) = length.unpack_from(data, pos)
-                pos += 4
-                if count == number and number:
-                    pos += 4 - pos & 7  # what is counted begins behind four bytes
-                    kept.append(numbers.unpack_from(data, pos))
-                    pos += 8 * number
-                elif count or field == FIELDS[0]:
-                    raise BadSample(_uneven(k, field, number, count))
-            field = 'time_from_start'
-            sec, nanosec = duration.unpack_from(data, pos)
-        except struct.error:
-            raise BadSample(f'points[{k}].{field}: the message ends before it') from None
-        pos += 8
-        times[k] = sec * NS + nanosec
-    fields = [_field(points, number, *pair) for pair in zip(FIELDS, rows, strict=True)]
-    return TrajectoryMessage(stamp_of(data), names, times, *fields)
+    count = _some(cursor.count('points'), MOST_POINTS, 'points', 'points')
+    points = _Points(data, number, little=cursor.little)
+    points.hashed += [name.encode() + b'\0' for name in names]
+    points.read(cursor.pos, count)
+    positions, *others = (points.rows[name] for name in FIELDS)
+    return TrajectoryMessage(
+        stamp_of(data),
+        names,
+        np.array(points.times, np.int64),
+        np.array(positions, np.float64).reshape(count, number),
+        *(None if not any(rows) else _filled(rows, number) for rows in others),
+        hashlib.sha256(b''.join(points.hashed)).hexdigest(),
+    )
 
 
 def _some(number: int, most: int, where: str, what: str) -> int:
@@ -113,17 +79,60 @@ def _some(number: int, most: int, where: str, what: str) -> int:
     return number
 
 
-def _uneven(point: int, field: str, number: int, count: int) -> str:
-    kind = 'positions' if field == 'positions' else f'{field}, or none'
-    return f'points[{point}].{field}: expected {number} {kind} (one a joint), got {count}'
+def _filled(rows: list[tuple[float, ...]], number: int) -> Floats:
+    return np.array([row or (np.nan,) * number for row in rows], np.float64)
 
 
-def _field(points: int, number: int, field: str, rows: list[tuple[float, ...]]) -> Floats:
-    """Return the numbers of a field, (n, m), or (n, 0) if no point has them."""
-    if not rows:
-        return np.empty((points, number if field == 'positions' else 0))
-    if len(rows) != points:
-        raise BadSample(
-            f'points: expected {field} in every point or in none, {len(rows)} of {points} have them'
-        )
-    return np.array(rows, dtype=np.float64).reshape(points, number)
+@dataclass(slots=True)
+class _Points:
+    """Reads the points of a message with `number` joints.
+
+    `hashed` is what a trajectory is named by: each name in UTF-8 and a zero byte; then, of each
+    point, each of FIELDS as its length (uint32) and its numbers (float64), and the time from the
+    start (int64, ns), all little endian. The bytes of the message itself do not serve: in its gaps
+    stands what was there by accident.
+    """
+
+    data: bytes
+    number: int
+    little: bool
+    times: list[int] = field(default_factory=list)
+    rows: dict[str, list[tuple[float, ...]]] = field(
+        default_factory=lambda: {n: [] for n in FIELDS}
+    )
+    hashed: list[bytes] = field(default_factory=list)
+
+    def read(self, pos: int, count: int) -> None:
+        """Read `count` points from byte `pos` on; a cursor would take three times as long."""
+        data, number, order = self.data, self.number, '<' if self.little else '>'
+        length, duration = struct.Struct(f'{order}I'), struct.Struct(f'{order}iI')
+        numbers, packed = struct.Struct(f'{order}{number}d'), struct.Struct(f'<I{number}d')
+        none, time, keep = bytes(4), struct.Struct('<q'), self.hashed.append
+        for k in range(count):
+            name = ''
+            try:
+                for name, rows in self.rows.items():
+                    pos += -pos & 3
+                    (found,) = length.unpack_from(data, pos)
+                    pos += 4
+                    row: tuple[float, ...] = ()
+                    if found == number:
+                        pos += 4 - pos & 7  # what is aligned is the distance from byte 4
+                        row = numbers.unpack_from(data, pos)
+                        pos += 8 * number
+                    elif found or name == FIELDS[0]:
+                        raise BadSample(_uneven(k, name, number, found))
+                    rows.append(row)
+                    keep(packed.pack(number, *row) if row else none)
+                name = 'time_from_start'
+                sec, nanosec = duration.unpack_from(data, pos)
+            except struct.error:
+                raise BadSample(f'points[{k}].{name}: the message ends before it') from None
+            pos += 8
+            self.times.append(sec * NS + nanosec)
+            keep(time.pack(self.times[-1]))
+
+
+def _uneven(point: int, name: str, number: int, count: int) -> str:
+    kind = 'positions' if name == FIELDS[0] else f'{name}, or none'
+    return f'points[{point}].{name}: expected {number} {kind} (one a joint), got {count}'
