@@ -163,7 +163,8 @@ def _corners(
 ) -> Samples:
     """Return the moments at which rates change at once: before it and after it.
 
-    At first the joints stand, and in the end they stop. Changes within CORNER of each other add up.
+    At first the joints stand, and in the end they stop: both are looked at too. Changes within
+    CORNER of each other add up.
     """
     knots, last = path.knots, first + counts - 1
     still = np.zeros((1, inside.rate.shape[1]))
@@ -175,13 +176,14 @@ def _corners(
     end = np.searchsorted(knots.time, knots.time + CORNER, side='left')
     burst = (total[end] - total[:-1]) / CORNER
     at = np.flatnonzero((change != 0.0).any(axis=1))
-    twice = np.concatenate((at, at))
+    rows = np.concatenate((at, at, [0, len(knots.time) - 1]))
+    rest = np.zeros((2, still.shape[1]))
     return Samples(
-        knots.time[twice],
-        knots.position[twice],
-        np.concatenate((before[at], after[at])),
-        burst[twice],
-        np.maximum(knots.first + twice, 1),
+        knots.time[rows],
+        knots.position[rows],
+        np.concatenate((before[at], after[at], rest)),
+        np.concatenate((burst[at], burst[at], rest)),
+        np.maximum(knots.first + rows, 1),
     )
 
 
