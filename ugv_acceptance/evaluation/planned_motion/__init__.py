@@ -12,7 +12,7 @@ from ugv_acceptance.evaluation.planned_motion.answer import (
     JointUse,
     TiltLeft,
 )
-from ugv_acceptance.evaluation.planned_motion.check import check_motion
+from ugv_acceptance.evaluation.planned_motion.check import MotionChecker, check_motion
 from ugv_acceptance.evaluation.planned_motion.request import Conditions, Trajectory
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     'CheckedMotion',
     'Conditions',
     'JointUse',
+    'MotionChecker',
     'TiltLeft',
     'Trajectory',
     'check_motion',

@@ -11,8 +11,8 @@ PERMITTED, REFUSED, NOT_KNOWN = 'PERMITTED', 'REFUSED', 'NOT_KNOWN'
 class TiltLeft:
     """The least tilt left (rad) before the robot tips: over which side, and when.
 
-    `time` (s) since the motion begins; `point` is the number of the trajectory's point (from 0)
-    that the joints are on their way to, or stand at.
+    `time` (s) since the motion begins; `point` is the number of the trajectory's point, counted
+    from 1, that the joints are on their way to, or stand at.
     """
 
     angle: float

@@ -30,9 +30,10 @@ class Conditions:
     `gravity` (m/s2) in base axes, None where the attitude is not known; (0, 0, -9.81) on level
     ground. `payload` is what the gripper carries during the motion, None where it is not known.
     `ground` is a kind of evaluation/ground.py, None: as the settings have it. `posture` (j) are
-    the positions of all joints at the start (rad, m) in the robot's own sense, as
-    `LiveMargins`' q; NaN where a joint's is not known, () where none is: the motion then begins
-    at its first point. `at_rest` says whether base and arm stand still.
+    the positions of all joints at the start (rad, m) in the robot's own sense, as `LiveMargins`'
+    q; NaN where a joint's is not known, () where none is. `at_rest` says whether base and arm
+    stand still. With `from_first_point` the joints of the trajectory are taken to stand at its
+    first point already, whatever `posture` says of them: only where a person asks, never live.
     """
 
     gravity: Vector | None
@@ -40,3 +41,4 @@ class Conditions:
     ground: str | None = None
     posture: tuple[float, ...] = ()
     at_rest: bool = True
+    from_first_point: bool = False
