@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ugv_acceptance.evaluation import planned_motion as motion
+from ugv_acceptance.evaluation.alerts.level_words import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, WARN
 from ugv_acceptance.evaluation.ground import ground_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
@@ -101,12 +102,8 @@ def situation_values(then: Situation) -> dict[str, object]:
 
 
 def _cautions(then: Situation) -> list[str]:
-    """Return what to say beside a permission: relaxed limits, CAUTION now, joints not told."""
-    found = []
-    if words := relaxed_words(then.settings):
-        found.append(words)
-    if then.level == WARN and not words:
-        found.append('the monitor shows CAUTION now')
+    """Return what to say beside a permission: CAUTION now, joints that nobody told."""
+    found = [f'the monitor shows {level_words(WARN)} now'] if then.level == WARN else []
     if then.held:
         found.append(f'never told, taken as held: {held_words(then.settings, sorted(then.held))}')
     return found

@@ -192,6 +192,16 @@ class MotionQuestions:
             values = situation_values(before.situation) | {'cause': 'newer'}
             yield before.asked.status(WITHDRAWN, [reason], values)
 
+    def give_up(self, why: str) -> Iterator[Status]:
+        """Yield that nothing is known of what was asked, after a fault in here."""
+        reason = f'fault of the monitor: {why}'
+        if self.standing is not None:
+            yield self.standing.asked.status(WITHDRAWN, [reason], {'cause': 'monitor'})
+        for question in (self._waiting, self._computed and self._computed[0]):
+            if question is not None:
+                yield Asked('', stamp_of(question.data)).status(NOT_KNOWN, [reason])
+        self.standing = self._waiting = self._computed = None
+
     def close(self) -> None:
         """End the thread."""
         if self._pool is not None:

@@ -15,6 +15,7 @@ from ugv_acceptance.evaluation.criteria.not_judged import unknown_words
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER
 from ugv_acceptance.evaluation.margin_words import excess_words
 from ugv_acceptance.evaluation.planned_motion import Conditions
+from ugv_acceptance.evaluation.planned_motion.asked import NEAR, NEAR_SLIDE
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.attitude import angle_between
 from ugv_acceptance.model.robot import Payload, Vector
@@ -25,8 +26,8 @@ from ugv_acceptance.monitoring.trends import LEAST
 # Alerts below DANGER beside which a motion may be judged: it is held against the same limits, or
 # they do not touch what is known now. With any other alert nothing is promised.
 HARMLESS = frozenset({'TIP_OVER', 'TORQUE_LIMIT', 'LIMITS_RELAXED', 'MESSAGES_LOST'})
-# How far joints (rad, m) and gravity (rad) may be from where they were: noise of a robot at rest.
-MOVED, TURNED = 0.02, math.radians(1.0)
+# How far gravity (rad) may be from where it was; joints: as far as a motion may begin beside them.
+TURNED = math.radians(1.0)
 # Length (ns) of the time that a robot must be seen at rest.
 AT_REST = 500_000_000
 INACTIVE = 'the monitor is not active'
@@ -145,8 +146,9 @@ def unrest(session: Session) -> Iterator[str]:
         yield 'the robot turns, by its gyro'
     if felt.running and math.hypot(*felt.state[3:6]) > imu.rest_acceleration:
         yield 'the robot is driven or pushed, by its accelerometer'
-    for name, *told in zip(names, *(m.q for m in recent), strict=True):
-        if max(told) - min(told) > MOVED:
+    rows = zip(names, _near(session.settings), *(m.q for m in recent), strict=True)
+    for name, near, *told in rows:
+        if max(told) - min(told) > near:
             yield f'{name} moves'
 
 
@@ -199,9 +201,17 @@ def _turned(session: Session, then: Situation) -> bool:
 
 def _moved(session: Session, then: Situation) -> bool:
     margins = session.evaluator.margins
-    return margins is not None and any(
-        abs(q - before) > MOVED for q, before in zip(margins.q, then.q, strict=True)
-    )
+    if margins is None:
+        return False
+    rows = zip(margins.q, then.q, _near(session.settings), strict=True)
+    return any(abs(q - before) > near for q, before, near in rows)
+
+
+def _near(settings: Settings) -> list[float]:
+    """Return how far each joint may be from where it was and still stand there: its noise."""
+    robot = settings.robot
+    slides = (robot.joint(name).slides for name in robot.joint_names)
+    return [NEAR_SLIDE if along else NEAR for along in slides]
 
 
 def _worse(session: Session) -> str:
