@@ -36,6 +36,7 @@ from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
 from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
+from ugv_acceptance.nodes.monitor.motion_desk import MotionDesk
 from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,
     black_box_of,
@@ -91,6 +92,9 @@ class Monitor(LifecycleNode):
             self.say,
             self.parameter_desk.declare,
             self._operators,
+        )
+        self.motions = MotionDesk(
+            self, lambda: self.session, lambda: self._inputs, self.output, self.steady
         )
         self.say()
 
