@@ -44,6 +44,14 @@ def test_acknowledging_clears_nothing() -> None:
     assert not book.rows
 
 
+def test_the_node_that_sent_a_command_stands_beside_the_name() -> None:
+    """Anybody can claim a name; an older monitor tells the name alone."""
+    book = AlertBook()
+    sent = {'who': 'Ada', 'note': 'stands well', 'from': '/acceptance_tell'}
+    say(book, 'acknowledged', 'active, acknowledged', **sent)
+    assert only(book).note == 'Ada (from /acceptance_tell): stands well'
+
+
 def test_what_nobody_saw_stays() -> None:
     """An alert that is over and was not acknowledged stays unseen."""
     book = AlertBook()

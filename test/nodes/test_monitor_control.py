@@ -391,7 +391,7 @@ def test_the_kind_of_ground_changes_while_it_runs(live: Live) -> None:
 
 
 def test_a_runner_tells_the_kind_of_ground_of_its_step(live: Live) -> None:
-    """Told by the service of the monitor's parameters; a step without one gives it back."""
+    """Told as an operator tells it; a step without one gives it back."""
     monitor, driver = live.running()
     guard = live.add(Guard(load(), lambda _: None))
 

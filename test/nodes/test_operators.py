@@ -14,8 +14,11 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from ugv_acceptance import BadConfig
+from ugv_acceptance.config import load
 from ugv_acceptance.nodes.monitor import sender_subscription
 from ugv_acceptance.nodes.monitor.node import Monitor
+from ugv_acceptance.nodes.runner_world import Guard
 
 SPACE = '/guarded'
 # The level of a line of the log.
@@ -240,6 +243,13 @@ def test_diagnostics_say_who_may_command(site: Guarded) -> None:
 def test_the_alert_goes_when_the_stranger_is_quiet(site: Guarded) -> None:
     """Some seconds after the last command it cleared by itself."""
     site.alert('FOREIGN_OPERATOR', 'cleared')
+
+
+def test_a_run_that_may_not_command_does_not_begin(tmp_path: Path, repository: Path) -> None:
+    """It tells the monitor the ground of each step: one line says what the list lacks."""
+    config = load(guarded_file(tmp_path, repository))
+    with pytest.raises(BadConfig, match=r'operators: expected /acceptance_runner among them, beca'):
+        Guard(config, lambda _: None)
 
 
 def test_who_cannot_be_told_for_sure_is_refused(

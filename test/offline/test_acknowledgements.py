@@ -72,6 +72,20 @@ def test_the_first_acknowledgement_counts(tmp_path: Path) -> None:
     assert result['alerts'][0]['acknowledged_by'] == 'Ann'
 
 
+def test_the_node_that_sent_it_stands_beside_the_name(tmp_path: Path) -> None:
+    """Recordings of monitors that told it have `acknowledged_from`; older ones are read without."""
+    told = status(
+        state='acknowledged', start_ns=START + 2 * S, time_ns=START + 5 * S, who='Ann',
+        **{'from': '/acceptance_tell'},
+    )  # fmt: skip
+    for name, one, wanted in (('new', told, '/acceptance_tell'), ('old', SEEN, None)):
+        result = {'alerts': [alert(2.0)]}
+        add_acknowledgements(result, open_bag(recorded(tmp_path / name, RAISED, one)))
+        (found,) = result['alerts']
+        assert (found['acknowledged_by'], found.get('acknowledged_from')) == ('Ann', wanted)
+        assert ('acknowledged_from' in found) == (wanted is not None)
+
+
 def test_without_the_topic_nothing_is_said(tmp_path: Path) -> None:
     """Without the alerts topic, acknowledgements are unknown, not absent."""
     result = {'alerts': [alert(2.0)]}

@@ -160,6 +160,9 @@ def again(
     if not all('worst_s' in alert for alert in told.get('alerts', ())):
         for alert in found['alerts']:
             del alert['worst_s']
+    if not any('acknowledged_from' in alert for alert in told.get('alerts', ())):
+        for alert in found['alerts']:
+            alert.pop('acknowledged_from', None)
     if 'urdf_sha256' not in told['robot']:
         _without_description(found)
     return found

@@ -35,7 +35,9 @@ class AlertBook:
             self.rows.pop(key, None)
             return
         before = self.rows.get(key)
-        said = ': '.join(x for x in (values.get('who', ''), values.get('note', '')) if x)
+        who, sender = values.get('who', ''), values.get('from', '')
+        who += f' (from {sender})' if who and sender else ''
+        said = ': '.join(x for x in (who, values.get('note', '')) if x)
         kept = before.note if before and how != 'raised' else ''
         shelved = how == 'shelved'
         self.rows[key] = AlertRow(

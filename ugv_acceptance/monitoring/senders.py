@@ -6,7 +6,7 @@ A node's name is what its own process says it is; only SROS 2 makes it hold (doc
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from ugv_acceptance import BadSample
+from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.monitoring.publisher_identity import Publisher
 
 # What is said in place of a node whose name ROS does not tell.
@@ -64,6 +64,14 @@ def check_operator(sender: Sender, operators: Collection[str] | None) -> None:
     if len(sender.nodes) > 1:
         raise BadSample(f'sent by {sender.words}, and which is not known; {allowed}')
     raise BadSample(f'sent by {sender.words}; {allowed}')
+
+
+def check_named(node: str, operators: Collection[str] | None, why: str) -> None:
+    """Raise BadConfig where a node of ours has to command and is not one of the `operators`."""
+    if operators is not None and node not in operators:
+        raise BadConfig(
+            f'operators: expected {node} among them, because {why}; got {", ".join(operators)}'
+        )
 
 
 def full_names(names: Sequence[str] | None, namespace: str) -> tuple[str, ...] | None:

@@ -11,11 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Inertia, InertiaStamped, Twist, Vector3
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.experimental.events_executor import EventsExecutor
@@ -32,10 +31,12 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import joint_state_decoder
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
+from ugv_acceptance.monitoring.senders import check_named, full_names
 from ugv_acceptance.nodes.executor import PATIENCE
+from ugv_acceptance.nodes.monitor.operator_desk import DONE
 from ugv_acceptance.nodes.monitor.own_description import MOST
 from ugv_acceptance.nodes.monitor.own_description import QOS as OWN
-from ugv_acceptance.nodes.monitor.publishers import LATCHED
+from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.plan.motions import hitch_of
 from ugv_acceptance.run.actuation import OPERATOR, SIM
@@ -45,6 +46,8 @@ from ugv_acceptance.run.world import Brake, Commands, Positions
 SIMULATOR, MONITOR = 'packbot_simulator', 'acceptance_monitor'
 # Seconds in which a simulator answers, on a busy machine too.
 ANSWER_WITHIN = 30.0
+# Seconds after which a command without an answer is sent again.
+AGAIN = 0.5
 
 
 class RosCommands:
@@ -62,7 +65,10 @@ class RosCommands:
         self._load = publish(Inertia, f'{SIMULATOR}/load', 10)
         self._reset: Any = node.create_client(Trigger, f'{SIMULATOR}/reset')
         self._told = config.settings.ground.kind or ''
-        self._set: Any = node.create_client(SetParameters, f'{MONITOR}/set_parameters')
+        self._answered: set[str] = set()
+        node.create_subscription(
+            DiagnosticStatus, f'{MONITOR}/operator_answer', self._take_answer, 10
+        )
 
     def unheard(self, mode: str) -> str:
         """Return a topic this mode needs that has no subscriber yet; empty: none.
@@ -116,10 +122,22 @@ class RosCommands:
         told = kind or self._config.settings.ground.kind or ''
         if told == self._told:
             return
-        text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=told)
-        request = SetParameters.Request(parameters=[Parameter(name='ground.kind', value=text)])
-        if self._set.wait_for_service(ANSWER_WITHIN) and self._done(self._set.call_async(request)):
-            self._told = told
+        number, end = uuid4().hex, time.monotonic() + ANSWER_WITHIN
+        values = key_values({'kind': told, 'id': number})
+        message = DiagnosticStatus(name='ground', hardware_id='run', values=values)
+        while time.monotonic() < end:
+            self._operator.publish(message)  # under one id it is carried out once
+            again = time.monotonic() + AGAIN
+            while number not in self._answered and time.monotonic() < again:
+                time.sleep(0.01)
+            if number in self._answered:
+                self._told = told
+                return
+
+    def _take_answer(self, message: DiagnosticStatus) -> None:
+        values = {pair.key: pair.value for pair in message.values}
+        if values.get('result') == DONE:
+            self._answered.add(values.get('id', ''))
 
     def may_touch(self, *, allowed: bool) -> None:
         """Say to the monitor whether the arm may touch the ground from now on."""
@@ -187,6 +205,8 @@ class Guard(Node):
         **node: Any,  # noqa: ANN401 - as Node does
     ) -> None:
         super().__init__('acceptance_runner', **node)
+        operators = full_names(config.operators, self.get_namespace())
+        check_named(self.get_fully_qualified_name(), operators, 'a run tells its ground')
         self.config, self._progress, self._mode = config, progress, mode
         self.positions = Positions(config)
         self._sent = RosCommands(self, config)

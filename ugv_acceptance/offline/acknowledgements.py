@@ -21,8 +21,9 @@ MOST = 2**63
 def add_acknowledgements(result: Json, bag: Bag) -> None:
     """Add to a result's alerts when, by whom and with what note each was acknowledged.
 
-    `acknowledged_s` is None where the topic was recorded but nobody acknowledged; without the
-    topic nothing is added.
+    `acknowledged_by` is the person the command named, `acknowledged_from` the node that sent it,
+    which older monitors did not tell. `acknowledged_s` is None where the topic was recorded but
+    nobody acknowledged; without the topic nothing is added.
     """
     topics = [n for n, t in bag.topics.items() if t.type == TYPE and n.endswith('/alerts')]
     if not topics:
@@ -34,6 +35,8 @@ def add_acknowledgements(result: Json, bag: Bag) -> None:
         first = min(of, key=lambda values: int(values['time_ns']), default=None)
         alert['acknowledged_s'] = (int(first['time_ns']) - bag.start_ns) / 1e9 if first else None
         alert['acknowledged_by'] = first.get('who', '') if first else None
+        if first and 'from' in first:
+            alert['acknowledged_from'] = first['from']
         alert['note'] = first.get('note', '') if first else None
 
 

@@ -170,11 +170,12 @@ class OperatorDesk:
         return others[message.name](session, {pair.key: pair.value for pair in message.values})
 
     def _ground(self, session: Session, values: Values) -> tuple[str, dict[str, object]]:
-        kind, before = values.get('kind', ''), ground_words(session.settings.ground.kind)
-        if kind not in KINDS:
+        kind, before = values.get('kind', 'nothing'), ground_words(session.settings.ground.kind)
+        if kind not in ('', *KINDS):  # empty: not entered
             raise BadSample(f'ground: expected one of {", ".join(KINDS)}, got {kind[:80]!r}')
         self._declare('ground.kind', kind)
-        return f'ground is now {kind}; before: {before}', {'ground': kind}
+        said = f'ground is now {ground_words(kind or None)}; before: {before}'
+        return said, {'ground': kind}
 
     def _hand(self, _: Session, values: Values) -> tuple[str, dict[str, object]]:
         allowed = values.get('allowed', '')
