@@ -92,8 +92,8 @@ def situation_values(then: Situation) -> dict[str, object]:
         'payload_kg': load.mass,
         'payload_cog_m': ','.join(f'{c:.6g}' for c in load.cog),
         'payload_by': then.load_by,
-        'roll_deg': math.degrees(roll),
-        'pitch_deg': math.degrees(pitch),
+        'roll_deg': math.degrees(roll) + 0.0,  # never -0
+        'pitch_deg': math.degrees(pitch) + 0.0,
         'ground': ground_words(settings.ground.kind),
         'limits_hash': then.limits_hash,
         'limits_relaxed': relaxed_words(settings),

@@ -7,6 +7,7 @@ hears none knows nothing.
 from collections.abc import Callable, Iterable
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -43,35 +44,47 @@ class MotionDesk:
     ) -> None:
         self._node, self._session, self._inputs = node, session, inputs
         self._output, self._clock = output, clock
-        self._parameter = MASS in node._parameter_overrides  # noqa: SLF001 - rclpy has no public way
-        self._heard = 0
+        self._payload_by, self._heard = '', 0
+        self._of: Session | None = None
+        self._declares = False
         self.questions = MotionQuestions(session, self.load_by, self._warn)
         self._out = node.create_publisher(DiagnosticStatus, '~/check_result', ANSWERS)
         node.create_subscription(JointTrajectory, '~/check', self._take, QUESTIONS, raw=True)
-        node.add_post_set_parameters_callback(self._told)
+        node.add_on_set_parameters_callback(self._before)
+        node.add_post_set_parameters_callback(self._after)
         self._timer: Timer = node.create_timer(PERIOD, self._look, clock=clock)
         self._timer.cancel()
 
     def load_by(self) -> str:
         """Return who told the payload in force; '' if nobody did, so that it is only assumed."""
-        session, inputs = self._session(), self._inputs()
+        session = self._session()
         if session is None:
             return ''
-        heard = session.counts['payload'].taken
-        if heard and (heard > self._heard or not self._parameter):
+        if session is not self._of:
+            self._of, self._heard = session, 0
+        if session.counts['payload'].taken > self._heard:
+            self._heard, inputs = session.counts['payload'].taken, self._inputs()
             nodes = [] if inputs is None else inputs.publishers.get('payload', [])
-            return ', '.join(nodes) or 'operator'
-        if self._parameter:
-            return f'parameter {MASS}'
-        return 'configuration' if session.settings.payload_known else ''
+            self._payload_by = ', '.join(nodes) or 'operator'
+        known = 'configuration' if session.settings.payload_known else ''
+        return self._payload_by or known
 
-    def _told(self, parameters: list[Parameter]) -> None:
-        """Note that the payload is told by a parameter: not where that follows a message."""
+    def _before(self, _: list[Parameter]) -> SetParametersResult:
+        """Note whether the payload's parameter is being declared, with the value of the file."""
+        self._declares = not self._node.has_parameter(MASS)
+        return SetParametersResult(successful=True)
+
+    def _after(self, parameters: list[Parameter]) -> None:
+        """Note that a parameter tells the payload: not one that follows a message."""
+        if all(parameter.name != MASS for parameter in parameters):
+            return
+        given = MASS in self._node._parameter_overrides  # noqa: SLF001 - rclpy has no public way
         session = self._session()
-        heard = 0 if session is None else session.counts['payload'].taken
-        if any(parameter.name == MASS for parameter in parameters) and heard <= self._heard:
-            self._parameter = True
-        self._heard = heard
+        heard = session is not None and session.counts['payload'].taken > self._heard
+        if self._declares and not given:
+            self._payload_by = ''
+        elif not heard:
+            self._payload_by = f'parameter {MASS}'
 
     def _take(self, data: bytes) -> None:
         """Take a question, whatever is in it."""
