@@ -1,7 +1,7 @@
 """What publishers offer, and what a subscriber has to ask for to hear all of them."""
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, cast
+from typing import Literal
 
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -87,4 +87,4 @@ def _node(info: TopicEndpointInfo) -> str:
 
 def publishers(node: Node, topic: str) -> list[TopicEndpointInfo]:
     """Return the publishers of a topic that ROS knows of."""
-    return cast('list[TopicEndpointInfo]', node.get_publishers_info_by_topic(topic))
+    return list(node.get_publishers_info_by_topic(topic))

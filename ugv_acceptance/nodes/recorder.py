@@ -37,7 +37,8 @@ LOOK, SOON = 1.0, 0.1
 class TopicState:
     """What came of a topic: messages, those lost, messages a second, and what is wrong with it.
 
-    `rate` is the present one, `mean` that from its first message to its last. `why_not` is why it is not recorded, `needed` whether it is missed where nobody publishes it.
+    `rate` is the present one, `mean` that from its first message to its last. `why_not` is why it
+    is not recorded, `needed` whether it is missed where nobody publishes it.
     """
 
     name: str
@@ -78,7 +79,7 @@ class RecorderNode(Node):
         self.recorder, self._tell, self._told = recorder, tell, set[str]()
         self.clock = ReceiptClock()
         self._monitor = self.resolve_topic_name(MONITOR)
-        self._parameters = ParametersInForce(self, self._monitor, self._on_parameters)
+        self._in_force = ParametersInForce(self, self._monitor, self._on_parameters)
         self._declared = False
         wanted = {one.name: one for one in self._wanted(topics)}
         for name in extra:
@@ -110,7 +111,7 @@ class RecorderNode(Node):
         yield Wanted(own, STRING, LATCHED, key=lambda data: data)
         yield Wanted(TF_STATIC, TF, LATCHED, key=_frames)
         monitor = self._monitor
-        yield Wanted(f'{monitor}/verdict', STATUS, LATCHED, key=one, also=self._parameters.hear)
+        yield Wanted(f'{monitor}/verdict', STATUS, LATCHED, key=one, also=self._in_force.hear)
         yield Wanted(f'{monitor}/alerts', ARRAY, needed=False)
         yield Wanted(f'{monitor}/operator', STATUS, needed=False)
         yield Wanted(f'{monitor}/operator_answer', STATUS, needed=False)
@@ -139,7 +140,7 @@ class RecorderNode(Node):
                 self._waited = 0.0
                 for topic in self.topics:
                     topic.look()
-            self._parameters.look()
+            self._in_force.look()
         except Exception as error:  # noqa: BLE001 - a fault in our code must not end the recording
             self._once(f'a fault in our code: {error!r}')
 
@@ -153,7 +154,7 @@ class RecorderNode(Node):
         return [*map(_state, self.topics), self._parameters_state()]
 
     def _parameters_state(self) -> TopicState:
-        name, number, state = f'{self._monitor}/{PARAMETERS}', self._parameters.told, ''
+        name, number, state = f'{self._monitor}/{PARAMETERS}', self._in_force.told, ''
         if not number and any(t.messages for t in self.topics if t.name.endswith('/verdict')):
             state = f'{self._monitor} has not answered what they are'
         return TopicState(name, number, 0, 0.0, 0.0, 1, state, needed=False)
