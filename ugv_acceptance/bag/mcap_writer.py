@@ -47,6 +47,11 @@ class McapWriter:
         self._put(MAGIC + _record(records.Header('ros2', library)))
 
     @property
+    def written(self) -> int:
+        """Number of bytes written, up to the end of the last whole record."""
+        return self._pos
+
+    @property
     def counts(self) -> dict[int, int]:
         """Number of messages written, by channel id."""
         return self._counts
@@ -110,12 +115,15 @@ class McapWriter:
         record = records.Chunk(
             self._compression, packed, chunk.last, chunk.first, crc32(content), len(content)
         )
-        self._put(_record(record))
-        length = self._pos - start
+        # One write for chunk and indexes: a process that is killed seldom leaves a part of one.
+        out = [_record(record)]
+        length = end = len(out[0])
         offsets = {}
         for channel, at in chunk.at.items():
-            offsets[channel] = self._pos
-            self._put(_record(records.MessageIndex(channel, at)))
+            offsets[channel] = start + end
+            out.append(_record(records.MessageIndex(channel, at)))
+            end += len(out[-1])
+        self._put(b''.join(out))
         self._chunks.append(
             records.ChunkIndex(
                 length,
@@ -181,7 +189,9 @@ class McapWriter:
         self._open.size += len(part)
 
     def _put(self, data: bytes) -> None:
-        self._file.write(data)
+        left = memoryview(data)
+        while left:  # a file without a buffer may take a part
+            left = left[self._file.write(left) :]
         self._pos += len(data)
 
 

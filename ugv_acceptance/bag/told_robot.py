@@ -59,7 +59,7 @@ def descriptions_in(recording: Recording, name: str) -> Described:
     seen: set[bytes] = set()
     texts: list[bytes] = []
     wrong: list[str] = []
-    for message in _messages(bag, topics):
+    for message in messages_of_few(bag, topics):
         if message.data in seen:
             continue
         if len(seen) == MOST_TEXTS:
@@ -91,7 +91,7 @@ def _topics(recording: Recording, name: str) -> tuple[str, ...]:
     return tuple(near or held)
 
 
-def _messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
+def messages_of_few(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
     """Yield the messages of a few topics, by the files' indexes where these can be believed."""
     wanted = set(topics)
     if not wanted:

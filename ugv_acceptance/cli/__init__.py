@@ -34,6 +34,7 @@ VERBS = (
     'verify',
     'campaign',
     'monitor',
+    'record',
     'console',
     'watch',
     'tell',

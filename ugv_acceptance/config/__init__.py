@@ -7,7 +7,7 @@ acceptance criteria. Every error is a BadConfig with file, line and field. Read 
 docs/robot_configuration.md explains every key of the file.
 """
 
-from ugv_acceptance.config.loading import Config, description_topic, load
+from ugv_acceptance.config.loading import Config, description_topic, load, name_and_topics
 from ugv_acceptance.config.strength import Worst, worst_torques
 from ugv_acceptance.config.topics import Topic, Topics
 from ugv_acceptance.config.units import quantity
@@ -20,6 +20,7 @@ __all__ = [
     'Worst',
     'description_topic',
     'load',
+    'name_and_topics',
     'quantity',
     'rotation_from_rpy',
     'worst_torques',

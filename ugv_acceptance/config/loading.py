@@ -14,7 +14,7 @@ from ugv_acceptance.config.files import LARGEST_FILE, beside, find, read, text
 from ugv_acceptance.config.schema import File
 from ugv_acceptance.config.setup_checks import setup_doubts
 from ugv_acceptance.config.strength import worst_torques
-from ugv_acceptance.config.topics import Topics, topics_from
+from ugv_acceptance.config.topics import Topics, topics_from, topics_named
 from ugv_acceptance.config.urdf import Urdf, read_urdf
 from ugv_acceptance.evaluation.criteria.not_judged import LEAST
 from ugv_acceptance.evaluation.settings import Settings
@@ -129,6 +129,20 @@ def description_topic(
     if urdf is not None or file.urdf is not None:
         return None
     return file.topics.robot_description.name
+
+
+def name_and_topics(
+    path: Path | str | None = None, *, urdf: Path | str | None = None
+) -> tuple[str, Topics]:
+    """Return a robot's name and topics, also where only the robot itself tells its URDF.
+
+    Raises BadConfig as `load` does.
+    """
+    _, _, _, file = _read_file(path)
+    if urdf is None and file.urdf is None:
+        return file.robot.name, topics_named(file)
+    config = load(path, urdf=urdf)
+    return config.name, config.topics
 
 
 def _read_file(path: Path | str | None) -> tuple[Path, bytes, Document, File]:

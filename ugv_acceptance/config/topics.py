@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ugv_acceptance.config.build import Build
-from ugv_acceptance.config.schema import IMU_DATA, JOINT_STATES, QosSection, TopicSection
+from ugv_acceptance.config.schema import IMU_DATA, JOINT_STATES, File, QosSection, TopicSection
 from ugv_acceptance.evaluation.settings import Settings
 
 TYPES = {
@@ -58,6 +58,18 @@ class Topics:
         return {name: topic for name, topic in every.items() if topic.used}
 
 
+def topics_named(file: File) -> Topics:
+    """Return the topics that a file names, without its URDF: an input is used unless it is null."""
+    given = file.topics
+    sections = {'joint_states': given.joint_states, 'imu': given.imu, 'payload': given.payload}
+    instead = {'joint_states': JOINT_STATES, 'imu': IMU_DATA}
+    found = {
+        key: _given(key, section or instead[key], used=section is not None)
+        for key, section in sections.items()
+    }
+    return Topics(**found, robot_description=given.robot_description.name)
+
+
 def topics_from(build: Build, settings: Settings) -> Topics:
     """Return the topics; BadConfig if two share a name or a type is not the supported one."""
     given = build.file.topics
@@ -83,6 +95,9 @@ def _topic(build: Build, key: str, section: TopicSection, *, used: bool) -> Topi
     kind = section.type or TYPES[key]
     if kind != TYPES[key]:
         raise build.refuse(('topics', key, 'type'), f'expected {TYPES[key]}, got {kind}')
-    qos = section.qos or _QOS[key]
-    frame = section.frame_id
-    return Topic(section.name, kind, qos.reliability, qos.durability, qos.depth, frame, used)
+    return _given(key, section, used=used)
+
+
+def _given(key: str, section: TopicSection, *, used: bool) -> Topic:
+    qos, frame = section.qos or _QOS[key], section.frame_id
+    return Topic(section.name, TYPES[key], qos.reliability, qos.durability, qos.depth, frame, used)

@@ -36,6 +36,7 @@ from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.judge import DEFAULTS, Options, judge
 from ugv_acceptance.offline.not_read import not_read
 from ugv_acceptance.offline.own_robot import check_default, description_statement, robot_of
+from ugv_acceptance.offline.told_parameters import told_parameters
 from ugv_acceptance.offline.training import with_training
 from ugv_acceptance.type_aliases import Json
 
@@ -110,6 +111,7 @@ def evaluate(
     result |= with_training(result, options.training, required, opened.start_ns)
     unread = [not_checked_json(one) for one in not_read(opened, robot)]
     result['not_checked'] = [*result['not_checked'], *unread]
+    result |= told_parameters(opened, judgement, result, declared=payload is not None)
     result['load'] = load_of(judgement.measurement.payloads, opened.start_ns)
     if payload is not None:
         carried = settings.robot.payload

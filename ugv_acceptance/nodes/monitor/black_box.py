@@ -15,6 +15,7 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 
 from ugv_acceptance import AcceptanceError
+from ugv_acceptance.bag.recordings_kept import unused
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, Alert
@@ -161,7 +162,7 @@ class BlackBox:
     def _begin(self, folder: Path, now: int, alert: Alert) -> None:
         when = datetime.fromtimestamp(now // 1_000_000_000, timezone.utc)
         stem = f'{when:%Y%m%dT%H%M%SZ}_{alert.rule.code}_{alert.rule.subject}'.lower()
-        path = _unused(folder / ''.join(c if c.isalnum() else '_' for c in stem))
+        path = unused(folder / ''.join(c if c.isalnum() else '_' for c in stem))
         past = [message for message in self._kept if message[0] >= now - BEFORE]
         first = past[0][0] if past else now
         lasting = [(first, name, data) for name, data in self._lasting.items()]
@@ -201,12 +202,3 @@ class BlackBox:
             if time.monotonic() - flushed > FLUSH:
                 writer.flush()
                 flushed = time.monotonic()
-
-
-def _unused(path: Path) -> Path:
-    """Return a path that does not exist: the one given, or with a number behind it."""
-    number, found = 1, path
-    while found.exists():
-        number += 1
-        found = path.with_name(f'{path.name}_{number}')
-    return found
