@@ -178,7 +178,7 @@ def play(live: Live, run: Path, heard: Path) -> Played:
     session.evaluator.tick(ended)
     counts = {name: count.taken for name, count in session.counts.items()}
     alerts = of_the_evaluator(session.evaluator.watch.log)
-    started = session.evaluator._fresh[0].started
+    started = session.evaluator.fresh[0].started
     return Played(run, heard, Evaluated(found, alerts), started, began, ended, counts)
 
 

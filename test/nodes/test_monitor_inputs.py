@@ -97,7 +97,7 @@ def test_a_publisher_that_stops_makes_the_verdict_stale(live: Live, end: signal.
     session = session_of(monitor)
     delays = session.settings.delays
     for name, start in stale(session).items():
-        fresh = session.evaluator._fresh[INPUTS.index(name)]
+        fresh = session.evaluator.fresh[INPUTS.index(name)]
         learnt = max(fresh.period * delays.stale_periods, delays.stale_after * 1e9)
         assert start <= session.counts[name].last + int(learnt)
     assert monitor.verdict().level == STALE

@@ -1,4 +1,4 @@
-"""Encodes diagnostics and markers for viewers as CDR, without ROS."""
+"""Encodes diagnostics, markers, polygons and points for viewers as CDR, without ROS."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -79,6 +79,21 @@ def markers_cdr(stamp_ns: int, frame_id: str, lifetime_s: float, shapes: Sequenc
     stamp, lifetime = _time(stamp_ns), _time(round(lifetime_s * _NS))
     for shape in shapes:
         _put_marker(out, stamp, frame_id, lifetime, shape)
+    return bytes(out)
+
+
+def polygon_cdr(stamp_ns: int, frame_id: str, points: Sequence[Point]) -> bytes:
+    """Encode a geometry_msgs/PolygonStamped (m), whose coordinates are single floats."""
+    out = message_head(stamp_ns, frame_id)
+    put_count(out, len(points))
+    out += struct.pack(f'<{3 * len(points)}f', *chain.from_iterable(points))
+    return bytes(out)
+
+
+def point_cdr(stamp_ns: int, frame_id: str, point: Point) -> bytes:
+    """Encode a geometry_msgs/PointStamped (m)."""
+    out = message_head(stamp_ns, frame_id)
+    put_floats(out, point, 3)
     return bytes(out)
 
 

@@ -70,7 +70,9 @@ class LiveEvaluator:
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
     newest that could be used; while not `load_known`, the newest declared could not. `ground` says
-    whether the arm touches the ground, `chassis` what its IMU feels, `joints` merges joint states.
+    whether the arm touches the ground, `chassis` what its IMU feels, `joints` merges joint states,
+    `fresh` has the timeouts of joint states and IMU. The margins rest on `posture` and
+    `chassis.stance`.
     """
 
     settings: Settings
@@ -85,8 +87,8 @@ class LiveEvaluator:
     _imu: ImuTracker = field(init=False)
     chassis: ChassisMotion = field(init=False)
     ground: GroundContact = field(init=False)
-    _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
-    _posture: Posture | None = None
+    fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
+    posture: Posture | None = None
     _stances: tuple[Stance, ...] = ()
     _gravity: Vector = NOWHERE
     _began: int | None = None
@@ -105,18 +107,18 @@ class LiveEvaluator:
         self.mount.serve(self._imu, self.chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
-        self._fresh = (InputTimeout(delays), InputTimeout(delays))
+        self.fresh = (InputTimeout(delays), InputTimeout(delays))
         self._level = not self.settings.hears_imu
         if self._level:
             self._gravity = (0.0, 0.0, -self.settings.robot.gravity)
-            self._fresh[1].last = FOREVER
+            self.fresh[1].last = FOREVER
         if not self.settings.hears_joints:
-            self._fresh[0].last = FOREVER
+            self.fresh[0].last = FOREVER
             self._stand()
 
     def start(self, now: int) -> None:
         """Begin to listen at `now` (ns): an input of which no message comes will become stale."""
-        for fresh in self._fresh:
+        for fresh in self.fresh:
             fresh.started = now
         self._began = self.ground.start = now
 
@@ -146,7 +148,7 @@ class LiveEvaluator:
             if unusable and not watch.joints.invalid.raw:
                 watch.joints.invalid.detail = words.why_unusable(joints)
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
-        limit, oldest = self._fresh[0].limit, min(joints.seen)
+        limit, oldest = self.fresh[0].limit, min(joints.seen)
         # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
         late = oldest != NEVER or now - joints.began > STARTUP
         old = (late and now - oldest > limit) or joints.doubted
@@ -162,17 +164,17 @@ class LiveEvaluator:
         if known:
             self._stand()
         else:
-            self._posture, self._stances = None, ()
+            self.posture, self._stances = None, ()
         return self._evaluate(now, stamp)
 
     def _stand(self) -> None:
         """Take the newest joint positions, which are known, with the newest payload."""
         load = self.payload
         if not self.load_known:
-            self._posture, self._stances = None, ()
+            self.posture, self._stances = None, ()
             return
-        self._posture = posture_of(self._mechanics, self.joints.q, load.mass, load.cog)
-        self._stances = stances_of(self._mechanics, self._posture)
+        self.posture = posture_of(self._mechanics, self.joints.q, load.mass, load.cog)
+        self._stances = stances_of(self._mechanics, self.posture)
         self.chassis.pose = tuple(self.joints.q), load
         self.ground.stands(self.joints.q, load.cog)
 
@@ -256,7 +258,7 @@ class LiveEvaluator:
         self.watch.trend.adopt(settings)
         for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
             signal.judge_by(other.rule)
-        for fresh in self._fresh:
+        for fresh in self.fresh:
             fresh.judge_by(settings.delays)
 
     def tick(self, now: int) -> None:
@@ -307,7 +309,7 @@ class LiveEvaluator:
         return judged and self.watch.trend.level == NO_TREND
 
     def _arrived(self, which: int, now: int, stamp: int, signals: InputSignals) -> None:
-        fresh = self._fresh[which]
+        fresh = self.fresh[which]
         stale, clock, slow = signals.stale, signals.clock, signals.slow
         self._silent(which, now, stale)
         if not stale.quiet:
@@ -325,7 +327,7 @@ class LiveEvaluator:
 
     def _silent(self, which: int, now: int, stale: Signal) -> None:
         """Judge whether an input has been silent for too long at `now` (ns)."""
-        due = self._fresh[which].deadline
+        due = self.fresh[which].deadline
         if due is not None and now > due:
             if which == 0 and not stale.raw:
                 stale.detail = words.why_foreign(self.joints, due)
@@ -333,7 +335,7 @@ class LiveEvaluator:
 
     def _alive_until(self) -> int:
         """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
-        joints, imu = self._fresh
+        joints, imu = self.fresh
         seen = min(self.joints.seen, default=FOREVER)
         if seen == NEVER or imu.last is None or self.joints.repeating:
             return NEVER
@@ -347,7 +349,7 @@ class LiveEvaluator:
             self._known_until = None
 
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
-        posture, gravity, until = self._posture, self._gravity, self._alive_until()
+        posture, gravity, until = self.posture, self._gravity, self._alive_until()
         unknown = posture is None or gravity[0] != gravity[0] or now > until
         stance = self.chassis.stance = None if unknown else standing(self._stances, gravity)
         touch = FREE

@@ -15,11 +15,10 @@ from ugv_acceptance.model.expressions import (
     rotate,
     scale,
     subtract,
-    transpose,
 )
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
-from ugv_acceptance.model.robot import IDENTITY, ZERO, Payload, Robot, Vector
+from ugv_acceptance.model.robot import Payload, Robot, Vector
 from ugv_acceptance.model.solids import Place, Solid, moving_bodies, solids_of
 from ugv_acceptance.model.stability import stances_of, standing
 from ugv_acceptance.model.tree import (
@@ -28,8 +27,8 @@ from ugv_acceptance.model.tree import (
     drives_of,
     point_of,
     pose_of,
-    tree_of,
 )
+from ugv_acceptance.monitoring.footprint import seen_from
 
 # Points of one body closer together than this (m) are drawn as one.
 _SAME = 0.02
@@ -197,8 +196,6 @@ LINE_STRIP, LINE_LIST, SPHERE_LIST, TEXT = 4, 5, 7, 9
 
 GREEN, AMBER = (0.1, 0.6, 0.2, 1.0), (1.0, 0.75, 0.0, 1.0)
 RED, BLUE = (0.8, 0.0, 0.1, 1.0), (0.0, 0.3, 0.8, 1.0)
-# Where the root link is on its body: at the origin.
-_ROOT = (0, IDENTITY, ZERO)
 # Outward direction in `base_link` of each of SIDES.
 _OUTWARD = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
@@ -206,14 +203,9 @@ _OUTWARD = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 def shapes_of(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple[Shape, ...]:
     """Return the shapes of one posture, one for each of NAMES, in the axes of `settings.frame`."""
     shapes = _in_root(skeleton, margins, settings)
-    _, rotation, xyz = tree_of(settings.robot).frames.get(settings.base_frame, _ROOT)
-    if (rotation, xyz) == _ROOT[1:]:
+    seen = seen_from(settings)
+    if seen is None:
         return shapes
-    back = transpose(rotation)
-
-    def seen(point: Vector) -> Vector:
-        return _numbers(rotate(back, subtract(point, xyz)))
-
     return tuple(
         replace(shape, points=tuple(map(seen, shape.points)), position=seen(shape.position))
         for shape in shapes

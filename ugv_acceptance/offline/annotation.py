@@ -12,7 +12,14 @@ import numpy as np
 
 from ugv_acceptance.bag.annotated import Said
 from ugv_acceptance.bag.encode import JointStateBytes
-from ugv_acceptance.bag.encode_views import Diagnosis, diagnoses_cdr, diagnosis_cdr, markers_cdr
+from ugv_acceptance.bag.encode_views import (
+    Diagnosis,
+    diagnoses_cdr,
+    diagnosis_cdr,
+    markers_cdr,
+    point_cdr,
+    polygon_cdr,
+)
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
@@ -23,7 +30,7 @@ from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.stability import SIDES, Stability
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES, Stability
 from ugv_acceptance.monitoring.alarm_tracker import Event, events_of
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
 from ugv_acceptance.monitoring.drawing import (
@@ -34,6 +41,7 @@ from ugv_acceptance.monitoring.drawing import (
     shapes_of,
     skeleton_of,
 )
+from ugv_acceptance.monitoring.footprint import TILTS, in_frame
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.margins import margin_rows
 from ugv_acceptance.offline.replayed_session import PastClock, ReplayedSession, moment_of
@@ -41,7 +49,8 @@ from ugv_acceptance.offline.replayed_session import PastClock, ReplayedSession, 
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 _ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
-# Type of each topic that the monitor publishes, by the last word of the topic's name.
+# Type of each topic that the monitor publishes, by the last word of the topic's name. Not `ok`: a
+# recording that is played must not tell a robot's gate that it may open.
 TYPES = {
     'static_torque': _JOINT_STATE,
     'torque_margin': _JOINT_STATE,
@@ -50,6 +59,8 @@ TYPES = {
     'alerts': _ARRAY,
     'diagnostics': _ARRAY,
     'markers': 'visualization_msgs/msg/MarkerArray',
+    'support_polygon': 'geometry_msgs/msg/PolygonStamped',
+    'center_of_mass': 'geometry_msgs/msg/PointStamped',
 }
 # Nanoseconds between verdicts, and between drawings.
 SECOND, DRAWING = 1_000_000_000, round(PERIOD * 1e9)
@@ -89,7 +100,7 @@ class Annotation:
         self._trend = RuleSet(self.settings).trend
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
-        self._bytes = JointStateBytes(names), JointStateBytes(SIDES)
+        self._bytes = JointStateBytes(names), JointStateBytes(TILTS)
         # The next is the last of the list; of alike ones the last of the log.
         self._events = events_of(log[::-1], log[::-1])[::-1]
         self._due = [self.bag.start_ns, self.bag.start_ns]
@@ -225,8 +236,15 @@ class Annotation:
         skeleton = skeleton_of(self._figure, margins.q, margins.gravity, load)
         if skeleton is not None:
             shapes = shapes_of(skeleton, margins, self.settings)
-            data = markers_cdr(self._stamp, self.settings.frame, LIFETIME, shapes)
-            yield Said(now, self.names['markers'], data)
+            stamp, frame = self._stamp, self.settings.frame
+            stands = margins.stability.state < NO_CONTACT
+            found = in_frame(self.settings, skeleton.polygon if stands else (), skeleton.cog)
+            for word, data in (
+                ('markers', markers_cdr(stamp, frame, LIFETIME, shapes)),
+                ('support_polygon', polygon_cdr(stamp, frame, found.polygon)),
+                ('center_of_mass', point_cdr(stamp, frame, found.center)),
+            ):
+                yield Said(now, self.names[word], data)
 
     def _array(self, now: int, statuses: Sequence[Status]) -> bytes:
         return diagnoses_cdr(now, [self._diagnosis(status) for status in statuses])

@@ -39,13 +39,14 @@ class Layout:
 
     `pairs` are (joint number, place in the message); `second` is the last second in which their
     positions were checked for jumps, `cell` the last cell of time (joint_rates.py) with a message,
-    `first` when such a message first came (ns).
+    `first` and `last` when such a message first and last came (ns).
     """
 
     pairs: list[tuple[int, int]]
     second: int = NEVER
     cell: int = NEVER
     first: int = NEVER
+    last: int = NEVER
     repeats: Repeats = field(default_factory=Repeats)
 
 

@@ -125,7 +125,7 @@ class JointMerger:
             return False
         if self.began == NEVER:
             self.began = now
-        repeats = layout.repeats
+        layout.last, repeats = now, layout.repeats
         if repeats.seconds or (stamp == repeats.stamp and stamp):
             self._repeat(repeats, now, stamp, position)
         else:

@@ -37,6 +37,7 @@ from ugv_acceptance.nodes.monitor.black_box import BlackBox
 from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
 from ugv_acceptance.nodes.monitor.motion_desk import MotionDesk
+from ugv_acceptance.nodes.monitor.ok_output import OkOutput
 from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,
     black_box_of,
@@ -79,6 +80,7 @@ class Monitor(LifecycleNode):
         self.parameter_desk = ParameterDesk(self, lambda: self.session, lambda: self._margins)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
+        self.ok = OkOutput(self, self)
         # Steady: a frozen /clock must not silence the diagnostics.
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, guarded(self, self._every_second), clock=self.steady)
@@ -179,7 +181,7 @@ class Monitor(LifecycleNode):
         if config.operators and not self.parameter_desk.value('lock_parameters'):
             self.get_logger().warning(UNLOCKED)
         self.output.hardware_id = config.serial or config.name
-        self._margins = MarginOutput(self, settings)
+        self._margins = MarginOutput(self, settings, lambda: self.session)
 
     def _activate(self) -> None:
         if self.parameter_desk.settings is None or self.config is None:
@@ -195,7 +197,7 @@ class Monitor(LifecycleNode):
             raise BadConfig('expected a configured monitor')
         self.session = self._new_session(self.parameter_desk.settings)
         self._box = black_box_of(self, self.config, self.session)
-        self._lamps = Lamps(self.session, self._box, self.session.clock.now())
+        self._lamps = Lamps(self.session, self._box, self.session.clock.now(), self.ok)
         self._inputs = Inputs(
             self, self.config.topics, self.session, self.parameter_desk.value('depth')
         )
@@ -259,6 +261,7 @@ class Monitor(LifecycleNode):
         session.advisory.renew(now, session.active)
         if session.advisory.arrived() or session.advisory.urgent(now):
             self.say()
+        self.ok.fall()
 
     def _every_second(self) -> None:
         self.own.look()
@@ -285,7 +288,8 @@ class Monitor(LifecycleNode):
         return self._lamps.on(verdict_of(self.session))
 
     def say(self) -> None:
-        """Publish the verdict and the diagnostics."""
+        """Publish the verdict and the diagnostics; before them that `~/ok` is false, if it is."""
+        self.ok.fall()
         status = self.verdict()
         self.output.verdict(status)
         self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))

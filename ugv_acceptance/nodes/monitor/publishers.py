@@ -1,9 +1,10 @@
-"""The monitor's publishers: conversion of results to messages, and RViz markers."""
+"""The monitor's publishers: conversion of results to messages, what they rest on, and markers."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import PointStamped, PolygonStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
@@ -13,10 +14,9 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from ugv_acceptance.bag.encode import JointStateBytes
-from ugv_acceptance.bag.encode_views import markers_cdr
+from ugv_acceptance.bag.encode_views import markers_cdr, point_cdr, polygon_cdr
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.diagnostics import Status
 from ugv_acceptance.monitoring.drawing import (
     LIFETIME,
@@ -26,6 +26,7 @@ from ugv_acceptance.monitoring.drawing import (
     shapes_of,
     skeleton_of,
 )
+from ugv_acceptance.monitoring.footprint import TILTS, footprint_of
 from ugv_acceptance.monitoring.session import Session
 
 _NS = 1_000_000_000
@@ -67,6 +68,7 @@ LATCHED = QoSProfile(
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 MARGIN_TOPICS = ('~/static_torque', '~/torque_margin', '~/stability')
+FOOTPRINT_TOPICS = (('~/support_polygon', PolygonStamped), ('~/center_of_mass', PointStamped))
 
 
 class StatusOutput:
@@ -100,24 +102,29 @@ class StatusOutput:
 
 
 class MarginOutput:
-    """Publishes the three margin topics, at most `rate` times a second (0: every message)."""
+    """Publishes the three margin topics and the two of what tip-over margins rest on.
 
-    def __init__(self, node: Node, settings: Settings) -> None:
-        self._node = node
+    Once in `period` (ns; 0: for every message) at most; those that somebody subscribes.
+    """
+
+    def __init__(
+        self, node: Node, settings: Settings, session: Callable[[], Session | None]
+    ) -> None:
+        self._node, self._session = node, session
         names = settings.robot.joint_names
         self._publishers: list[Publisher] = [
             node.create_publisher(JointState, topic, 10) for topic in MARGIN_TOPICS
         ]
-        self._joints, self._sides = JointStateBytes(names), JointStateBytes(SIDES)
-        self._wanted = (False, False, False)
+        self._publishers += [node.create_publisher(kind, t, 10) for t, kind in FOOTPRINT_TOPICS]
+        self._joints, self._sides = JointStateBytes(names), JointStateBytes(TILTS)
+        self._wanted = [False] * len(self._publishers)
         self._due = 0
         self.period = 0
         self.limits = settings.limits.torque
 
     def look_for_listeners(self) -> None:
         """Update which topics have subscribers; messages of the others are not built."""
-        torque, margin, tip = (p.get_subscription_count() > 0 for p in self._publishers)
-        self._wanted = (torque, margin, tip)
+        self._wanted = [p.get_subscription_count() > 0 for p in self._publishers]
         if not any(self._wanted):
             self._due = 1 << 62
         elif self._due == 1 << 62:
@@ -129,7 +136,7 @@ class MarginOutput:
             return
         late = margins.time - self._due > self.period
         self._due = (margins.time if late else self._due) + self.period
-        torque, margin, tip = self._wanted
+        torque, margin, tip, polygon, center = self._wanted
         if torque:
             self._publishers[0].publish(self._joints.fill(stamp, margins.q, margins.torque))
         if margin:
@@ -140,6 +147,20 @@ class MarginOutput:
             found = margins.stability
             angle, moment = map(float, found.angle), map(float, found.moment)
             self._publishers[2].publish(self._sides.fill(stamp, tuple(angle), tuple(moment)))
+        if polygon or center:
+            self._stand(stamp, polygon=polygon, center=center)
+
+    def _stand(self, stamp: int, *, polygon: bool, center: bool) -> None:
+        """Publish what the margins in hand rest on."""
+        session = self._session()
+        found = None if session is None else footprint_of(session.evaluator)
+        if session is None or found is None:
+            return
+        frame = session.settings.frame
+        if polygon:
+            self._publishers[3].publish(polygon_cdr(stamp, frame, found.polygon))
+        if center:
+            self._publishers[4].publish(point_cdr(stamp, frame, found.center))
 
     def destroy(self) -> None:
         """Destroy the publishers."""
