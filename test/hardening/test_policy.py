@@ -1,16 +1,30 @@
 """The SROS 2 policy names every topic and service of the nodes, and nobody's but their own."""
 
-import ast
-import re
+import os
+import subprocess
+import sys
+import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from nodes.live_case import Live, live_nodes, ros_context
-from rclpy.node import NodeNameNonExistentError
+from framed_robot import robot_files
+from nodes.live_case import PATIENCE, Live, live_nodes, ros_context, session_of
+from nodes.test_imu_mounting import send
+from nodes.tf2_type import provide_tf2_msgs
+from rclpy.node import Node, NodeNameNonExistentError
 
+from ugv_acceptance.bag.recorder import Recorder
+from ugv_acceptance.config import load
+from ugv_acceptance.nodes.console_feed import ConsoleNode
+from ugv_acceptance.nodes.operator_client import OperatorClient, _say_load
+from ugv_acceptance.nodes.recorder import RecorderNode
+from ugv_acceptance.nodes.runner_world import Guard
+
+provide_tf2_msgs()
 POLICY = Path(__file__).parents[2] / 'sros2' / 'policy.xml'
 NODES = Path(__file__).parents[2] / 'ugv_acceptance' / 'nodes'
 # Other tests' monitors, killed a moment ago, are still known to ROS; none of them is in here.
@@ -53,50 +67,115 @@ def test_it_has_the_form_of_a_policy() -> None:
             assert len(names) == len(set(names))
 
 
-@pytest.fixture
-def live() -> Iterator[Live]:
-    """Give nodes of a test's own."""
-    with ros_context(), live_nodes() as found:
-        yield found
+@dataclass
+class Site:
+    """The nodes of a robot in their own namespace, of which a spectator asks the ROS graph."""
+
+    live: Live
+    spectator: Node
+
+    def uses(self, node: str) -> dict[tuple[str, str], set[str]]:
+        """Return the names a node uses now, by kind and right, as if in the root namespace."""
+        look = self.spectator
+        tells = {
+            ('topics', 'publish'): look.get_publisher_names_and_types_by_node,
+            ('topics', 'subscribe'): look.get_subscriber_names_and_types_by_node,
+            ('services', 'reply'): look.get_service_names_and_types_by_node,
+            ('services', 'request'): look.get_client_names_and_types_by_node,
+        }
+        found = {}
+        for key, tell in tells.items():
+            found[key] = set[str]()
+            with suppress(NodeNameNonExistentError):  # ROS does not know the node yet
+                found[key] = {name.removeprefix(OWN) for name, _ in tell(node, OWN)}
+        return found
+
+    def agree(self, node: str) -> None:
+        """Wait until a node uses what it may by the policy, all of it and nothing else.
+
+        What ROS tells of a node comes piece by piece, so it is waited for.
+        """
+        may = {
+            (kind, right): allowed(node, kind, right)
+            for kind, rights in KINDS.items()
+            for right in rights
+        }
+        assert any(may.values()), f'{node} is not in the policy'
+        end, uses = time.monotonic() + PATIENCE, self.uses(node)
+        while uses != may and time.monotonic() < end:
+            self.live.spin(0.1)
+            uses = self.uses(node)
+        for key, names in may.items():
+            assert uses[key] - names == set(), f'{node} may not {key}'
+            assert names - uses[key] == set(), f'{node} does not need {key}'
 
 
-def test_the_monitor_uses_just_what_it_may(live: Live) -> None:
-    """All topics and services of a running monitor, as ROS tells them, are those of the policy."""
-    node = 'acceptance_monitor'
-    monitor = live.monitor(publish_rate=0.0, arguments=('-r', f'__ns:={OWN}'))
-    tells = {
-        ('topics', 'publish'): monitor.get_publisher_names_and_types_by_node,
-        ('topics', 'subscribe'): monitor.get_subscriber_names_and_types_by_node,
-        ('services', 'reply'): monitor.get_service_names_and_types_by_node,
-    }
-    live.until(lambda: all(_used(tell, node) for tell in tells.values()))
-    for (kind, right), tell in tells.items():
-        assert _used(tell, node) <= allowed(node, kind, right)
+@pytest.fixture(scope='module')
+def site() -> Iterator[Site]:
+    """Give an executor and a spectator."""
+    with ros_context(), live_nodes() as live:
+        yield Site(live, live.add(Node('spectator')))
 
 
-def _used(tell: Callable[[str, str], list[tuple[str, list[str]]]], node: str) -> set[str]:
-    """Return the names ROS tells of a node; none while it does not know the node yet."""
-    with suppress(NodeNameNonExistentError):
-        return {name.removeprefix(OWN) for name, _ in tell(node, OWN)}
-    return set()
+def test_the_monitor(site: Site, tmp_path: Path) -> None:
+    """With /clock, and with /tf_static, which is heard while only that tells where the IMU is."""
+    clock = '-p', 'use_sim_time:=true'
+    config = str(robot_files(tmp_path, 'base_footprint'))
+    space = ('-r', f'__ns:={OWN}')
+    monitor = site.live.monitor(config=config, arguments=(*space, *clock))
+    driver = site.live.driver(namespace=OWN)
+    site.live.until(
+        lambda: session_of(monitor).evaluator.mount.seeks, lambda: send(driver, 'nobody_knows')
+    )
+    site.agree('acceptance_monitor')
 
 
-def test_every_topic_in_the_code_is_in_the_policy() -> None:
-    """Each name given to a publisher or subscription in nodes/ that is a text stands in it."""
-    known = set(re.findall(r'<topic>(.*?)</topic>', POLICY.read_text(encoding='utf-8')))
-    known |= {name.replace('/acceptance_monitor/', '~/') for name in known}
-    missing = []
-    for path in NODES.rglob('*.py'):
-        if path.name in {'packbot_simulator.py', 'bag_player.py'}:  # tools of a test bench
-            continue
-        for call in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            if isinstance(call, ast.Call) and getattr(call.func, 'attr', '').startswith(
-                ('create_publisher', 'create_subscription')
-            ):
-                name = call.args[1]
-                if isinstance(name, ast.Constant) and name.value not in known:
-                    missing.append(f'{path.name}: {name.value!r}')
-    assert missing == []
+def test_the_console(site: Site) -> None:
+    """Also after an operator declared a load, which it then says on its topic."""
+    console = ConsoleNode(load(), namespace=OWN)
+    try:
+        console._operator._carry(1.0, (0.0, 0.0, 0.0))  # noqa: SLF001 - as after an answer
+        site.agree('acceptance_console')
+    finally:
+        console.close()
+
+
+def test_tell(site: Site) -> None:
+    """Also when it says a load that the monitor took on its topic."""
+    node = site.live.add(Node('acceptance_tell', namespace=OWN))
+    OperatorClient(node)
+    values = {'topic': f'{OWN}/payload', 'cog_m': '0,0,0', 'mass_kg': '1', 'link': 'hand'}
+    _say_load(node, values, lambda _: None)
+    site.agree('acceptance_tell')
+
+
+def test_the_runner(site: Site) -> None:
+    """Of a plan on a real robot, without what it asks of a simulated one alone."""
+    site.live.add(Guard(load(), lambda _: None, namespace=OWN))
+    site.agree('acceptance_runner')
+
+
+def test_the_recorder(site: Site, tmp_path: Path) -> None:
+    """With all that it records if somebody publishes it: other tests' nodes do not count."""
+    topics = load().topics
+    recorder = Recorder(tmp_path / 'recording')
+    site.live.add(RecorderNode(recorder, load().topics, namespace=OWN))
+    site.agree('acceptance_recorder')
+    recorder.close()
+
+
+def test_the_doctor(site: Site) -> None:
+    """While it listens, in a process of its own."""
+    code = 'from ugv_acceptance.cli import main; main()'
+    doctor = [sys.executable, '-c', code, 'doctor', '--seconds', '60', '--ros-args']
+    env = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    out = subprocess.DEVNULL
+    process = subprocess.Popen([*doctor, '-r', f'__ns:={OWN}'], env=env, stdout=out, stderr=out)
+    try:
+        site.agree('doctor')
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_nobody_but_the_driver_may_publish_the_inputs() -> None:
