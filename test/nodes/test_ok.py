@@ -1,6 +1,7 @@
 """`~/ok` over DDS: a driver that is killed, stopped or half dead, and every state of the node."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -209,6 +210,28 @@ def test_a_fault_of_ours_is_false(live: Live) -> None:
     before = len(words.heard)
     live.until(lambda: len(words.heard) >= before + 10, driver.send)
     assert not any(word for _, word in words.heard[before:])
+
+
+def test_the_lock_in_the_documentation_is_open_only_while_the_word_is_true(
+    live: Live, repository: Path
+) -> None:
+    """The team's own node of docs/ros_interface.md, run as it stands there: locked, open, locked."""
+    text = (repository / 'docs' / 'ros_interface.md').read_text('utf-8')
+    (code,) = re.findall(r'```python\n(.*?)```', text, re.DOTALL)
+    locks, words, driver = Words(), words_of(live), live.driver()
+    driver.create_subscription(Bool, 'margins_lock', locks.take, 1)
+    environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}
+    live.monitor()
+    with subprocess.Popen([sys.executable, '-c', code], env=environment) as process:
+        try:
+            live.until(lambda: locks.heard)
+            assert locks.now()
+            live.until(lambda: not locks.now(), driver.send)
+            assert words.now()
+            live.until(locks.now)
+            assert not words.now()
+        finally:
+            process.kill()
 
 
 def test_the_deadline_that_is_offered_is_kept(live: Live) -> None:
