@@ -30,6 +30,7 @@ from rosbags.typesys import Stores, get_typestore
 from ugv_acceptance.bag.annotated import Said, write_annotated
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.footprint import TILTS
 
 OFFLINE = (
     'import sys\nfrom ugv_acceptance.cli import main\ntry: main()\nfinally:'
@@ -113,7 +114,7 @@ def test_margins_are_the_columns_of_the_evaluation(failed: Path) -> None:
             assert repr(torque.position[k]) == row[f'{name}_position_rad']
             assert repr(torque.effort[k]) == row[f'{name}_static_torque_nm']
             assert repr(margin.effort[k]).removeprefix('inf') == row[f'{name}_torque_margin_nm']
-        assert tuple(tip.name) == SIDES
+        assert tuple(tip.name) == TILTS
         for k, side in enumerate(SIDES):
             assert repr(tip.effort[k]) == row[f'{side}_moment_nm']
             degrees = tip.position[k] * 57.29577951308232
@@ -174,6 +175,33 @@ def test_markers_are_drawn_ten_times_a_second(failed: Path) -> None:
         assert (outline[0].x, outline[0].y) == (outline[-1].x, outline[-1].y)
 
 
+def test_polygon_and_centre_come_with_each_drawing(failed: Path) -> None:
+    """Of the same moment, stamp and frame, and the same points, as those of a live monitor."""
+    found = decoded(failed / 'run.mcap')
+    words = ('markers', 'support_polygon', 'center_of_mass')
+    drawings, polygons, centers = (found[f'/acceptance_monitor/{word}'] for word in words)
+    assert len(drawings) == len(polygons) == len(centers) > 200
+    for (at, array), (told, outline), (_, center) in zip(drawings, polygons, centers, strict=True):
+        marker = {marker.ns: marker for marker in array.markers}
+        assert told == at
+        assert outline.header.frame_id == center.header.frame_id == 'base_link'
+        stamps = [m.header.stamp for m in (outline, center, marker['cog'])]
+        assert len({(s.sec, s.nanosec) for s in stamps}) == 1
+        drawn = [(p.x, p.y, p.z) for p in marker['support'].points[:-1]]
+        single = [pytest.approx(corner, abs=1e-6) for corner in drawn]
+        assert [(p.x, p.y, p.z) for p in outline.polygon.points] in ([], single)
+        assert (center.point.x, center.point.y) == (
+            marker['cog'].points[0].x,
+            marker['cog'].points[0].y,
+        )
+    assert any(outline.polygon.points for _, outline in polygons)
+
+
+def test_the_word_for_a_gate_of_motion_is_not_made(failed: Path) -> None:
+    """A recording that is played must not tell a robot's gate that it may open."""
+    assert not [topic for topic in decoded(failed / 'run.mcap') if topic.endswith('/ok')]
+
+
 def test_every_chunk_has_a_checksum(failed: Path, tmp_path: Path) -> None:
     """A byte that is changed inside a chunk is found."""
     data = bytearray((failed / 'run.mcap').read_bytes())
@@ -194,7 +222,7 @@ def test_what_the_monitor_said_then_is_kept_apart(failed: Path, tmp_path: Path) 
     # Of the same moment the order of several topics is nobody's.
     assert sorted(m for m in after if m[2] in topics) == sorted(before)
     mine = {topic for _, _, topic, _ in after} - topics
-    assert len(mine) == 7
+    assert len(mine) == 9
     assert {topic.split('/')[1] for topic in mine} == {'acceptance_evaluation'}
 
 

@@ -209,6 +209,19 @@ def test_a_recorded_clock_is_left_out_of_a_replay_of_now(live: Live, tmp_path: P
     assert '/clock' in player(live, Play(path, topics=('/clock',))).publishers
 
 
+def test_a_recorded_word_for_gates_of_motion_is_left_out(live: Live, tmp_path: Path) -> None:
+    """A robot's gate would take a true word of then for one of now: only who names it plays it."""
+    path, word = tmp_path / 'run', '/r1/acceptance_monitor/ok'
+    with BagWriter(path) as writer:
+        for name, kind in ((word, 'std_msgs/msg/Bool'), ('/t', 'std_msgs/msg/Bool')):
+            writer.add_topic(name, kind)
+            writer.write(name, T0, b'\x00\x01\x00\x00\x01')
+    playing = player(live, Play(path))
+    assert list(playing.publishers) == ['/t']
+    assert list(playing.skipped) == [word]
+    assert list(player(live, Play(path, topics=(word,))).publishers) == [word]
+
+
 @pytest.mark.parametrize(
     ('play', 'error', 'text'),
     [

@@ -11,6 +11,7 @@ import pytest
 from nodes.live_case import ERROR, FOLDED, OK, STALE, Live, imu, joints, levels, session_of
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
+from std_srvs.srv import Trigger
 
 from ugv_acceptance.bag.encode import joint_state_cdr
 from ugv_acceptance.bag.raw import Offered
@@ -257,3 +258,14 @@ def test_a_quality_of_service_that_does_not_match_is_named(
         lambda: any('INPUT_QOS imu' in a.name for a in driver.alerts), lambda: quiet.publish(imu())
     )
     assert 'RELIABILITY' in next(a.message for a in driver.alerts if 'INPUT_QOS' in a.name)
+
+
+def test_a_look_for_publishers_that_comes_after_the_end_does_nothing(live: Live) -> None:
+    """Its turn may be waiting when the monitor is deactivated or reset: that must not end it."""
+    monitor, _ = live.running()
+    inputs = monitor._inputs
+    assert inputs is not None
+    assert live.call(Trigger, 'acceptance_monitor/reset').success
+    for _ in range(20):
+        inputs._look()
+    assert monitor._inputs is not inputs

@@ -13,7 +13,7 @@ from nodes.live_case import Driver, Live
 from rclpy.node import Node
 
 from ugv_acceptance.config import load
-from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.footprint import TILTS
 from ugv_acceptance.nodes.bag_player import message_type
 
 JOINTS = load().settings.robot.joint_names
@@ -85,7 +85,7 @@ def test_every_curve_of_plotjuggler_is_a_series(robot: Driver, repository: Path)
     for curve in curves:
         topic, name, field = str(curve).rsplit('/', 2)
         assert known[topic] == 'sensor_msgs/msg/JointState'
-        assert name in (SIDES if topic.endswith('stability') else JOINTS)
+        assert name in (TILTS if topic.endswith('stability') else JOINTS)
         assert field in {'position', 'effort'}
 
 

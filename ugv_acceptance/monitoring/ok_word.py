@@ -23,6 +23,7 @@ same; alerts say it later, of an IMU after 1 s.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from ugv_acceptance.evaluation.alerts.level_words import level_words
 from ugv_acceptance.evaluation.alerts.state_machine import WARN
@@ -90,7 +91,7 @@ class OkWord:
     def why_not(self) -> str:
         """Return why the word is false now; '': it is true. Does not let time pass: tick before."""
         now = self.session.clock.now()
-        unknown = self._unknown(now)
+        unknown = next(self._unknown(now), '')
         if unknown:
             self._known_since = None
             return unknown
@@ -102,24 +103,25 @@ class OkWord:
             return f'margins known for {known / 1e9:.1f} s, expected {settled / 1e9:g} s'
         return next(self._objections(), '')
 
-    def _unknown(self, now: int) -> str:
-        """Return which margin, or datum that it rests on, is not known now; '': none."""
+    def _unknown(self, now: int) -> Iterator[str]:
+        """Yield which margins, or data that they rest on, are not known at `now` (ns)."""
         session, evaluator = self.session, self.session.evaluator
         margins = evaluator.margins
         if margins is None:
-            return 'margins not known'
+            yield 'margins not known'
+            return
         if not session.settings.judges_tilt:
-            return 'tip-over is not judged'
+            yield 'tip-over is not judged'
         if not evaluator.load_known:
-            return 'the payload is not known'
+            yield 'the payload is not known'
         if evaluator.joints.doubted:
-            return 'a joint is taken as held that may be elsewhere'
-        stability = margins.stability
-        if stability.state not in (STANDING, RAISED) or any(map(math.isnan, stability.angle)):  # type: ignore[arg-type]
-            return 'no tip-over margin'
-        if any(map(math.isnan, margins.torque)):
-            return 'torque is not judged'
-        return next(self._old(now), '')
+            yield 'a joint is taken as held that may be elsewhere'
+        if margins.stability.state not in (STANDING, RAISED):
+            yield 'no tip-over margin'
+        angles: Any = margins.stability.angle
+        if any(map(math.isnan, (*angles, *margins.torque))):
+            yield 'tip-over or a torque is not judged'
+        yield from self._old(now)
 
     def _old(self, now: int) -> Iterator[str]:
         """Yield the inputs whose data are older than their stale limit at `now` (ns)."""

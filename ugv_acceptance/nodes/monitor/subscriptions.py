@@ -105,6 +105,9 @@ class Inputs:
         self._soon.reset()
 
     def _look(self) -> None:
+        # Its turn may have come before the timer was destroyed.
+        if not self.subscriptions:
+            return
         self._looks += 1
         if self._looks >= _LOOKS:
             self._soon.cancel()
