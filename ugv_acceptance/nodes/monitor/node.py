@@ -46,13 +46,14 @@ from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.parameter_desk import ParameterDesk
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.parameter_types import FittingParameters
 
 NAME = 'acceptance_monitor'
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
 
-class Monitor(LifecycleNode):
+class Monitor(FittingParameters, LifecycleNode):
     """The monitor's node. `listener` is called with every verdict and change of an alert."""
 
     def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
