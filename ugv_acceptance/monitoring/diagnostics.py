@@ -1,8 +1,9 @@
 """The monitor's verdict, alert messages and diagnostics as plain values, ready to be published."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
@@ -283,10 +284,17 @@ def unavailable(problem: str) -> Status:
 
 
 def diagnostics_of(
-    verdict: Status, config: Config | None, session: Session | None, inputs: InputSources | None
+    verdict: Status,
+    config: Config | None,
+    session: Session | None,
+    inputs: InputSources | None,
+    transport: Mapping[str, object] = MappingProxyType({}),
 ) -> list[Status]:
-    """Return all statuses for /diagnostics; the first is the monitor itself."""
-    statuses = [_monitor(verdict, config, session)]
+    """Return all statuses for /diagnostics; the first is the monitor itself.
+
+    `transport` are values that say how messages reach it.
+    """
+    statuses = [_monitor(verdict, config, session, transport)]
     if session is not None:
         active = session.active
         moving = session.evaluator.moving
@@ -297,8 +305,13 @@ def diagnostics_of(
     return statuses
 
 
-def _monitor(verdict: Status, config: Config | None, session: Session | None) -> Status:
-    values: dict[str, object] = {'version': __version__}
+def _monitor(
+    verdict: Status,
+    config: Config | None,
+    session: Session | None,
+    transport: Mapping[str, object],
+) -> Status:
+    values: dict[str, object] = {'version': __version__, **transport}
     if config is not None:
         values |= {
             'robot': config.name,

@@ -47,6 +47,7 @@ from ugv_acceptance.nodes.monitor.parameter_desk import ParameterDesk
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 from ugv_acceptance.nodes.parameter_types import FittingParameters
+from ugv_acceptance.nodes.transport import transport_now
 
 NAME = 'acceptance_monitor'
 # Called with ('alert' or 'verdict', the status).
@@ -71,6 +72,7 @@ class Monitor(FittingParameters, LifecycleNode):
         self.own = OwnDescription(self, self._on_description)
         # Whether it is to bring itself up as soon as the robot tells its URDF.
         self._awaits = False
+        self._transport = transport_now().values()
         self.parameter_desk = ParameterDesk(self, lambda: self.session, lambda: self._margins)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
@@ -265,7 +267,9 @@ class Monitor(FittingParameters, LifecycleNode):
         """Publish the verdict and the diagnostics."""
         status = self.verdict()
         self.output.verdict(status)
-        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.output.diagnostics(
+            diagnostics_of(status, self.config, self.session, self._inputs, self._transport)
+        )
         self.listener('verdict', status)
 
     def _on_change(self) -> None:
