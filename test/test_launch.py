@@ -66,24 +66,28 @@ def declared_parameters(executable: str) -> dict[str, type]:
     return declared
 
 
-def tables(path: Path, type_: type[ast.expr]) -> list[ast.Dict]:
-    """Return the tables of a launch file whose keys are texts and whose values are of a type."""
-    found = [
-        n for n in ast.walk(ast.parse(path.read_text(encoding='utf-8'))) if isinstance(n, ast.Dict)
-    ]
-    return [n for n in found if n.values and all(isinstance(v, type_) for v in n.values)]
+def tables(path: Path) -> Iterator[dict[str, ast.expr]]:
+    """Yield the tables of a launch file whose keys are texts."""
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Dict):
+            keys = [key.value for key in node.keys if isinstance(key, ast.Constant)]
+            if len(keys) == len(node.values):
+                yield dict(zip(map(str, keys), node.values, strict=True))
+
+
+def typed(path: Path) -> dict[str, str]:
+    """Return the arguments of a launch file that are parameters by its table of types."""
+    found = (t for t in tables(path) if t and all(isinstance(v, ast.Name) for v in t.values()))
+    return {name: ast.unparse(kind) for table in found for name, kind in table.items()}
 
 
 def parameters_of(path: Path) -> dict[str, str]:
     """Return the parameters a launch file may set, each with the name of its type."""
-    given: dict[str, str] = {}
-    for table in tables(path, ast.Call):
-        for key, value in zip(table.keys, table.values, strict=True):
-            if ast.unparse(value).startswith('ParameterValue('):
-                given[ast.literal_eval(key)] = ast.unparse(keywords(value)['value_type'])
-    for table in tables(path, ast.Name):
-        pairs = zip(table.keys, table.values, strict=True)
-        given |= {ast.literal_eval(key): ast.unparse(value) for key, value in pairs}
+    given = typed(path)
+    for table in tables(path):
+        for name, value in table.items():
+            if isinstance(value, ast.Call) and ast.unparse(value.func) == 'ParameterValue':
+                given[name] = ast.unparse(keywords(value)['value_type'])
     return given
 
 
@@ -102,13 +106,11 @@ def test_every_argument_is_declared_and_used(path: Path) -> None:
     """What a launch file takes it uses, and what it uses it takes."""
     declared = first_arguments(path, 'DeclareLaunchArgument')
     literal = {
-        call.args[0].value
+        str(call.args[0].value)
         for call in calls(path, {'LaunchConfiguration'})
         if isinstance(call.args[0], ast.Constant)
     }
-    assert declared == literal | {
-        name for table in tables(path, ast.Name) for name in map(ast.literal_eval, table.keys)
-    }
+    assert declared == literal | typed(path).keys()
 
 
 def defaults(path: Path) -> dict[str, str]:

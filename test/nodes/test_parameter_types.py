@@ -22,8 +22,8 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter, get_parameter_value
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.config.yaml_numbers import with_doubles
 from ugv_acceptance.nodes.parameter_types import Kind, fitted
-from ugv_acceptance.nodes.ros_arguments import with_doubles
 
 MONITOR = 'ugv_acceptance.nodes.monitor.node'
 PLAYER = 'ugv_acceptance.nodes.bag_player'

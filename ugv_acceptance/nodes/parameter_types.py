@@ -8,13 +8,13 @@ ROS tools go on showing a double.
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-import yaml
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.config.yaml_numbers import list_in
 
 Kind = Parameter.Type
 _EXPECTED = {
@@ -90,11 +90,8 @@ def _number(value: Any) -> float:  # noqa: ANN401 - a parameter's value
 def _numbers(value: Any) -> list[float]:  # noqa: ANN401 - a parameter's value
     if isinstance(value, str):
         # So `ros2 param set` sends a list of integers and doubles.
-        try:
-            value = yaml.safe_load(value)
-        except yaml.YAMLError:
-            raise TypeError from None
-        if not isinstance(value, list):
+        value = list_in(value)
+        if value is None:
             raise TypeError
     return [_number(item) for item in _items(value)]
 

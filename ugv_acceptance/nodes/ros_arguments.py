@@ -12,12 +12,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import rclpy
-import yaml
 from rclpy.signals import SignalHandlerOptions
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.config.yaml_numbers import with_doubles
 
-_INTEGER = re.compile(r'[-+]?[0-9]+')
 _VALUE, _FILE = ('-p', '--param'), '--params-file'
 # Where in rcl's own source text an error arose: of no use to who wrote the argument.
 _PLACE = re.compile(r', at \S+:[0-9]+')
@@ -52,43 +51,6 @@ def readable(args: Sequence[str], folder: Path) -> Iterator[str]:
             yield str(copy)
         else:
             yield argument
-
-
-def with_doubles(text: str) -> str:
-    """Return YAML text in which the integers of a list that has doubles too are doubles."""
-    try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError:
-        return text  # rcl says what is wrong with it
-    places = [] if root is None else sorted(set(_integers(root)), reverse=True)
-    for place in places:
-        text = f'{text[:place]}.0{text[place:]}'
-    return text
-
-
-def _integers(node: yaml.Node) -> Iterator[int]:
-    """Yield where the integers end in lists below a node that have integers and doubles."""
-    if isinstance(node, yaml.SequenceNode):
-        whole = [item for item in node.value if _is_integer(item)]
-        if len(whole) < len(node.value) and all(map(_is_number, node.value)):
-            yield from (item.end_mark.index for item in whole)
-    elif isinstance(node, yaml.MappingNode):
-        for _, value in node.value:
-            yield from _integers(value)
-
-
-def _is_integer(node: yaml.Node) -> bool:
-    return _is_number(node) and _INTEGER.fullmatch(node.value) is not None
-
-
-def _is_number(node: yaml.Node) -> bool:
-    if not isinstance(node, yaml.ScalarNode) or node.style is not None:
-        return False
-    try:
-        float(node.value)
-    except ValueError:
-        return False
-    return True
 
 
 def _text_of(path: Path) -> str:
