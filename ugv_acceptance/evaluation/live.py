@@ -70,7 +70,7 @@ class LiveEvaluator:
     `margins` is None while they are unknown: an input is missing, stale or unusable. `watch` holds
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
     newest that could be used; while not `load_known`, the newest declared could not. `ground` says
-    whether the arm touches the ground, `joints` merges joint states.
+    whether the arm touches the ground, `chassis` what its IMU feels, `joints` merges joint states.
     """
 
     settings: Settings
@@ -83,7 +83,7 @@ class LiveEvaluator:
     joints: JointMerger = field(init=False)
     mount: ImuMount = field(init=False)
     _imu: ImuTracker = field(init=False)
-    _chassis: ChassisMotion = field(init=False)
+    chassis: ChassisMotion = field(init=False)
     ground: GroundContact = field(init=False)
     _fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     _posture: Posture | None = None
@@ -101,8 +101,8 @@ class LiveEvaluator:
         self.mount = ImuMount(self.settings, *self.watch.mounting)
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
-        self._chassis = ChassisMotion(placed, self.watch.chassis)
-        self.mount.serve(self._imu, self._chassis.place)
+        self.chassis = ChassisMotion(placed, self.watch.chassis)
+        self.mount.serve(self._imu, self.chassis.place)
         self.ground = GroundContact(self.settings, self._mechanics, self.watch.ground)
         delays = self.settings.delays
         self._fresh = (InputTimeout(delays), InputTimeout(delays))
@@ -173,7 +173,7 @@ class LiveEvaluator:
             return
         self._posture = posture_of(self._mechanics, self.joints.q, load.mass, load.cog)
         self._stances = stances_of(self._mechanics, self._posture)
-        self._chassis.pose = tuple(self.joints.q), load
+        self.chassis.pose = tuple(self.joints.q), load
         self.ground.stands(self.joints.q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
@@ -214,7 +214,7 @@ class LiveEvaluator:
         unknown = omega_covariance_0 == -1.0 or not self._imu.motion.gyro_trusted
         seen = UNWITNESSED if covariance_0 == -1.0 else WITNESSED
         rate = NO_RATE if unknown else seen
-        self._chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
+        self.chassis.step(now, stamp, omega, acceleration, gravity, angles, rate)
         return margins
 
     @property
@@ -226,7 +226,7 @@ class LiveEvaluator:
         if self.margins is None:
             return None
         angles: Any = self.margins.stability.angle
-        return self._chassis.moving(self.margins.gravity, angles)
+        return self.chassis.moving(self.margins.gravity, angles)
 
     def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
         """Take a declared payload (kg, m), in force from the next joint state on.
@@ -349,7 +349,7 @@ class LiveEvaluator:
     def _evaluate(self, now: int, stamp: int) -> Margins | None:
         posture, gravity, until = self._posture, self._gravity, self._alive_until()
         unknown = posture is None or gravity[0] != gravity[0] or now > until
-        stance = self._chassis.stance = None if unknown else standing(self._stances, gravity)
+        stance = self.chassis.stance = None if unknown else standing(self._stances, gravity)
         touch = FREE
         if stance is not None:
             touch = self.ground.step(now, None if self._level else stance.ground_face)
@@ -371,7 +371,7 @@ class LiveEvaluator:
         prediction = self.watch.prediction
         if now >= prediction.due:
             prediction.keep(now, stability.angle, torque, self.joints.effort, q)
-            pose = self._chassis.pose
+            pose = self.chassis.pose
             if pose is not None and not self._level:
                 self.watch.trend.keep(now, stability.angle, q, gravity, pose[1])
         return self.margins

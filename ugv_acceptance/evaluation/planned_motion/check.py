@@ -33,7 +33,14 @@ from ugv_acceptance.evaluation.planned_motion.asked import (
     undefined,
 )
 from ugv_acceptance.evaluation.planned_motion.margins import Margins, columns_of, margins_of
-from ugv_acceptance.evaluation.planned_motion.path import Path, Samples, path_of, samples_of
+from ugv_acceptance.evaluation.planned_motion.path import (
+    MOST_IN_ALL,
+    Path,
+    Samples,
+    path_of,
+    samples_of,
+    steps_of,
+)
 from ugv_acceptance.evaluation.planned_motion.request import Conditions, Trajectory
 from ugv_acceptance.evaluation.rough_ground import cautious_mechanics
 from ugv_acceptance.evaluation.settings import Settings
@@ -85,8 +92,11 @@ class MotionChecker:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]
         knots, jumps = knots_of(self.settings, trajectory, moved, at)
-        path = path_of(knots)
-        samples = samples_of(path, slides_of(self.settings, moved))
+        path, slides = path_of(knots), slides_of(self.settings, moved)
+        moments = int(steps_of(path, slides).sum())
+        if moments > MOST_IN_ALL:
+            return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
+        samples = samples_of(path, slides)
         work = _Work(self, path, samples, moved, start, (conditions.gravity, conditions.payload))
         work.refusals += jumps
         return work.answer(conditions, len(trajectory.times))

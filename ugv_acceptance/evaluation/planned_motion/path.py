@@ -20,6 +20,8 @@ STEP, SLIDE = 0.035, 0.01
 LEAST = {1: 1, 3: 4, 5: 6}
 # Moments at most between two points: more would be no motion of a joint.
 MOST = 4096
+# Moments of a whole motion at most: they take a second and 0.1 GB.
+MOST_IN_ALL = 100_000
 # Time (s) in which a drive takes up another rate.
 CORNER = 0.05
 # Changes of rate (rad/s, m/s) below are rounding.
@@ -122,17 +124,22 @@ def _degrees(knots: Knots) -> NDArray[np.intp]:
     return np.where(all_of, 5, np.where(both, 3, 1)).astype(np.intp)
 
 
+def steps_of(path: Path, slides: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return in how many steps each way (n - 1,) between two knots is looked at."""
+    most = np.where(slides, SLIDE, STEP)
+    travel = 5.0 * np.abs(np.diff(path.hull, axis=1)).max(axis=1, initial=0.0)
+    steps = np.ceil(np.minimum(travel / most, MOST).max(axis=1, initial=0.0)).astype(np.intp)
+    least = np.where(path.degree == 1, LEAST[1], np.where(path.degree == 3, LEAST[3], LEAST[5]))
+    return np.clip(steps, least, MOST)
+
+
 def samples_of(path: Path, slides: NDArray[np.bool_], finer: int = 1) -> Samples:
     """Return the moments to look at; `slides` (m,) says which joints move along their axis.
 
     `finer` times as many between two knots as are needed, for whoever doubts it.
     """
     knots, n = path.knots, len(path.length)
-    most = np.where(slides, SLIDE, STEP)
-    travel = 5.0 * np.abs(np.diff(path.hull, axis=1)).max(axis=1, initial=0.0)
-    steps = np.ceil((travel / most).max(axis=1, initial=0.0)).astype(np.intp)
-    least = np.where(path.degree == 1, LEAST[1], np.where(path.degree == 3, LEAST[3], LEAST[5]))
-    steps = np.clip(steps, least, MOST) * finer
+    steps = steps_of(path, slides) * finer
     counts = steps + 1
     of = np.repeat(np.arange(n), counts)
     first = np.cumsum(counts) - counts

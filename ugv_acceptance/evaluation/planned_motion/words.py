@@ -27,6 +27,14 @@ def when(time: float, point: int, points: int) -> str:
     return f'at {time:.2f} s, on the way to point {point} of {points}'
 
 
+def too_long_words(moments: int, most: int) -> str:
+    """Return that a motion would take too many moments to look at."""
+    return (
+        f'the motion is too long, or goes to and fro too far: {moments:,} moments would have to be '
+        f'looked at, at most {most:,} are; check it in parts'
+    )
+
+
 def tilt_words(tilt: TiltLeft, limit: float, points: int) -> str:
     """Return that a tilt left is at its limit (rad) or past it."""
     told = tipping_words(tilt.side, tilt.angle)
