@@ -4,6 +4,7 @@ Its driver sends what each test needs; every test leaves the robot at rest, told
 """
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -69,7 +70,7 @@ class Site:
     pose: tuple[float, ...] = FOLDED
     sways: bool = False
     silent: bool = False
-    called: int = 0
+    due: float = 0.0
     answers: list[Answer] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -83,35 +84,31 @@ class Site:
 
     def send(self) -> None:
         """Send posture and attitude 25 times a second, never twice the same to the last digit."""
-        self.called += 1
-        if not self.silent and self.called % 4 == 0:
-            lean = math.sin(0.2 * self.called / 4)
+        if not self.silent and time.monotonic() >= self.due:
+            self.due = time.monotonic() + 0.04
+            lean = math.sin(5.0 * self.due)
             self.driver.send(self.pose, (0.1 if self.sways else 1e-4) * lean)
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Spin and send until a condition holds."""
         self.live.until(condition, self.send)
 
-    def of(self, message: JointTrajectory, result: str = '') -> list[Answer]:
-        """Return the answers about a trajectory, those with a result."""
-        found = [a for a in self.answers if a.values['trajectory_sha256'] == name_of(message)]
-        return [a for a in found if result in ('', a.values['result'])]
+    def of(self, message: JointTrajectory, *results: str) -> list[Answer]:
+        """Return what was heard about a trajectory with one of some results."""
+        mine = [a for a in self.answers if a.values['trajectory_sha256'] == name_of(message)]
+        return [a for a in mine if a.values['result'] in results]
 
     def ask(self, message: JointTrajectory) -> Answer:
         """Ask once and return the answer."""
-        before = len(self.of(message))
+        results = ('permitted', 'refused', 'not_known')
+        before = len(self.of(message, *results))
         self.out.publish(message)
-        self.until(lambda: len(self.of(message)) > before)
-        return self.of(message)[before]
+        self.until(lambda: len(self.of(message, *results)) > before)
+        return self.of(message, *results)[before]
 
     def permitted(self, message: JointTrajectory) -> Answer:
         """Ask until the motion is permitted: the robot must have been at rest for a while."""
-        try:
-            self.until(lambda: self.ask(message).values['result'] == 'permitted')
-        except AssertionError:
-            print([a.text for a in self.answers[-5:]], len(self.answers))
-            d = self.monitor.motions; print(d.questions.asked, d.questions.computing, d.questions._computed, d.questions.standing is None, d._timer.is_canceled(), d._timer.time_until_next_call())
-            raise
+        self.until(lambda: self.ask(message).values['result'] == 'permitted')
         return self.of(message, 'permitted')[-1]
 
     def withdrawn(self, message: JointTrajectory) -> Answer:
