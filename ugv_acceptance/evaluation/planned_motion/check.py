@@ -24,11 +24,11 @@ from ugv_acceptance.evaluation.planned_motion.answer import (
 )
 from ugv_acceptance.evaluation.planned_motion.asked import (
     drives,
+    farthest,
     joints_of,
     knots_of,
     not_configured,
     not_known,
-    slides_of,
     standing_joints,
     undefined,
 )
@@ -92,11 +92,11 @@ class MotionChecker:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]
         knots, jumps = knots_of(self.settings, trajectory, moved, at)
-        path, slides = path_of(knots), slides_of(self.settings, moved)
-        moments = int(steps_of(path, slides).sum())
+        path, most = path_of(knots), farthest(self.settings, self.mechanics, moved)
+        moments = int(steps_of(path, most).sum())
         if moments > MOST_IN_ALL:
             return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
-        samples = samples_of(path, slides)
+        samples = samples_of(path, most, conditions.corner)
         work = _Work(self, path, samples, moved, start, (conditions.gravity, conditions.payload))
         work.refusals += jumps
         return work.answer(conditions, len(trajectory.times))
@@ -294,4 +294,4 @@ class _Work:
             self.not_checked.append('the way to the first point: the joints are taken to be there')
         corners = int((self.path.degree == 1).sum())
         if corners and self.path.knots.time[-1] > self.path.knots.time[0]:
-            self.not_checked.append(words.corner_words(corners + 1))
+            self.not_checked.append(words.corner_words(corners + 1, conditions.corner))
