@@ -147,7 +147,7 @@ def test_the_way_passes_its_points_as_they_say(kind: str) -> None:
     time, none = np.array([0.0, 0.7, 1.0, 2.5]), np.full((4, 2), np.nan)
     q, v, a = (rng.normal(size=(4, 2)) for _ in range(3))
     knots = Knots(time, q, none if kind == 'linear' else v, a if kind == 'quintic' else none)
-    seen = samples_of(path_of(knots), np.full(2, 0.035))
+    seen = samples_of(path_of(knots), np.full(3, 20))
     for k in range(3):
         inside = np.flatnonzero((seen.point == k + 2) & (seen.time > time[k]))
         last = inside[np.isclose(seen.time[inside], time[k + 1])][0]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.planned_motion.asked import farthest
 from ugv_acceptance.evaluation.planned_motion.margins import columns_of, margins_of
-from ugv_acceptance.evaluation.planned_motion.path import Knots, path_of, samples_of
+from ugv_acceptance.evaluation.planned_motion.path import Knots, path_of, samples_of, steps_of
 from ugv_acceptance.model.mechanics import mechanics_of
 from ugv_acceptance.model.robot import Payload
 
@@ -34,7 +34,7 @@ def test_a_finer_look_finds_hardly_less(seed: int, degree: int, pace: float, fli
     down = (0.6, -1.2, -math.sqrt(9.81**2 - 1.8))
     worst = []
     for finer in (1, 10):
-        seen = samples_of(path, most, finer=finer)
+        seen = samples_of(path, steps_of(path, most) * finer)
         motion = columns_of(seen, range(count), [0.0, 0.0, 0.0, FOLDED])
         found = margins_of(MECHANICS, motion, len(seen.time), down, Payload(2.0, (0.0, 0.0, 0.0)))
         worst.append((found.angle.min(), *np.abs(found.torque).max(axis=1)[:3]))

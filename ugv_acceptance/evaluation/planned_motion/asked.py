@@ -15,7 +15,6 @@ from ugv_acceptance.evaluation.planned_motion.path import CARRYING, SLIDE, STEP,
 from ugv_acceptance.evaluation.planned_motion.request import Conditions, Trajectory
 from ugv_acceptance.evaluation.settings import CONTACTS, Settings
 from ugv_acceptance.model.mechanics import Mechanics
-from ugv_acceptance.model.roles import roles_of
 from ugv_acceptance.type_aliases import Floats
 
 # A motion that begins at once may begin so far (rad, m) from where the joints stand: encoders.
@@ -123,7 +122,8 @@ def standing_joints(
         return [], [f'the posture has {len(given)} positions: expected {len(names)}']
     q = list(given) or [math.nan] * len(names)
     missing = []
-    turning = turning_of(robot)
+    known = given and all(map(math.isfinite, given))
+    turning = [] if known else turning_of(robot)
     for j, position in enumerate(q):
         if math.isfinite(position) or (j in moved and conditions.from_first_point):
             continue
@@ -139,9 +139,8 @@ def standing_joints(
     return q, []
 
 
-def drives(settings: Settings, moved: Sequence[int]) -> list[str]:
+def drives(settings: Settings, moved: Sequence[int], wheels: Sequence[str]) -> list[str]:
     """Return a sentence if the trajectory turns wheels: the base then does not stand still."""
-    wheels = roles_of(settings.robot).wheels
     names = [settings.robot.joint_names[j] for j in moved]
     turned = [name for name in names if name in wheels]
     return [f'{_listed(turned)} drives the robot: the base is to stand still'] if turned else []

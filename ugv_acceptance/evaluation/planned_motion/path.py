@@ -72,19 +72,15 @@ class Samples:
 class Path:
     """A motion: polynomials `powers` (n - 1, 6, m) of the share of the way between two knots.
 
-    `length` (n - 1,) s is the time from knot to knot, `degree` (n - 1,) that of the polynomial.
+    `length` (n - 1,) s is the time from knot to knot, `degree` (n - 1,) that of the polynomial. The
+    motion stays between the least and the largest of the positions `hull` (n - 1, 6, m).
     """
 
     knots: Knots
     powers: Floats
     length: Floats
     degree: NDArray[np.intp]
-
-    @property
-    def hull(self) -> Floats:
-        """Positions (n - 1, 6, m) between whose least and largest the motion stays."""
-        found: Floats = _BERNSTEIN @ self.powers
-        return found
+    hull: Floats
 
 
 def path_of(knots: Knots) -> Path:
@@ -113,7 +109,8 @@ def path_of(knots: Knots) -> Path:
         )
         for k, part in enumerate(shape5, start=1):
             powers[quintic, k] = part[quintic]
-    return Path(knots, powers, length, degree)
+    hull: Floats = _BERNSTEIN @ powers
+    return Path(knots, powers, length, degree, hull)
 
 
 def _degrees(knots: Knots) -> NDArray[np.intp]:
@@ -136,15 +133,13 @@ def steps_of(path: Path, most: Floats) -> NDArray[np.intp]:
 
 
 def samples_of(
-    path: Path, most: Floats, corner: float = CORNER, finer: int = 1
+    path: Path, steps: NDArray[np.intp], corner: float = CORNER
 ) -> Samples:
-    """Return the moments to look at; each joint moves by `most` (m,) at most from one to the next.
+    """Return the moments to look at, given in how many `steps` (n - 1,) to go from knot to knot.
 
-    A drive takes up another rate within `corner` (s). `finer` times as many moments between two
-    knots as are needed, for whoever doubts it.
+    A drive takes up another rate within `corner` (s).
     """
     knots, n = path.knots, len(path.length)
-    steps = steps_of(path, most) * finer
     counts = steps + 1
     of = np.repeat(np.arange(n), counts)
     first = np.cumsum(counts) - counts
