@@ -9,12 +9,20 @@ from rich.console import Console
 from rich.markup import escape
 
 from ugv_acceptance.cli.completion import poses_like
-from ugv_acceptance.cli.options import GroundKinds, PayloadMass, RobotFile
+from ugv_acceptance.cli.options import (
+    CONTEXT,
+    GroundKinds,
+    PayloadMass,
+    RobotFile,
+    ros_arguments,
+)
 
 if TYPE_CHECKING:
     from ugv_acceptance.config import Config
     from ugv_acceptance.evaluation.planned_motion import CheckedMotion, Conditions, Trajectory
     from ugv_acceptance.evaluation.planned_motion.answer import JointUse, TiltLeft
+
+__all__ = ['CONTEXT', 'check']
 
 VERSION = 1
 # Exit codes by verdict.
@@ -22,6 +30,7 @@ CODES = {'PERMITTED': 0, 'REFUSED': 1, 'NOT_KNOWN': 3}
 
 
 def check(
+    context: typer.Context,
     trajectory: Annotated[
         Path,
         typer.Argument(
@@ -59,6 +68,9 @@ def check(
         str, typer.Option(help='Which of a topic: the last one at that time, such as 12.5s.')
     ] = '',
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not text.')] = False,
+    live: Annotated[
+        bool, typer.Option('--live', help='Ask the running monitor: the robot as it stands now.')
+    ] = False,
 ) -> None:
     """May the arm move so? Judges a planned motion before the robot carries it out.
 
@@ -75,16 +87,25 @@ def check(
       ugv-acceptance check reach.yaml --tilt roll=10deg,pitch=-5deg
       ugv-acceptance check reach.yaml -c my_robot.yaml --ground stairs
       ugv-acceptance check run/ --topic /arm_controller/joint_trajectory
+      ugv-acceptance check reach.yaml --live --ros-args -r __ns:=/robot1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
     from ugv_acceptance.cli.check_request import conditions_of, ground_kind, trajectory_of
     from ugv_acceptance.cli.robot_description import payload_doubts, warn
     from ugv_acceptance.config import load
     from ugv_acceptance.evaluation.planned_motion import check_motion
 
+    options = {'posture': posture, 'tilt': tilt, 'payload': payload, 'at': at}
+    ros_args = ros_arguments(context)
+    if live or ros_args:
+        from ugv_acceptance.cli.check_live import check_live
+
+        entered = [name for name, given in options.items() if given]
+        entered += ['config'] * (config is not None) + ['ground'] * bool(ground)
+        planned = trajectory_of(trajectory, topic, when)
+        raise typer.Exit(check_live(planned, ros_args, entered, live=live, as_json=as_json))
     kind = ground_kind(ground)
     loaded = load(config)
     planned = trajectory_of(trajectory, topic, when)
-    options = {'posture': posture, 'tilt': tilt, 'payload': payload, 'at': at}
     conditions = conditions_of(loaded.settings, planned, options, kind)
     warn(payload_doubts(loaded.settings.robot, payload))
     found = check_motion(loaded.settings, planned, conditions)

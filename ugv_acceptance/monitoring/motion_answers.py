@@ -147,7 +147,7 @@ def _least_words(checked: CheckedMotion) -> str:
 
 
 def _joined(sentences: Iterable[str]) -> str:
-    return '; '.join(sentences)
+    return ' | '.join(sentences)
 
 
 def _cut(text: str, most: int) -> str:
