@@ -3,42 +3,17 @@
 import hashlib
 import struct
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 import pytest
-from bag.bag_cases import STORE
+from bag.trajectories import encoded, trajectory
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.bag.trajectory import FIELDS, MOST_POINTS, TYPE, trajectory_from
+from ugv_acceptance.bag.trajectory import FIELDS, MOST_POINTS, trajectory_from
 
-POINT, T = STORE.types['trajectory_msgs/msg/JointTrajectoryPoint'], STORE.types
 FLOATS = st.floats(allow_nan=False, width=64)
-
-
-def trajectory(
-    rows: list[list[float]], given_fields: tuple[str, ...] = ('positions',), sec: int = 5
-) -> Any:
-    """Return a message of rosbags: `rows` (n, m) are the numbers of each field that is given."""
-    empty = np.empty(0)
-    points = [
-        POINT(
-            *(np.array(row) if field in given_fields else empty for field in FIELDS),
-            time_from_start=T['builtin_interfaces/msg/Duration'](sec=k, nanosec=7 * k),
-        )
-        for k, row in enumerate(rows)
-    ]
-    stamp = T['builtin_interfaces/msg/Time'](sec=sec, nanosec=1)
-    header = T['std_msgs/msg/Header'](stamp=stamp, frame_id='äh')
-    names = [f'joint_{"x" * j}' for j in range(len(rows[0]))] if rows else ['a']
-    return T[TYPE](header=header, joint_names=names, points=points)
-
-
-def encoded(message: Any, *, little: bool = True) -> bytes:
-    """Serialise a message of rosbags."""
-    return bytes(STORE.serialize_cdr(message, TYPE, little_endian=little))
 
 
 @given(
@@ -68,7 +43,7 @@ def test_a_trajectory_is_named_by_its_contents_alone() -> None:
     """Not by header, byte order or gaps; any other number gives another name."""
     rows = [[1.0, 2.0], [3.0, 4.0]]
     name = trajectory_from(encoded(trajectory(rows))).sha256
-    later = encoded(trajectory(rows, sec=6), little=False) + b'accidental'
+    later = encoded(trajectory(rows, stamp=6), little=False) + b'accidental'
     assert trajectory_from(later).sha256 == name
     plain = b'joint_\0joint_x\0'
     for time, row in ((0, rows[0]), (10**9 + 7, rows[1])):

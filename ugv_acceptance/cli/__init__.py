@@ -44,6 +44,7 @@ VERBS = (
     'run',
     'simulate',
     'drill',
+    'check',
     'model',
     'map',
     'paper',

@@ -31,6 +31,8 @@ LEVELS = {PERMITTED: OK, REFUSED: ERROR, NOT_KNOWN: STALE, WITHDRAWN: STALE, EXP
 # Name of the statuses; seconds within which a permitted motion has to begin.
 NAME, VALID = 'Planned motion', 2.0
 VALID_NS = int(VALID * 1e9)
+# Letters of a sentence in an answer.
+LONGEST = 300
 # What no input of the monitor tells.
 STANDS = 'that the robot stands still is seen by its IMU and its joints alone'
 
@@ -50,14 +52,14 @@ class Asked:
     ) -> Status:
         """Return an answer; its message is the first of the reasons."""
         more = f' (and {len(reasons) - 1} more)' if len(reasons) > 1 else ''
-        text = f'{result.replace("_", " ")}: {reasons[0]}{more}'
+        text = f'{result.replace("_", " ")}: {_cut(reasons[0], LONGEST)}{more}'
         own: dict[str, object] = {
             'result': result,
             'trajectory_sha256': self.sha256,
             'stamp_ns': self.stamp,
             'valid_until_ns': 0,
             'valid_s': 0.0,
-            'reasons': _joined(reasons),
+            'reasons': _cut(_joined(reasons), 10 * LONGEST),
         }
         return Status(LEVELS[result], NAME, text, own | (values or {}))
 
@@ -145,4 +147,10 @@ def _least_words(checked: CheckedMotion) -> str:
 
 
 def _joined(sentences: Iterable[str]) -> str:
-    return '; '.join(sentences)
+    return ' | '.join(sentences)
+
+
+def _cut(text: str, most: int) -> str:
+    """Return a text in one line, at most so long: a number in a message may have 300 digits."""
+    line = ' '.join(text.split())
+    return line if len(line) <= most else f'{line[: most - 3]}...'

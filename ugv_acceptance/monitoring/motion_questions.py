@@ -95,7 +95,12 @@ class MotionQuestions:
     @property
     def busy(self) -> bool:
         """Whether `look` has something to do: a question or a permission."""
-        return self._waiting is not None or self._computed is not None or bool(self.standing)
+        return self.computing or self.standing is not None
+
+    @property
+    def computing(self) -> bool:
+        """Whether a question is not answered yet."""
+        return self._waiting is not None or self._computed is not None
 
     def ask(self, question: Question) -> list[Status]:
         """Take a question; return the answers that can be given at once."""
@@ -123,9 +128,9 @@ class MotionQuestions:
             return
         question, self._waiting = self._waiting, None
         session, load_by = self.session(), self.load_by()
-        reasons, result = tuple(missing(session, load_by)), NOT_KNOWN
-        if session is not None and not reasons:
-            reasons, result = tuple(dangers(session)), REFUSED
+        reasons, result = tuple(dangers(session)), REFUSED
+        if not reasons:
+            reasons, result = tuple(missing(session, load_by)), NOT_KNOWN
         then = None if session is None or reasons else situation_of(session, load_by)
         if self._pool is None:
             self._pool = ThreadPoolExecutor(1, thread_name_prefix='planned_motion')

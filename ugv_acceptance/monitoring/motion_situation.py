@@ -122,8 +122,13 @@ def _untold(settings: Settings, load_by: str) -> Iterator[str]:
         yield 'the arm may touch the ground (hand_may_touch), so no torque is known'
 
 
-def dangers(session: Session) -> Iterator[str]:
-    """Yield in sentences why nothing may move now: what the monitor shows as DANGER."""
+def dangers(session: Session | None) -> Iterator[str]:
+    """Yield in sentences why nothing may move now: what the monitor shows as DANGER.
+
+    Nothing where it shows NO DATA: `missing` says that.
+    """
+    if session is None or session.level == STALE:
+        return
     for alert in session.active:
         if alert.rule.level == ERROR:
             words = session.faults.sentence(alert, session.settings)

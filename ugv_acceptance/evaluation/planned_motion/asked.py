@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.ground import KINDS
 from ugv_acceptance.evaluation.inputs.turns import turning_of
-from ugv_acceptance.evaluation.planned_motion.path import Knots
+from ugv_acceptance.evaluation.planned_motion.path import CARRYING, SLIDE, STEP, Knots
 from ugv_acceptance.evaluation.planned_motion.request import Conditions, Trajectory
 from ugv_acceptance.evaluation.settings import CONTACTS, Settings
-from ugv_acceptance.model.roles import roles_of
+from ugv_acceptance.model.mechanics import Mechanics
 from ugv_acceptance.type_aliases import Floats
 
 # A motion that begins at once may begin so far (rad, m) from where the joints stand: encoders.
@@ -95,6 +95,8 @@ def not_known(settings: Settings, conditions: Conditions) -> Iterator[str]:
         yield 'the configuration does not say which link carries the payload'
     if conditions.ground is not None and conditions.ground not in KINDS:
         yield f'the ground is {conditions.ground!r}: expected one of {", ".join(KINDS)}'
+    if not conditions.corner > 0.0:
+        yield f'the drives take {conditions.corner:g} s for another rate: expected more than 0 s'
     if not conditions.at_rest:
         yield 'the robot moves already: a motion is checked from rest'
 
@@ -120,7 +122,8 @@ def standing_joints(
         return [], [f'the posture has {len(given)} positions: expected {len(names)}']
     q = list(given) or [math.nan] * len(names)
     missing = []
-    turning = turning_of(robot)
+    known = given and all(map(math.isfinite, given))
+    turning = [] if known else turning_of(robot)
     for j, position in enumerate(q):
         if math.isfinite(position) or (j in moved and conditions.from_first_point):
             continue
@@ -136,9 +139,8 @@ def standing_joints(
     return q, []
 
 
-def drives(settings: Settings, moved: Sequence[int]) -> list[str]:
+def drives(settings: Settings, moved: Sequence[int], wheels: Sequence[str]) -> list[str]:
     """Return a sentence if the trajectory turns wheels: the base then does not stand still."""
-    wheels = roles_of(settings.robot).wheels
     names = [settings.robot.joint_names[j] for j in moved]
     turned = [name for name in names if name in wheels]
     return [f'{_listed(turned)} drives the robot: the base is to stand still'] if turned else []
@@ -184,6 +186,14 @@ def slides_of(settings: Settings, moved: Sequence[int]) -> NDArray[np.bool_]:
     """Return which joints (m,) of a trajectory move along their axis."""
     robot = settings.robot
     return np.array([robot.joint(robot.joint_names[j]).slides for j in moved], np.bool_)
+
+
+def farthest(settings: Settings, mechanics: Mechanics, moved: Sequence[int]) -> Floats:
+    """Return how far each joint (m,) of a trajectory may move between two moments (rad, m)."""
+    carrying = {joint for joint, _ in mechanics.carried}
+    part = np.array([CARRYING if j in carrying else 1.0 for j in moved])
+    most: Floats = part * np.where(slides_of(settings, moved), SLIDE, STEP)
+    return most
 
 
 def _with_start(knots: Knots, at: Floats) -> Knots:

@@ -24,11 +24,11 @@ from ugv_acceptance.evaluation.planned_motion.answer import (
 )
 from ugv_acceptance.evaluation.planned_motion.asked import (
     drives,
+    farthest,
     joints_of,
     knots_of,
     not_configured,
     not_known,
-    slides_of,
     standing_joints,
     undefined,
 )
@@ -47,6 +47,7 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.clearance import nearness_of
 from ugv_acceptance.model.mechanics import Mechanics, mechanics_of
 from ugv_acceptance.model.robot import Joint, Payload, Vector
+from ugv_acceptance.model.roles import roles_of
 from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import INVERTED, NO_CONTACT, SIDES, STATES, UNKNOWN
 from ugv_acceptance.type_aliases import Floats
@@ -73,9 +74,11 @@ class MotionChecker:
 
     settings: Settings
     mechanics: Mechanics = field(init=False)
+    wheels: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         self.mechanics = mechanics_of(self.settings.robot)
+        self.wheels = roles_of(self.settings.robot).wheels
 
     def check(self, trajectory: Trajectory, conditions: Conditions) -> CheckedMotion:
         """Return whether the robot may carry out a motion under these conditions."""
@@ -87,16 +90,17 @@ class MotionChecker:
             names = ', '.join(unknown[:4])
             return CheckedMotion(NOT_KNOWN, (f'{names}: no joint that the robot is known by',))
         start, missing = standing_joints(self.settings, conditions, moved)
-        missing += [*not_known(self.settings, conditions), *drives(self.settings, moved)]
+        missing += [*not_known(self.settings, conditions), *drives(self.settings, moved, self.wheels)]
         if missing or conditions.gravity is None or conditions.payload is None:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]
         knots, jumps = knots_of(self.settings, trajectory, moved, at)
-        path, slides = path_of(knots), slides_of(self.settings, moved)
-        moments = int(steps_of(path, slides).sum())
+        path, most = path_of(knots), farthest(self.settings, self.mechanics, moved)
+        steps = steps_of(path, most)
+        moments = int(steps.sum())
         if moments > MOST_IN_ALL:
             return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
-        samples = samples_of(path, slides)
+        samples = samples_of(path, steps, conditions.corner)
         work = _Work(self, path, samples, moved, start, (conditions.gravity, conditions.payload))
         work.refusals += jumps
         return work.answer(conditions, len(trajectory.times))
@@ -294,4 +298,4 @@ class _Work:
             self.not_checked.append('the way to the first point: the joints are taken to be there')
         corners = int((self.path.degree == 1).sum())
         if corners and self.path.knots.time[-1] > self.path.knots.time[0]:
-            self.not_checked.append(words.corner_words(corners + 1))
+            self.not_checked.append(words.corner_words(corners + 1, conditions.corner))

@@ -2,9 +2,10 @@
 
 As joint_trajectory_controller has it: between two points that both have accelerations and rates
 along a polynomial of degree 5, with rates of degree 3, else straight. A joint moves by no more
-than STEP (SLIDE) between two moments. Where the rate changes at once, a drive takes some time for
-it: a critically damped position servo of natural frequency w, which is given the positions, at
-most e / w of the change a second (0.37 w). CORNER is that time for 50 rad/s, rounded down.
+than STEP (SLIDE) between two moments, one that carries contact points (a flipper, on which the
+margin hangs more steeply) by a part of it. Where the rate changes at once, a drive takes some time for
+it: a position servo of natural frequency w that is damped at least critically, and is given the
+positions, accelerates by at most the change over 2 / w.
 """
 
 from dataclasses import dataclass
@@ -12,18 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.evaluation.planned_motion.request import CORNER
 from ugv_acceptance.type_aliases import Floats
 
-# The most a joint moves between two moments: rad, m.
-STEP, SLIDE = 0.035, 0.01
+# The most a joint moves between two moments: rad, m; and the part of it of one that carries.
+STEP, SLIDE, CARRYING = 0.035, 0.01, 0.1
 # Moments at least between two points, by degree of the polynomial.
 LEAST = {1: 1, 3: 4, 5: 6}
 # Moments at most between two points: more would be no motion of a joint.
 MOST = 4096
 # Moments of a whole motion at most: they take a second and 0.1 GB.
 MOST_IN_ALL = 100_000
-# Time (s) in which a drive takes up another rate.
-CORNER = 0.05
 # Changes of rate (rad/s, m/s) below are rounding.
 _SMALL = 1e-9
 # Bernstein's form of a polynomial of degree 5, from its powers.
@@ -72,19 +72,15 @@ class Samples:
 class Path:
     """A motion: polynomials `powers` (n - 1, 6, m) of the share of the way between two knots.
 
-    `length` (n - 1,) s is the time from knot to knot, `degree` (n - 1,) that of the polynomial.
+    `length` (n - 1,) s is the time from knot to knot, `degree` (n - 1,) that of the polynomial. The
+    motion stays between the least and the largest of the positions `hull` (n - 1, 6, m).
     """
 
     knots: Knots
     powers: Floats
     length: Floats
     degree: NDArray[np.intp]
-
-    @property
-    def hull(self) -> Floats:
-        """Positions (n - 1, 6, m) between whose least and largest the motion stays."""
-        found: Floats = _BERNSTEIN @ self.powers
-        return found
+    hull: Floats
 
 
 def path_of(knots: Knots) -> Path:
@@ -113,7 +109,8 @@ def path_of(knots: Knots) -> Path:
         )
         for k, part in enumerate(shape5, start=1):
             powers[quintic, k] = part[quintic]
-    return Path(knots, powers, length, degree)
+    hull: Floats = _BERNSTEIN @ powers
+    return Path(knots, powers, length, degree, hull)
 
 
 def _degrees(knots: Knots) -> NDArray[np.intp]:
@@ -124,22 +121,25 @@ def _degrees(knots: Knots) -> NDArray[np.intp]:
     return np.where(all_of, 5, np.where(both, 3, 1)).astype(np.intp)
 
 
-def steps_of(path: Path, slides: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return in how many steps each way (n - 1,) between two knots is looked at."""
-    most = np.where(slides, SLIDE, STEP)
+def steps_of(path: Path, most: Floats) -> NDArray[np.intp]:
+    """Return in how many steps each way (n - 1,) between two knots is looked at.
+
+    `most` (m,) is how far each joint may move in one.
+    """
     travel = 5.0 * np.abs(np.diff(path.hull, axis=1)).max(axis=1, initial=0.0)
     steps = np.ceil(np.minimum(travel / most, MOST).max(axis=1, initial=0.0)).astype(np.intp)
     least = np.where(path.degree == 1, LEAST[1], np.where(path.degree == 3, LEAST[3], LEAST[5]))
     return np.clip(steps, least, MOST)
 
 
-def samples_of(path: Path, slides: NDArray[np.bool_], finer: int = 1) -> Samples:
-    """Return the moments to look at; `slides` (m,) says which joints move along their axis.
+def samples_of(
+    path: Path, steps: NDArray[np.intp], corner: float = CORNER
+) -> Samples:
+    """Return the moments to look at, given in how many `steps` (n - 1,) to go from knot to knot.
 
-    `finer` times as many between two knots as are needed, for whoever doubts it.
+    A drive takes up another rate within `corner` (s).
     """
     knots, n = path.knots, len(path.length)
-    steps = steps_of(path, slides) * finer
     counts = steps + 1
     of = np.repeat(np.arange(n), counts)
     first = np.cumsum(counts) - counts
@@ -147,7 +147,7 @@ def samples_of(path: Path, slides: NDArray[np.bool_], finer: int = 1) -> Samples
     q, v, a = _at(path, of, share)
     time = knots.time[:-1][of] + share * path.length[of]
     inside = Samples(time, q, v, a, knots.first + 1 + of)
-    return _joined(inside, _corners(path, inside, first, counts))
+    return _joined(inside, _corners(path, inside, (first, counts), corner))
 
 
 def _at(path: Path, of: NDArray[np.intp], share: Floats) -> tuple[Floats, Floats, Floats]:
@@ -166,13 +166,17 @@ def _at(path: Path, of: NDArray[np.intp], share: Floats) -> tuple[Floats, Floats
 
 
 def _corners(
-    path: Path, inside: Samples, first: NDArray[np.intp], counts: NDArray[np.intp]
+    path: Path,
+    inside: Samples,
+    of: tuple[NDArray[np.intp], NDArray[np.intp]],
+    corner: float,
 ) -> Samples:
     """Return the moments at which rates change at once: before it and after it.
 
     At first the joints stand, and in the end they stop: both are looked at too. Changes within
-    CORNER of each other add up.
+    `corner` (s) of each other add up. `of` are each way's first moment and number of moments.
     """
+    first, counts = of
     knots, last = path.knots, first + counts - 1
     still = np.zeros((1, inside.rate.shape[1]))
     before = np.concatenate((still, inside.rate[last]))
@@ -180,8 +184,8 @@ def _corners(
     change = after - before
     change[np.abs(change) < _SMALL] = 0.0
     total = np.concatenate((still, np.cumsum(change, axis=0)))
-    end = np.searchsorted(knots.time, knots.time + CORNER, side='left')
-    burst = (total[end] - total[:-1]) / CORNER
+    end = np.searchsorted(knots.time, knots.time + corner, side='left')
+    burst = (total[end] - total[:-1]) / corner
     at = np.flatnonzero((change != 0.0).any(axis=1))
     rows = np.concatenate((at, at, [0, len(knots.time) - 1]))
     rest = np.zeros((2, still.shape[1]))

@@ -6,6 +6,10 @@ from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.type_aliases import Floats
 
 
+# Time (s) in which a drive takes up another rate: 2 / w of a position servo of w = 40 rad/s.
+CORNER = 0.05
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """A planned motion, as trajectory_msgs/JointTrajectory has it.
@@ -34,6 +38,7 @@ class Conditions:
     q; NaN where a joint's is not known, () where none is. `at_rest` says whether base and arm
     stand still. With `from_first_point` the joints of the trajectory are taken to stand at its
     first point already, whatever `posture` says of them: only where a person asks, never live.
+    `corner` (s) is how long the drives take for a change of rate that the points ask for at once.
     """
 
     gravity: Vector | None
@@ -42,3 +47,4 @@ class Conditions:
     posture: tuple[float, ...] = ()
     at_rest: bool = True
     from_first_point: bool = False
+    corner: float = CORNER

@@ -11,7 +11,6 @@ from ugv_acceptance.evaluation.margin_words import (
     tipping_words,
 )
 from ugv_acceptance.evaluation.planned_motion.answer import JointUse, TiltLeft
-from ugv_acceptance.evaluation.planned_motion.path import CORNER
 from ugv_acceptance.model.robot import Joint
 
 # What no answer covers, whatever is asked.
@@ -67,11 +66,11 @@ def rate_words_of(joint: Joint, rate: float, place: str) -> str:
     return f'{joint.name} is to move at {told} {place}: it can move at {limit}'
 
 
-def corner_words(count: int) -> str:
-    """Return how corners of a path were judged."""
+def corner_words(count: int, corner: float) -> str:
+    """Return how corners of a path were judged, by a time (s)."""
     return (
         f'{count} changes of rate at once, as between points without velocities: each is taken '
-        f'to last {CORNER:g} s; a stiffer drive needs more torque'
+        f'to last {corner:g} s; a stiffer drive needs more torque'
     )
 
 

@@ -21,7 +21,7 @@ from ugv_acceptance.nodes.monitor.publishers import StatusOutput, status_message
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 
 # Seconds between two looks at questions and permissions; there are none while there is neither.
-PERIOD = 0.02
+PERIOD = 0.05
 # Questions that wait in the middleware, the newest; answers that wait for a client.
 QUESTIONS, ANSWERS = 10, 50
 # The parameter that tells a payload.
