@@ -1,4 +1,4 @@
-"""What `record` costs and what it loses: `python -m bench.bench_record` (a minute; more with kills).
+"""What `record` costs and loses: `python -m bench.bench_record` (two minutes; more with kills).
 
 For 200 + 400 and 1000 + 1000 messages a second: processor time against that of a process that only
 subscribes, messages lost. With `--kills N`, kill -9 at random moments: seconds lost before the kill
@@ -67,17 +67,19 @@ def under_load(
     process: 'subprocess.Popen[bytes]', joints: int, imu: int, seconds: float
 ) -> tuple[float, list[int]]:
     """Publish for a while; return the share of a processor a process took, and what was sent."""
-    words = [str(HERE / 'live_load.py'), str(joints), str(imu), str(seconds)]
-    with child(*words) as load:
-        # It waits for its listeners, and another second.
-        before, began = 0.0, 0.0
-        while load.poll() is None and not (began and time.monotonic() - began >= seconds):
-            time.sleep(0.2)
-            if not began and cpu(load.pid) > 1.0:
-                before, began = cpu(process.pid), time.monotonic()
-        spent, took = cpu(process.pid) - before, time.monotonic() - began
+    settle(process)
+    before = cpu(process.pid)
+    with child(str(HERE / 'live_load.py'), str(joints), str(imu), str(seconds)) as load:
         out, _ = load.communicate()
-    return spent / took, json.loads(out)
+    return (cpu(process.pid) - before) / seconds, json.loads(out)
+
+
+def settle(process: 'subprocess.Popen[bytes]') -> None:
+    """Wait until a process has come up: it takes next to nothing while nothing comes."""
+    time.sleep(3.0)
+    before = cpu(process.pid)
+    while time.sleep(1.0) or cpu(process.pid) - before > 0.05:
+        before = cpu(process.pid)
 
 
 def killed(times: int, split: str, seed: int) -> bool:

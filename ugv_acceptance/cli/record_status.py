@@ -101,12 +101,11 @@ class Lines:
 
     def draw(self, heard: 'Sequence[TopicState]') -> None:
         """Print what is due."""
-        cautions = self._progress.cautions(heard)
-        for text in cautions:
-            if (what := _without_numbers(text)) not in self._cautions:
-                self._cautions.add(what)
+        cautions = {_without_numbers(text): text for text in self._progress.cautions(heard)}
+        for what, text in cautions.items():
+            if what not in self._cautions:
                 self.tell(text)
-        self._cautions &= set(map(_without_numbers, cautions))
+        self._cautions = set(cautions)
         if self._progress.seconds < self._due:
             return
         self._due = self._progress.seconds + self._every
