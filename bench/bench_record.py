@@ -45,33 +45,31 @@ def main() -> None:
 
 
 def cost(joints: int, imu: int, seconds: float) -> str:
-    """Return a row: CPU of both processes, their ratio, messages sent and recorded."""
+    """Return a row: CPU of both processes at the same time, their ratio, messages sent and not."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'run'
-        with child(str(HERE / 'live_listener.py'), 'raw') as process:
-            plain, _ = under_load(process, joints, imu, seconds)
-        with child('-c', CODE, 'record', '--out', str(path)) as process:
+        with (
+            child(str(HERE / 'live_listener.py'), 'raw') as listener,
+            child('-c', CODE, 'record', '--out', str(path)) as recorder,
+        ):
             until(path.is_dir)
-            busy, sent = under_load(process, joints, imu, seconds)
-            process.terminate()
-            process.wait()
+            both = listener, recorder
+            for process in both:
+                settle(process)
+            before = [cpu(process.pid) for process in both]
+            words = [str(HERE / 'live_load.py'), str(joints), str(imu), str(seconds)]
+            with child(*words) as load:
+                sent = sum(json.loads(load.communicate()[0]))
+            now = [cpu(process.pid) for process in both]
+            recorder.terminate()
+            recorder.wait()
         bag = open_bag(path)
         held = sum(bag.topics[name].count for name in INPUTS)
+    plain, busy = ((b - a) / seconds for a, b in zip(before, now, strict=True))
     return (
         f'{joints:5d} + {imu:<5d}{100 * plain:12.1f} %{100 * busy:8.1f} %{busy / plain:9.2f}'
-        f'{sum(sent):8d}{held:12d}{sum(sent) - held:11d}'
+        f'{sent:8d}{held:12d}{sent - held:11d}'
     )
-
-
-def under_load(
-    process: 'subprocess.Popen[bytes]', joints: int, imu: int, seconds: float
-) -> tuple[float, list[int]]:
-    """Publish for a while; return the share of a processor a process took, and what was sent."""
-    settle(process)
-    before = cpu(process.pid)
-    with child(str(HERE / 'live_load.py'), str(joints), str(imu), str(seconds)) as load:
-        out, _ = load.communicate()
-    return (cpu(process.pid) - before) / seconds, json.loads(out)
 
 
 def settle(process: 'subprocess.Popen[bytes]') -> None:
