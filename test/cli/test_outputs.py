@@ -48,7 +48,10 @@ FILES = {
     ('drill', '--out'): '.json',
 }
 MAPS = ('.svg', '.png', '.csv', '.npz')
-FOLDERS = {('campaign', '--out'), ('paper', '--out'), ('simulate', '--bag'), ('run', '--out')}
+FOLDERS = {
+    ('campaign', '--out'), ('paper', '--out'), ('simulate', '--bag'), ('run', '--out'),
+    ('record', '--out'),
+}  # fmt: skip
 # Paths that verbs read; whatever else is a path is written, and stands in one of the tables above.
 READ = {
     'config', 'urdf', 'bag', 'bags', 'criteria', 'result_file', 'failures', 'mission', 'existing',
@@ -170,7 +173,7 @@ def test_no_verb_has_an_output_that_is_not_asked_about_here(name: str) -> None:
     told = {option for of, option in (*FILES, *FOLDERS) if of == name and option != '-o'}
     assert paths == told
     # A recording is never replaced, so those that only record cannot be asked to.
-    assert ('overwrite' in hints) == bool(told and name not in {'simulate', 'run'})
+    assert ('overwrite' in hints) == bool(told and name not in {'simulate', 'run', 'record'})
 
 
 @pytest.mark.parametrize('spelling', ['itself', 'dotted', 'symbolic link', 'hard link'])
@@ -319,6 +322,7 @@ def test_an_ending_that_does_not_fit_is_told(
         ['paper', '--out', 'flat'],
         ['campaign', 'run', '--out', 'flat'],
         ['simulate', 'gentle', '--bag', 'flat'],
+        ['record', '--out', 'flat'],
         ['run', 'mine.yaml', '--sim', '--fast', '--out', 'flat'],
     ],
 )

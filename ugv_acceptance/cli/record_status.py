@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+import typer
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.markup import escape
@@ -100,12 +101,11 @@ class Lines:
 
     def draw(self, heard: 'Sequence[TopicState]') -> None:
         """Print what is due."""
-        cautions = self._progress.cautions(heard)
-        for text in cautions:
-            if (what := _without_numbers(text)) not in self._cautions:
-                self._cautions.add(what)
+        cautions = {_without_numbers(text): text for text in self._progress.cautions(heard)}
+        for what, text in cautions.items():
+            if what not in self._cautions:
                 self.tell(text)
-        self._cautions &= set(map(_without_numbers, cautions))
+        self._cautions = set(cautions)
         if self._progress.seconds < self._due:
             return
         self._due = self._progress.seconds + self._every
@@ -165,14 +165,15 @@ def print_summary(
 ) -> None:
     """Print what was recorded, what is missing of it, and the command that judges it."""
     total = sum(topic.messages for topic in heard)
-    say(console, escape(f'{folder}: {total:,} messages in {progress.head()}'))
+    typer.echo(f'Recorded {folder}')  # whole, however long: it is to be copied
+    say(console, escape(f'{total:,} messages in {progress.head()}'))
     if total:
         print_table(console, topics_table(heard, over=True))
     for text in [t.missing.replace('no message yet', 'no message came') for t in heard]:
         if text:
             say(console, f'{CAUTION} {escape(text)}')
     if total:
-        say(console, escape(f'Judge it: ugv-acceptance evaluate {shlex.quote(str(folder))}'))
+        typer.echo(f'Judge it: ugv-acceptance evaluate {shlex.quote(str(folder))}')
 
 
 def _without_numbers(text: str) -> str:

@@ -98,8 +98,8 @@ class RecorderNode(Node):
     def _full(self, name: str) -> str:
         try:
             return self.resolve_topic_name(name)
-        except InvalidTopicNameException as error:
-            why = ' '.join(str(error).split())
+        except (InvalidTopicNameException, RuntimeError, ValueError) as error:
+            why = ' '.join(str(error).split()).partition(', at /')[0]
             raise BadConfig(f'--topics {name}: expected the name of a topic: {why}') from None
 
     def _wanted(self, topics: Topics) -> Iterable[Wanted]:
