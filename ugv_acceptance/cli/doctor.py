@@ -13,7 +13,7 @@ from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_argume
 from ugv_acceptance.cli.terminal_output import console_of, said_of_work, say
 
 if TYPE_CHECKING:
-    from ugv_acceptance.nodes.doctor.checks import Finding
+    from ugv_acceptance.inspection.heard import Finding
 
 COLOURS = {'OK': 'bold green', 'CAUTION': 'bold yellow', 'FAIL': 'bold red'}
 FINE, AILING = 0, 1
