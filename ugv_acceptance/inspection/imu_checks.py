@@ -6,6 +6,7 @@ from statistics import fmean, median
 
 from ugv_acceptance.bag.cdr import ImuSample
 from ugv_acceptance.config import Config
+from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.inputs.imu_mount import NAMELESS, mounted
 from ugv_acceptance.evaluation.margin_words import rate_words
 from ugv_acceptance.evaluation.settings import UNKNOWN as UNPLACED
@@ -53,8 +54,8 @@ def check_imu(heard: Heard, config: Config) -> Iterator[Finding]:
         if size > g / 2:
             yield _mounting(up)
         yield from _orientation(samples, imu, found.rotation, up, known=abs(size - g) <= 0.15 * g)
-    expected, frames = config.topics.imu.frame_id, {sample.frame_id for sample in samples}
-    if expected is not None and frames != {expected}:
+    expected, frames = config.topics.imu.frame_id, {sample.frame_id for sample in heard.samples}
+    if expected is not None and not all(same_frame(frame, expected) for frame in frames):
         text = f'frame_id is {", ".join(sorted(frames)) or "empty"}, expected {expected}'
         yield Finding(WARN, 'imu frame', text, 'check that this is the IMU whose mounting is given')
 
