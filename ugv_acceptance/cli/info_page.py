@@ -13,6 +13,8 @@ from ugv_acceptance.type_aliases import Json
 
 # Lines of the screen, one of them for the next prompt; topics shown; sentences, characters of one.
 SCREEN, TOPICS, MOST, LONGEST = 23, 5, 3, 134
+# Columns of a page; a name is shortened to no less than this.
+WIDE, NARROW = 80, 12
 STORAGES = {'mcap': 'MCAP', 'sqlite3': 'SQLite', 'ros1': 'ROS 1 bag'}
 GUARDED = {
     'all': 'every chunk has a checksum',
@@ -21,6 +23,8 @@ GUARDED = {
 }
 INPUTS = {'joint_states': 'joints', 'imu': 'imu', 'payload': 'payload'}
 KB = 1000.0
+# A rate (Hz) that no topic has.
+SILLY = 1e5
 
 
 def print_info(told: Json, asked: Sequence[Path], console: Console, *, verbose: bool) -> None:
@@ -100,7 +104,11 @@ def _topics(topics: Sequence[Json], *, verbose: bool) -> list[str]:
     heads = ('topic', 'type', 'messages', 'Hz', 'gap', 'QoS', 'taken for')
     rows = [heads, *(_row(one) for one in shown)]
     if not verbose:
-        rows = [(_cut(row[0], 26), _cut(row[1], 16), *row[2:]) for row in rows]
+        others = [max(len(row[k]) for row in rows) for k in range(2, len(heads))]
+        room = WIDE - sum(others) - 2 * len(heads)
+        kinds = min(max(len(row[1]) for row in rows), max(room // 2, NARROW))
+        names = max(room - kinds, NARROW)
+        rows = [(_cut(row[0], names), _cut(row[1], kinds), *row[2:]) for row in rows]
     widths = [max(len(row[k]) for row in rows) for k in range(len(heads))]
     right = {2, 3, 4}
     lines = [
@@ -128,7 +136,7 @@ def _row(one: Json) -> tuple[str, ...]:
         one['name'],
         kind.rpartition('/')[2] + ('' if one['encoding'] == 'cdr' else f' ({one["encoding"]})'),
         str(one['messages']),
-        '-' if rate is None else f'{rate:.3g}' if rate < KB else f'{rate:.0f}',
+        '-' if rate is None else f'{rate:.0f}' if KB <= rate < SILLY else f'{rate:.3g}',
         '-' if gap is None else _seconds(gap),
         _qos_words(one['qos']),
         INPUTS.get(one['used_as'] or '', ''),
@@ -144,8 +152,9 @@ def _qos_words(profiles: Sequence[Json]) -> str:
     for one in profiles:
         text = 'best effort' if one['reliability'] == 'best_effort' else 'reliable'
         words.append(text + (', latched' if one['durability'] == 'transient_local' else ''))
-    found = dict.fromkeys(words)
-    return ' / '.join(found) + (f' ({len(words)}x)' if len(words) > 1 else '')
+    found = list(dict.fromkeys(words))
+    text = found[0] if len(found) == 1 else f'{len(found)} kinds' if found else ''
+    return text + (f', {len(words)}x' if len(words) > 1 else '')
 
 
 def _robot(told: Json, *, verbose: bool) -> Iterable[Sentence]:

@@ -20,6 +20,8 @@ from ugv_acceptance.monitoring.session import IMU_FIELDS, JOINT_FIELDS
 CLOCK_SLACK = 1.0
 # The slowest input (Hz) that leaves time to react.
 SLOWEST = 10.0
+# Findings after which the direction of gravity is not known, and so no static torque.
+OF_GRAVITY = ('imu gravity', 'imu mounting', 'imu orientation')
 # Efforts are looked at this often (ns).
 LOOK = 200_000_000
 # What is said of an input that the configuration does not use.
@@ -56,6 +58,7 @@ def check_inputs(
         ('joint_states', joints, check_joints),
         ('imu', imu, check_imu),
     )
+    misled = False
     for name, heard, look in looks:
         if heard is None:
             yield Finding(OK, name, ABSENT[name])
@@ -63,9 +66,10 @@ def check_inputs(
         yield from of_topic(name, heard)
         if heard.publishers:
             yield from _messages(name, heard, seconds)
-        if heard.samples:
-            yield from look(heard, config)
-    if joints is not None:
+        found = list(look(heard, config)) if heard.samples else []
+        yield from found
+        misled = misled or any(one.level == FAIL and one.about in OF_GRAVITY for one in found)
+    if joints is not None and not misled:
         yield from _efforts(joints, imu, config)
 
 
@@ -116,7 +120,8 @@ def _messages(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:
     if heard.malformed:
         text = f'{len(heard.malformed)} messages cannot be decoded: {heard.malformed[-1]}'
         yield Finding(FAIL, name, text, 'check the version of the message type at the publisher')
-    yield from _rate(name, heard, seconds)
+    if heard.times or not heard.malformed:
+        yield from _rate(name, heard, seconds)
 
 
 def _rate(name: str, heard: Heard, seconds: float) -> Iterator[Finding]:

@@ -1,10 +1,12 @@
 """The checks of `doctor` on a recording: its files, its topics, its messages, what they mean."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import partial
 
 from ugv_acceptance import BadSample
+from ugv_acceptance.bag.log_times import LogTimes, log_times_of
 from ugv_acceptance.bag.raw import Offered, offered_by_all
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.recording import Recording
@@ -56,15 +58,15 @@ def examine_recording(
     joints, imu = heard.get('joint_states'), heard.get('imu')
     hear(part, _there(joints), _there(imu), config.settings.imu)
     seen = look(recording, config, everything=everything, reached=reached)
-    of_topic = partial(_of_topic, bag, config, used)
-    seconds = part.duration_s
+    of_topic = partial(_of_topic, config, used, log_times_of(bag))
     found = [
         *_of_files(bag),
         *check_description(_told(recording, config), config),
         *check_configuration(config),
-        *check_inputs(joints, imu, config, of_topic, seconds),
-        *_of_evaluation(seen),
+        *check_inputs(joints, imu, config, of_topic, part.duration_s),
     ]
+    silent = {name for name, one in heard.items() if not one.times}
+    found += _of_evaluation(seen, silent, [one.seen for one in found])
     return Checked(tuple(dict.fromkeys(found)), seen.until_s)
 
 
@@ -114,9 +116,12 @@ def _of_files(bag: Bag) -> Iterator[Finding]:
 
 
 def _of_topic(
-    bag: Bag, config: Config, used: dict[str, Chosen], name: str, heard: Heard
+    config: Config,
+    used: dict[str, Chosen],
+    times: dict[str, LogTimes],
+    name: str,
+    heard: Heard,
 ) -> Iterator[Finding]:
-    del bag
     if used[name].topic is None:
         yield Finding(FAIL, name, used[name].why)
         return
@@ -131,23 +136,27 @@ def _of_topic(
     if len(heard.publishers) > 1:
         text = f'{heard.topic} had {len(heard.publishers)} publishers when it was recorded'
         yield Finding(WARN, name, text, 'stop all but one')
+    back = times[heard.topic].backwards if heard.topic in times else 0
+    if back:
+        text = f'log times of {heard.topic} go back by up to {back / 1e9:.3g} s'
+        yield Finding(WARN, name, text, "do not set the recorder's clock while it records")
 
 
-def _of_evaluation(seen: Look) -> Iterator[Finding]:
-    """Yield what the evaluation of a recording found wrong with its inputs."""
+def _of_evaluation(
+    seen: Look, silent: AbstractSet[str], known: Collection[str]
+) -> Iterator[Finding]:
+    """Yield what the evaluation of a recording found wrong with its inputs.
+
+    `silent` are inputs without a message, `known` what was said already.
+    """
     if seen.judged is None:
-        path = seen.whole.paths[0]
-        yield Finding(FAIL, 'evaluation', seen.obstacle.removeprefix(f'{path}: '))
+        text = seen.obstacle.removeprefix(f'{seen.whole.paths[0]}: ')
+        text = text.partition('; the bag holds:')[0]
+        if text not in known:
+            yield Finding(FAIL, 'evaluation', text)
         return
     result = seen.judged.result
-    told = set()
-    for alert in result['alerts']:
-        key = alert['code'], alert['subject']
-        if alert['code'] in FAILURES or alert['doubtful'] or key in told or not _of_input(alert):
-            continue
-        told.add(key)
-        level = FAIL if level_words(alert['level']) == 'DANGER' else WARN
-        yield Finding(level, f'{alert["subject"]} {alert["code"]}', _when(alert), alert['advice'])
+    yield from _of_alerts(result['alerts'], silent)
     said = {alert['message'] for alert in result['alerts']}
     for one in result['safeguards']:
         if one['name'] in ABOUT_INPUTS:
@@ -159,6 +168,19 @@ def _of_evaluation(seen: Look) -> Iterator[Finding]:
             yield Finding(WARN, one['what'], one['why'], do)
         elif one['what'].startswith(NOTED):
             yield Finding(OK, one['what'], one['why'])
+
+
+def _of_alerts(alerts: Iterable[Json], silent: AbstractSet[str]) -> Iterator[Finding]:
+    """Yield the first alert of each kind that is about an input."""
+    told = set()
+    for alert in alerts:
+        key = alert['code'], alert['subject']
+        known = key in told or (alert['code'] == 'INPUT_STALE' and alert['subject'] in silent)
+        if known or alert['code'] in FAILURES or alert['doubtful'] or not _of_input(alert):
+            continue
+        told.add(key)
+        level = FAIL if level_words(alert['level']) == 'DANGER' else WARN
+        yield Finding(level, f'{alert["subject"]} {alert["code"]}', _when(alert), alert['advice'])
 
 
 def _of_input(alert: Json) -> bool:
