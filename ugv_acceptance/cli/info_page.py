@@ -80,7 +80,7 @@ def _recording(told: Json, *, verbose: bool) -> Iterable[Sentence]:
     shown = odd if verbose else odd[:2]
     yield from ((f'[yellow]{escape(_short(text, verbose=verbose))}[/]', 2) for text in shown)
     if len(odd) > len(shown):
-        yield f'and {len(odd) - len(shown)} more findings about the files', 2
+        yield f'and {len(odd) - len(shown)} more about the files', 2
 
 
 def size_words(size: int) -> str:
