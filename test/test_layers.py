@@ -17,7 +17,7 @@ MODULES = sorted(PACKAGE.rglob('*.py'))
 BELOW_OFFLINE = {'model', 'studies', 'evaluation', 'config', 'bag', 'monitoring', 'report'}
 BELOW_RUN = BELOW_OFFLINE | {'offline', 'simulation', 'plan', 'campaign', 'processes'}
 BELOW_DRILL = BELOW_RUN | {'run', 'console'}
-BELOW_NODES = BELOW_DRILL | {'configure', 'drill'}
+BELOW_NODES = BELOW_DRILL | {'configure', 'drill', 'inspection'}
 MAY_IMPORT: dict[str, set[str]] = {
     # The front door: for types, and when a name is first used.
     '__init__': {'bag', 'config', 'model', 'monitoring', 'offline'},
@@ -33,6 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     'simulation': {'model', 'processes'},
     'report': {'model', 'studies', 'evaluation'},
     'offline': BELOW_OFFLINE,
+    'inspection': BELOW_OFFLINE | {'offline'},
     'campaign': BELOW_OFFLINE | {'offline', 'processes'},
     'console': BELOW_OFFLINE | {'offline'},
     'plan': {'model', 'studies', 'evaluation', 'config', 'report'},

@@ -137,11 +137,19 @@ def test_the_quality_of_service_is_that_of_the_recorder(tmp_path: Path) -> None:
 
 
 def test_metadata_of_any_kind_is_survived(tmp_path: Path) -> None:
-    """Where metadata.yaml says nothing useful, nothing is known."""
+    """Where metadata.yaml says nothing useful, the file's own word holds."""
     path = tmp_path / 'run'
     with BagWriter(path) as writer:
-        writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos())
+        writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos('best_effort'))
     bag = open_bag(path)
     for text in ('', '[]', 'rosbag2_bagfile_information: 3', '{', 'a: &a [*a]', '[' * 800):
         (path / 'metadata.yaml').write_text(text)
-        assert offered(bag) == {}
+        assert offered(bag) == {'/a': Offered('best_effort')}
+
+
+def test_a_file_alone_tells_the_quality_of_service(tmp_path: Path) -> None:
+    """Taken out of its folder, an MCAP file still says what its publishers offered."""
+    with BagWriter(tmp_path / 'run') as writer:
+        writer.add_topic('/a', 'sensor_msgs/msg/Imu', Qos('best_effort', 'transient_local'))
+    alone = (tmp_path / 'run' / 'run_0.mcap').rename(tmp_path / 'alone.mcap')
+    assert offered(open_bag(alone)) == {'/a': Offered('best_effort', 'transient_local')}

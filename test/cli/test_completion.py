@@ -67,6 +67,19 @@ def test_a_configuration_of_this_folder_is_offered_too(
     assert bash('model --config ', monkeypatch) == [*SHIPPED, 'mine.yaml']
 
 
+@pytest.mark.parametrize('verb', ['info', 'doctor'])
+def test_recordings_are_offered(verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """rosbag2 folders and files of recordings, and with a slash the folders on the way to others."""
+    monkeypatch.chdir(tmp_path)
+    for name in ('run1/metadata.yaml', 'runs/day/run2.mcap', 'run.mcap', 'run.yaml', '.run.mcap'):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).touch()
+    assert bash(f'{verb} ru', monkeypatch) == ['run.mcap', 'run1', 'runs/']
+    assert bash(f'{verb} runs/d', monkeypatch) == ['runs/day/']
+    assert bash(f'{verb} runs/day/', monkeypatch) == ['runs/day/run2.mcap']
+    assert bash(f'{verb} nowhere/', monkeypatch) == []
+
+
 @pytest.mark.skipif(not SCRIPT.exists(), reason='by colcon the script is elsewhere: the first test')
 def test_the_installed_script_answers_zsh(tmp_path: Path) -> None:
     """By the variables that its completion script sets."""

@@ -39,6 +39,7 @@ EVALUATE = {
 }
 FILES = {
     **{('evaluate', option): ending for option, ending in EVALUATE.items()},
+    ('info', '--json'): '.json',
     ('plan', '--out'): '.yaml',
     ('plan', '-o'): '.yml',
     ('plan', '--card'): '.html',
@@ -122,6 +123,14 @@ GIVEN: dict[str, tuple[list[str], dict[str, str]]] = {
             'the URDF': 'packbot.urdf',
             'the criteria': 'site.yaml',
             'the identity': 'who.yaml',
+        },
+    ),
+    'info': (
+        ['run', '-c', 'robot.yaml'],
+        {
+            'the recording': 'run/packbot_pass_0.mcap',
+            'the configuration': 'robot.yaml',
+            'the URDF': 'packbot.urdf',
         },
     ),
     'plan': (

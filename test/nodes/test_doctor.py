@@ -19,9 +19,10 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.settings import Untold
+from ugv_acceptance.inspection.heard import FAIL, OK, WARN, Finding, Heard, Told
 from ugv_acceptance.model.statics import static_torque
-from ugv_acceptance.nodes.doctor.checks import FAIL, OK, WARN, Finding, examine
-from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings, Told
+from ugv_acceptance.nodes.doctor.checks import examine
+from ugv_acceptance.nodes.doctor.probe import Surroundings
 
 CONFIG = load()
 URDF = CONFIG.urdf_text.decode()

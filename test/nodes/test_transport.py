@@ -9,7 +9,7 @@ from nodes.live_case import Live
 from nodes.test_doctor import healthy
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from ugv_acceptance.nodes.doctor.checks import OK, WARN, Finding
+from ugv_acceptance.inspection.heard import OK, WARN, Finding
 from ugv_acceptance.nodes.doctor.network import network
 from ugv_acceptance.nodes.doctor.probe import Surroundings
 from ugv_acceptance.nodes.executor import LOOPBACK, PROFILES, RANGE, TRANSPORT, choose_transport

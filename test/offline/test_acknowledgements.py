@@ -9,7 +9,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.bag.writer import BagWriter
-from ugv_acceptance.offline.acknowledgements import TYPE, add_acknowledgements
+from ugv_acceptance.bag.statuses import TYPE
+from ugv_acceptance.offline.acknowledgements import add_acknowledgements
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 S = 10**9

@@ -14,6 +14,7 @@ import zstandard
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.gather import LEAD, SLACK, Bytes, Offsets
 from ugv_acceptance.bag.lz4_frame import Lz4
+from ugv_acceptance.type_aliases import Times
 
 FOOTER, MESSAGE, CHUNK, MESSAGE_INDEX, DATA_END = 2, 5, 6, 7, 15
 MAX_CHUNK_BYTES = 64 << 20
@@ -191,8 +192,8 @@ def log_times(data: Bytes, offsets: Offsets) -> Offsets:
     return every[offsets].astype(np.int64)
 
 
-def indexed(data: bytes | memoryview, channel: int) -> Offsets | None:
-    """Return the message offsets in a MessageIndex record; None if it is not one of `channel`."""
+def _entries(data: bytes | memoryview, channel: int) -> Offsets | None:
+    """Return log time (ns) and offset, in turn, of a MessageIndex record; None if it is another."""
     if len(data) < 15:
         return None
     opcode, length, found = _MESSAGE.unpack_from(data)
@@ -201,7 +202,21 @@ def indexed(data: bytes | memoryview, channel: int) -> Offsets | None:
         return None
     if 15 + size > len(data):
         return None
-    offsets = np.frombuffer(data, '<i8', size // 8, 15)[1::2].astype(np.int64)
+    return np.frombuffer(data, '<i8', size // 8, 15)
+
+
+def indexed_times(data: bytes | memoryview, channel: int) -> Times | None:
+    """Return the log times (n,) in ns in a MessageIndex record; None if it is not one of it."""
+    entries = _entries(data, channel)
+    return None if entries is None else entries[::2].astype(np.int64)
+
+
+def indexed(data: bytes | memoryview, channel: int) -> Offsets | None:
+    """Return the message offsets in a MessageIndex record; None if it is not one of `channel`."""
+    entries = _entries(data, channel)
+    if entries is None:
+        return None
+    offsets = entries[1::2].astype(np.int64)
     if offsets.size and (offsets[0] < 0 or (offsets[1:] <= offsets[:-1]).any()):
         offsets = np.unique(offsets)
         offsets = offsets[offsets >= 0]

@@ -37,12 +37,17 @@ class ForeignIndex:
 def open_sqlite(path: Path, name: str) -> ForeignIndex:
     """Read the index of an SQLite bag; BadBag if it is not readable. `name` is for errors."""
     with _sqlite_errors(name), closing(_connect(path)) as db:
-        topics = db.execute('SELECT id, name, type, serialization_format FROM topics')
-        channels = {int(i): Channel(int(i), str(n), str(t), str(s)) for i, n, t, s in topics}
-        counts = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
-        held = {int(i): int(n) for i, n in counts}
+        held = {str(row[1]) for row in db.execute('PRAGMA table_info(topics)')}
+        qos = 'offered_qos_profiles' if 'offered_qos_profiles' in held else "''"
+        topics = db.execute(f'SELECT id, name, type, serialization_format, {qos} FROM topics')  # noqa: S608 (one of two words)
+        channels = {
+            int(i): Channel(int(i), str(n), str(t), str(s), qos=str(q or ''))
+            for i, n, t, s, q in topics
+        }
+        found = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
+        counts = {int(i): int(n) for i, n in found}
         first, last = db.execute('SELECT min(timestamp), max(timestamp) FROM messages').fetchone()
-    return ForeignIndex(channels, held, int(first or 0), int(last or 0))
+    return ForeignIndex(channels, counts, int(first or 0), int(last or 0))
 
 
 def _connect(path: Path) -> sqlite3.Connection:
@@ -98,6 +103,27 @@ def _ros1_messages(path: Path, wanted: Collection[int]) -> Iterator[_Message]:
 
 
 _MESSAGES = {'sqlite3': _sqlite_messages, 'ros1': _ros1_messages}
+
+
+def foreign_times(storage: str, path: Path, name: str) -> Iterator[tuple[int, list[int]]]:
+    """Yield channels with log times (ns) of their messages, in the order of the file.
+
+    A channel may come several times. BadBag where the file cannot be read.
+    """
+    if storage == 'ros1':
+        try:
+            with Ros1Reader(path) as reader:
+                yield from ((i, [e.time for e in held]) for i, held in reader.indexes.items())
+        except Exception as error:  # rosbags raises anything for a broken file
+            raise BadBag(f'{name}: not a readable ROS 1 bag ({error})') from error
+        return
+    with _sqlite_errors(name), closing(_connect(path)) as db:
+        rows = db.execute('SELECT topic_id, timestamp FROM messages ORDER BY id')
+        while block := rows.fetchmany(_BLOCK):
+            held = dict[int, list[int]]()
+            for channel, time in block:
+                held.setdefault(int(channel), []).append(int(time))
+            yield from held.items()
 
 
 def foreign_messages(

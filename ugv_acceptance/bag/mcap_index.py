@@ -27,6 +27,8 @@ from ugv_acceptance.bag.chunks import (
 MAGIC = b'\x89MCAP0\r\n'
 # Key of a channel's metadata that says where its messages come from, and its one value.
 ORIGIN, SIMULATED = 'origin', 'simulated'
+# That of the quality of service which its publishers offered.
+QOS = 'offered_qos_profiles'
 UNKNOWN = '?'  # the type of a channel whose schema was not found
 _FOOTER_BYTES = 29 + len(MAGIC)
 _MAX_SUMMARY_BYTES = 1 << 30
@@ -36,7 +38,8 @@ _MAX_SUMMARY_BYTES = 1 << 30
 class Channel:
     """A channel of one file: topic, ROS type ('' if it has no schema), encoding of messages.
 
-    `origin` is what its metadata say its messages come from, '' where they say nothing.
+    `origin` is what its metadata say its messages come from, `qos` what its publishers offered (as
+    YAML): '' where they say nothing.
     """
 
     id: int
@@ -44,6 +47,7 @@ class Channel:
     type: str
     encoding: str
     origin: str = ''
+    qos: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +116,7 @@ def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int,
                     schemas.get(channel.schema_id, UNKNOWN) if channel.schema_id else '',
                     channel.message_encoding,
                     channel.metadata.get(ORIGIN, ''),
+                    channel.metadata.get(QOS, ''),
                 )
         except BadBag as error:  # noqa: PERF203 (one garbled record spoils no other)
             index.findings.append(str(error))

@@ -3,6 +3,7 @@
 import heapq
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -22,6 +23,8 @@ from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
 
 _HEADER = 31  # bytes of a Message record before its content
+# What YAML that is none of QoS raises.
+_ODD = (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
 
 
 class Logged(NamedTuple):
@@ -138,8 +141,20 @@ def _cdr(store: Typestore, data: bytes, kind: str) -> bytes | None:
 
 
 def offered(bag: Bag) -> dict[str, Offered]:
-    """Return the recorded QoS by topic, from metadata.yaml; topics without it are missing."""
-    found: dict[str, Offered] = {}
+    """Return the recorded QoS by topic, that of the first of its publishers if there were several.
+
+    Topics of which neither the file nor metadata.yaml tells it are missing.
+    """
+    return {topic: profiles[0] for topic, profiles in offered_by_all(bag).items()}
+
+
+def offered_by_all(bag: Bag) -> dict[str, tuple[Offered, ...]]:
+    """Return the recorded QoS by topic: one of each publisher; metadata.yaml before the file."""
+    found: dict[str, tuple[Offered, ...]] = {}
+    for channel in (c for member in bag.members for c in member.index.channels.values()):
+        with suppress(*_ODD):
+            if profiles := _all_offered(channel.qos):
+                found[channel.topic] = profiles
     for folder in {path.parent for path in bag.paths}:
         path = folder / NAME
         if path.is_file():
@@ -147,19 +162,21 @@ def offered(bag: Bag) -> dict[str, Offered]:
     return found
 
 
-def _profiles(text: str) -> dict[str, Offered]:
+def _profiles(text: str) -> dict[str, tuple[Offered, ...]]:
     found = {}
-    try:
+    # The reader has reported what is wrong with it.
+    with suppress(*_ODD):
         info = yaml.safe_load(text)['rosbag2_bagfile_information']
         for topic in info.get('topics_with_message_count') or ():
             metadata = topic['topic_metadata']
-            profiles = metadata.get('offered_qos_profiles')
-            profiles = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
-            if profiles:
-                found[str(metadata['name'])] = _offered(profiles[0])
-    except (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, RecursionError):
-        return found  # the reader has reported what is wrong with it
+            if profiles := _all_offered(metadata.get('offered_qos_profiles')):
+                found[str(metadata['name'])] = profiles
     return found
+
+
+def _all_offered(profiles: Any) -> tuple[Offered, ...]:  # noqa: ANN401 - YAML's
+    held = yaml.safe_load(profiles) if isinstance(profiles, str) else profiles
+    return tuple(_offered(profile) for profile in held or ())
 
 
 def _offered(profile: dict[str, Any]) -> Offered:

@@ -7,7 +7,7 @@ import hashlib
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,8 @@ class Bag:
     `start_ns` and `end_ns` are the first and last log time. `protected` says whether all, part or
     none of its chunks have a checksum; `salvaged` is a sentence if a file breaks off, else None;
     `findings` are sentences about what is odd. What only reading can find is in `Reading.facts`.
-    `promised` is the number of messages by topic according to metadata.yaml.
+    `promised` is the number of messages by topic according to metadata.yaml. Of a `beginning`,
+    `until_ns` is the last log time that is read.
     """
 
     paths: tuple[Path, ...]
@@ -74,6 +75,7 @@ class Bag:
     members: tuple[Member, ...] = field(repr=False)
     _hash: list[str] = field(default_factory=list, repr=False, compare=False)
     promised: dict[str, int] = field(default_factory=dict)
+    until_ns: int | None = None
 
     @property
     def duration_s(self) -> float:
@@ -97,6 +99,15 @@ class Bag:
             self._hash.append(one.hex())
         return self._hash[0]
 
+    def beginning(self, until_ns: int) -> 'Bag':
+        """Return the recording as if it ended at a log time (ns); nothing after it is read.
+
+        Its numbers of messages and findings are those of the whole. Its SHA-256 is '', since that
+        would read all of it.
+        """
+        cut = None if until_ns >= self.end_ns else until_ns
+        return replace(self, end_ns=min(until_ns, self.end_ns), until_ns=cut, _hash=[''])
+
     def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
         """Read the messages of `topics` as an iterator of batches in order of log time.
 
@@ -106,7 +117,7 @@ class Bag:
         chosen = ((JOINT_STATE, topics.joint_states), (IMU, topics.imu), (PAYLOAD, topics.payload))
         wanted = {name: kind for kind, name in chosen if name is not None}
         counts = {name: topic.count for name, topic in self.topics.items()}
-        return Reading(self.members, wanted, counts, workers)
+        return Reading(self.members, wanted, counts, workers, self.until_ns)
 
 
 def open_bag(

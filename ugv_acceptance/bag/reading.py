@@ -4,7 +4,7 @@ import os
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
@@ -149,7 +149,8 @@ class Reading(Iterator[Batch]):
     """An iterator over the batches of a recording by log time; `facts` is what was found so far.
 
     Within a batch a topic's messages are grouped by chunk, by names, and by which arrays they hold:
-    each group is in file order, groups are in order of their first message.
+    each group is in file order, groups are in order of their first message. Nothing is read beyond
+    the log time `until` (ns).
     """
 
     def __init__(
@@ -158,7 +159,9 @@ class Reading(Iterator[Batch]):
         topics: dict[str, Kind[Any]],
         expected: dict[str, int],
         workers: int | None = None,
+        until: int | None = None,
     ) -> None:
+        self._until = until
         self._members = members
         self._topics = topics
         self._expected = expected
@@ -193,11 +196,24 @@ class Reading(Iterator[Batch]):
 
     def _batches(self) -> Generator[Batch, None, None]:
         mcap = all(isinstance(member.index, McapIndex) for member in self._members)
-        for work, until in self._mcap() if mcap else self._foreign():
-            self._add(work)
-            if batch := self._sequencer.push(work.columns, until):
-                yield batch
+        with closing(self._mcap() if mcap else self._foreign()) as parts:
+            for work, until in parts:
+                self._add(work)
+                columns, end = self._up_to_end(work.columns, until)
+                if batch := self._sequencer.push(columns, end):
+                    yield batch
+                if end is None:
+                    break
         self._conclude()
+
+    def _up_to_end(
+        self, columns: list[Columns], until: int | None
+    ) -> tuple[list[Columns], int | None]:
+        """Return columns and the log time (ns) of what comes next, without what is not wanted."""
+        if self._until is None:
+            return columns, until
+        kept = [part for whole in columns for part in _split(whole, self._until + 1)[0]]
+        return kept, None if until is None or until > self._until else until
 
     def _add(self, work: Piecework) -> None:
         for topic, count in work.counts.items():
@@ -209,7 +225,7 @@ class Reading(Iterator[Batch]):
 
     def _conclude(self) -> None:
         for topic, count in self._total.counts.items():
-            if count != self._expected.get(topic, 0):
+            if self._until is None and count != self._expected.get(topic, 0):
                 self._total.findings.append(
                     f'{topic}: the index counts {self._expected.get(topic, 0)} messages, '
                     f'{count} were read'
@@ -225,7 +241,7 @@ class Reading(Iterator[Batch]):
             )
         self._complete = True
 
-    def _foreign(self) -> Iterator[tuple[Piecework, int | None]]:
+    def _foreign(self) -> Generator[tuple[Piecework, int | None], None, None]:
         spans = [member.span() or (0, 0) for member in self._members]
         order = sorted(range(len(spans)), key=lambda i: spans[i])
         for place, i in enumerate(order):
@@ -238,7 +254,7 @@ class Reading(Iterator[Batch]):
                 yield work, min([last, *later])
         yield Piecework(), None
 
-    def _mcap(self) -> Iterator[tuple[Piecework, int | None]]:
+    def _mcap(self) -> Generator[tuple[Piecework, int | None], None, None]:
         """Yield each piece's decoded work by first log time, with that of the next piece (ns)."""
         with ExitStack() as stack:
             sources = []

@@ -30,6 +30,7 @@ COMPLETE = '_UGV_ACCEPTANCE'
 VERBS = (
     'demo',
     'init',
+    'info',
     'evaluate',
     'verify',
     'campaign',

@@ -33,6 +33,8 @@ SCENARIOS = (
     *('gentle', 'overreach', 'fetch', 'work', 'tilt', 'swing', 'reach', 'grasp', 'snatch'),
     *('dash', 'climb', *(f'fault-{name}' for name in FAULTS)),
 )
+# Ends of the names of recordings.
+RECORDINGS = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
 # Ids and groups of steps in a plan's YAML.
 _STEP = re.compile(r'^\s*(?:- )?(?:id|group): *[\'"]?([^\s\'"]+)', re.MULTILINE)
 
@@ -68,6 +70,28 @@ def shipped_configs() -> list[str]:
     ros = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
     shares += [Path(prefix, 'share', 'ugv_acceptance') for prefix in ros]
     return sorted({file.stem for share in shares for file in share.glob('msg_configs/*.yaml')})
+
+
+def recordings_like(incomplete: str) -> list[str]:
+    """Return recordings that begin so, with the folders on the way to others."""
+    place, _, begun = incomplete.rpartition('/')
+    folder = Path(place or ('/' if incomplete.startswith('/') else '.'))
+    before = incomplete.removesuffix(begun)
+    try:
+        held = sorted(path for path in folder.iterdir() if not path.name.startswith('.'))
+    except OSError:
+        return []
+    found = (before + path.name + _end_of(path) for path in held if _leads_to(path))
+    return _begin(found, incomplete)
+
+
+def _leads_to(path: Path) -> bool:
+    return path.is_dir() or path.name.lower().endswith(RECORDINGS)
+
+
+def _end_of(path: Path) -> str:
+    """Return a slash after a folder that is no recording itself."""
+    return '/' if path.is_dir() and not (path / 'metadata.yaml').exists() else ''
 
 
 def poses_like(context: typer.Context, incomplete: str) -> list[str]:

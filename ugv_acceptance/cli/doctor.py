@@ -1,4 +1,4 @@
-"""`ugv-acceptance doctor`: checks a ROS set-up and says what to do."""
+"""`ugv-acceptance doctor [BAG]`: checks a ROS set-up, or a recording, and says what to do."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -9,11 +9,12 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from ugv_acceptance.cli.completion import recordings_like
 from ugv_acceptance.cli.options import CONTEXT, ConfigFile, UrdfFile, ros_arguments
-from ugv_acceptance.cli.terminal_output import console_of, said_of_work, say
+from ugv_acceptance.cli.terminal_output import console_of, progress, said_of_work, say
 
 if TYPE_CHECKING:
-    from ugv_acceptance.nodes.doctor.checks import Finding
+    from ugv_acceptance.inspection.heard import Finding
 
 COLOURS = {'OK': 'bold green', 'CAUTION': 'bold yellow', 'FAIL': 'bold red'}
 FINE, AILING = 0, 1
@@ -21,6 +22,24 @@ _NO_ROS = (
     'no rclpy: source /opt/ros/jazzy/setup.bash, or install the wheels: '
     'pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp ros-jazzy-common-interfaces'
 )
+
+
+def read(bag: Path, config: Path | None, urdf: Path | None, *, everything: bool) -> int:
+    """Print the findings about a recording and return the exit code: 1 if any has failed."""
+    from ugv_acceptance.bag.recording import open_recording
+    from ugv_acceptance.inspection.recorded import examine_recording
+    from ugv_acceptance.offline.own_robot import robot_of
+
+    recording = open_recording(bag)
+    robot = robot_of(recording, config, urdf=urdf)
+    with progress('reading', recording.duration_s) as reached:
+        checked = examine_recording(
+            recording, robot, everything=everything, reached=lambda seconds: reached(seconds, '')
+        )
+    if checked.until_s is not None:
+        text = f'The first {checked.until_s:.0f} s were read; --all reads the rest.'
+        say(said_of_work(), text)
+    return _print(checked.findings)
 
 
 def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[str]) -> int:
@@ -37,7 +56,12 @@ def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[s
     loaded = load_live(config, urdf, args)
     say(said_of_work(), f'Listening for {seconds:g} s; let the robot stand still.')
     around = listen(loaded.topics, seconds, args)
-    findings = [*examine(around, loaded), *network(around)]
+    return _print([*examine(around, loaded), *network(around)])
+
+
+def _print(findings: 'Sequence[Finding]') -> int:
+    """Print findings between what they come to, and return the exit code."""
+    console = console_of()
     outcome = _outcome(findings)
     say(console, outcome)
     for finding in findings:
@@ -68,19 +92,36 @@ __all__ = ['CONTEXT', 'doctor']
 
 def doctor(
     context: typer.Context,
+    bag: Annotated[
+        Path | None,
+        typer.Argument(
+            help='Recording to check; without one, the live robot.',
+            autocompletion=recordings_like,
+        ),
+    ] = None,
     config: ConfigFile = None,
     urdf: UrdfFile = None,
     seconds: Annotated[float, typer.Option(help='How long to listen.')] = 5.0,
+    everything: Annotated[
+        bool, typer.Option('--all', help='Read a long recording to its end, not its beginning.')
+    ] = False,
 ) -> None:
     """Check a set-up: ROS, topics, rates, QoS, joint names, IMU. One line each, with advice.
 
-    Let the robot stand still meanwhile. The exit code is 0 if no check fails, else 1.
+    Let the robot stand still meanwhile. Of a recording, the same checks look where it stood still,
+    and what evaluate finds wrong with its inputs is told too. The exit code is 0 if no check fails,
+    1 if one does, 2 if a recording cannot be read.
 
     \b
     Examples:
       ugv-acceptance doctor
+      ugv-acceptance doctor bags/packbot_pass
       ugv-acceptance doctor -c my_robot.yaml --seconds 10 --ros-args -r __ns:=/r1
     """  # noqa: D301 - typer's \b keeps the lines of the examples apart
-    from ugv_acceptance.cli.doctor import consult
-
-    raise typer.Exit(consult(config, urdf, seconds, ros_arguments(context)))
+    # Where no recording is given, click takes --ros-args for it.
+    if bag is not None and str(bag) == '--ros-args':
+        context.args, bag = [str(bag), *context.args], None
+    arguments = ros_arguments(context)
+    if bag is not None:
+        raise typer.Exit(read(bag, config, urdf, everything=everything))
+    raise typer.Exit(consult(config, urdf, seconds, arguments))

@@ -81,6 +81,12 @@ def _one_result(result: dict[str, Any]) -> bool:
     )
 
 
+def _is_info(path: Path) -> bool:
+    """Whether a file holds what info --json writes."""
+    found = _json(path)
+    return isinstance(found, dict) and {'recording', 'topics', 'could_be_judged'} <= set(found)
+
+
 def _is_pdf(path: Path) -> bool:
     """Whether a PDF is a report of ours, by its outline in a compressed part."""
     content = _whole(path)
@@ -164,6 +170,7 @@ _HTML = ('.html', '.htm')
 _PAGE = rb'\s*<!DOCTYPE html>.*<title>%s: '
 
 RESULT = Kind('JSON', ('.json',), _is_result, 'and is not a result of evaluate')
+INFO = Kind('JSON', ('.json',), _is_info, 'and was not written by info')
 MARGINS = Kind(
     'CSV', ('.csv',), _starts(rb'time_s,stamp_ns,state,'), 'and is not a table of margins'
 )

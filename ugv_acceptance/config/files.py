@@ -18,12 +18,15 @@ def find(path: Path) -> Path:
     places = [folder / 'msg_configs' / name for folder in _shares()]
     found = next((place for place in places if place.is_file()), None)
     if found is None:
-        folders = [place.parent for place in places if place.parent.is_dir()]
-        known = sorted({file.stem for folder in folders for file in folder.glob('*.yaml')})
-        raise BadConfig(
-            f'{path}: expected a file, or one that ships ({", ".join(known) or "none found"})'
-        )
+        known = ', '.join(shipped()) or 'none found'
+        raise BadConfig(f'{path}: expected a file, or one that ships ({known})')
     return found
+
+
+def shipped() -> list[str]:
+    """Return the names of the configurations that ship."""
+    folders = [folder / 'msg_configs' for folder in _shares()]
+    return sorted({file.stem for folder in folders for file in folder.glob('*.yaml')})
 
 
 def _shares() -> list[Path]:

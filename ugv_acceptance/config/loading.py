@@ -145,6 +145,17 @@ def name_and_topics(
     return config.name, config.topics
 
 
+def names_in_messages(path: Path | str) -> tuple[str, ...] | None:
+    """Return the joint names that a YAML file expects in messages; None: those of its URDF.
+
+    The URDF is not read. Raises BadConfig as `load` does for a YAML file that cannot be used.
+    """
+    _, _, _, file = _read_file(path)
+    if file.joints is None:
+        return None
+    return tuple(section.topic_name or name for name, section in file.joints.items())
+
+
 def _read_file(path: Path | str | None) -> tuple[Path, bytes, Document, File]:
     at = find(DEFAULT if path is None else Path(path))
     content = read(at, 'configuration')

@@ -7,9 +7,13 @@ description names meshes by package, a file beside a configuration by path.
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ugv_acceptance.config.urdf import Urdf
+from ugv_acceptance import BadConfig, BadSample
+from ugv_acceptance.config.urdf import Urdf, read_urdf
+
+if TYPE_CHECKING:
+    from ugv_acceptance.config.loading import Config
 
 # Numbers that differ by less, or by this share, are the same number printed twice.
 ALIKE = 1e-9
@@ -59,6 +63,21 @@ def difference_words(found: Sequence[str]) -> str:
     """Return the first differences and the number of the others as one text."""
     more = len(found) - MOST
     return '; '.join(found[:MOST]) + (f'; and {more} more differences' if more > 0 else '')
+
+
+def difference_of(config: 'Config', told: str | BadSample, topic: str) -> str:
+    """Return how a description told on a topic differs from the URDF in force; empty: not at all.
+
+    What cannot be read is a difference.
+    """
+    if isinstance(told, BadSample):
+        return f'{topic} cannot be read: {told}'
+    try:
+        other = read_urdf(told.encode(), topic)
+    except BadConfig as error:
+        return str(error)
+    places = FILE_AND_ROBOT if config.description == 'file' else THEN_AND_NOW
+    return difference_words(differences(config.urdf, other, places))
 
 
 def _differences(one: Urdf, other: Urdf, places: Places) -> Iterator[str]:

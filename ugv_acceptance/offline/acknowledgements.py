@@ -1,17 +1,11 @@
 """Adds to a result who acknowledged which alert and when, if the monitor's alerts were recorded."""
 
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
-
-from mcap.exceptions import McapError
-from mcap.reader import make_reader
-from rosbags.typesys import Stores, get_typestore
 
 from ugv_acceptance.bag.reader import Bag
+from ugv_acceptance.bag.statuses import alert_topics, statuses
 from ugv_acceptance.type_aliases import Json
 
-TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
 # The monitor dates alerts by its own clock: starts that differ by less (ns) belong to one alert.
 SAME = 500_000_000
 # Times (ns) have 64 bits; what is larger is none.
@@ -25,10 +19,10 @@ def add_acknowledgements(result: Json, bag: Bag) -> None:
     which older monitors did not tell. `acknowledged_s` is None where the topic was recorded but
     nobody acknowledged; without the topic nothing is added.
     """
-    topics = [n for n, t in bag.topics.items() if t.type == TYPE and n.endswith('/alerts')]
+    topics = alert_topics(bag)
     if not topics:
         return
-    seen = [found for path in bag.paths for found in _acknowledged(path, topics)]
+    seen = list(_acknowledged(bag, topics))
     for alert in result['alerts']:
         start = bag.start_ns + round(alert['start_s'] * 1e9)
         of = [values for values in seen if _is_of(values, alert, start)]
@@ -45,22 +39,11 @@ def _is_of(values: dict[str, str], alert: Json, start: int) -> bool:
     return named and abs(int(values['start_ns']) - start) <= SAME
 
 
-def _acknowledged(path: Path, topics: list[str]) -> Iterator[dict[str, str]]:
-    """Yield the values of every recorded status that says an alert was acknowledged.
-
-    Unreadable messages are skipped: the verdict does not depend on them.
-    """
-    store = get_typestore(Stores.ROS2_JAZZY)
-    try:
-        with path.open('rb') as file:
-            for _, _, message in make_reader(file).iter_messages(topics=topics):
-                array: Any = store.deserialize_cdr(message.data, TYPE)
-                for status in array.status:
-                    values = {pair.key: pair.value for pair in status.values}
-                    if values.get('state') == 'acknowledged' and _dated(values):
-                        yield values
-    except (McapError, OSError, ValueError, KeyError, AssertionError):
-        return
+def _acknowledged(bag: Bag, topics: list[str]) -> Iterator[dict[str, str]]:
+    """Yield the values of every recorded status that says an alert was acknowledged."""
+    for values in statuses(bag, topics):
+        if values.get('state') == 'acknowledged' and _dated(values):
+            yield values
 
 
 def _dated(values: dict[str, str]) -> bool:

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from ugv_acceptance.nodes.doctor.checks import OK, WARN, Finding
-from ugv_acceptance.nodes.doctor.probe import Heard, Surroundings
+from ugv_acceptance.inspection.heard import OK, WARN, Finding, Heard
+from ugv_acceptance.nodes.doctor.probe import Surroundings
 from ugv_acceptance.nodes.transport import Transport, vendor_of
 
 # Room (s) for messages that come while this process stands still, below which it is small.

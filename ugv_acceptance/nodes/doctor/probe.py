@@ -2,8 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -11,9 +10,9 @@ from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, QoSProfile, ReliabilityPolicy, qos_check_compatible
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from ugv_acceptance import BadSample
-from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, ImuSample, JointStateSample, Kind
+from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, Decoder, Kind
 from ugv_acceptance.config import Topic, Topics
+from ugv_acceptance.inspection.heard import Heard, Told
 from ugv_acceptance.nodes.bag_player import message_type
 from ugv_acceptance.nodes.executor import RANGE, ros, spin
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
@@ -21,55 +20,10 @@ from ugv_acceptance.nodes.monitor.publishers import MARGIN_TOPICS
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.nodes.transport import Transport, transport_now, vendor_by
 
-# Samples of an input that are kept.
-KEPT = 5000
 # Seconds until all publishers should be known; then the listening begins.
 DISCOVERY = 4.0
 # Names of a monitor's margin topics, whatever the node's own name.
 _MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
-
-
-@dataclass(slots=True)
-class Heard:
-    """The messages of one input: receipt times (ns), samples, and the publishers.
-
-    `publishers` are (node, type, why its QoS does not match), `vendors` their nodes' DDS where that
-    is known. `alike` are the other topics with messages of the input's type, except those a monitor
-    publishes.
-    """
-
-    topic: str
-    type: str
-    publishers: list[tuple[str, str, str]] = field(default_factory=list)
-    alike: list[str] = field(default_factory=list)
-    times: list[int] = field(default_factory=list)
-    samples: list[Any] = field(default_factory=list)
-    malformed: list[str] = field(default_factory=list)
-    vendors: dict[str, str] = field(default_factory=dict)
-
-    def take(self, decode: Callable[[bytes], JointStateSample | ImuSample], data: bytes) -> None:
-        """Decode a message and keep it, or the reason why it cannot be read."""
-        try:
-            sample = decode(data)
-        except BadSample as error:
-            self.malformed.append(str(error))
-        else:
-            if len(self.samples) < KEPT:
-                self.samples.append(sample)
-        if len(self.times) < KEPT:
-            self.times.append(time.time_ns())
-
-
-@dataclass(frozen=True, slots=True)
-class Told:
-    """The robot's descriptions on `topic`: their texts, or why a message could not be read.
-
-    `obstacle` says why none of them could be taken as the robot's URDF; empty: one can.
-    """
-
-    topic: str
-    texts: tuple[str | BadSample, ...]
-    obstacle: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,13 +17,7 @@ from std_msgs.msg import String
 from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.bag.told_robot import description_of
 from ugv_acceptance.config import Config, description_topic, load
-from ugv_acceptance.config.same_robot import (
-    FILE_AND_ROBOT,
-    THEN_AND_NOW,
-    difference_words,
-    differences,
-)
-from ugv_acceptance.config.urdf import read_urdf
+from ugv_acceptance.config.same_robot import difference_of
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import ros
 
@@ -192,21 +186,6 @@ class OwnDescription:
             if self._compared[key]:
                 return self._compared[key]
         return ''
-
-
-def difference_of(config: Config, told: str | BadSample, topic: str) -> str:
-    """Return how a description told on a topic differs from the URDF in force; empty: not at all.
-
-    What cannot be read is a difference.
-    """
-    if isinstance(told, BadSample):
-        return f'{topic} cannot be read: {told}'
-    try:
-        other = read_urdf(told.encode(), topic)
-    except BadConfig as error:
-        return str(error)
-    places = FILE_AND_ROBOT if config.description == 'file' else THEN_AND_NOW
-    return difference_words(differences(config.urdf, other, places))
 
 
 def load_live(config: Path | None, urdf: Path | None, args: list[str]) -> Config:
