@@ -27,6 +27,7 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 
 from bench.soak_listener import Listener, Window
+from bench.soak_robot import LATE, SIZE
 from bench.soak_summary import draw, summarise
 from ugv_acceptance.nodes.executor import end, ros, spin
 
@@ -80,9 +81,9 @@ class Robot:
     count: mmap.mmap = field(init=False)
 
     def __post_init__(self) -> None:
-        self.counter.write_bytes(bytes(24))
+        self.counter.write_bytes(bytes(SIZE))
         with self.counter.open('r+b') as file:
-            self.count = mmap.mmap(file.fileno(), 24)
+            self.count = mmap.mmap(file.fileno(), SIZE)
         self.start()
 
     def start(self) -> None:
@@ -108,6 +109,12 @@ class Robot:
         both = self.count[:8], self.count[8:16]
         joints, imu = (int.from_bytes(told, 'little') for told in both)
         return joints, imu
+
+    def late(self) -> float:
+        """Return by how much it was late to send at most (ms) since the last call."""
+        largest = int.from_bytes(self.count[LATE : LATE + 8], 'little') / 1e6
+        self.count[LATE : LATE + 8] = bytes(8)
+        return largest
 
 
 @dataclass
@@ -191,6 +198,7 @@ class Sampler:
         row |= {'robot_rss_mb': found['robot_']['rss_mb'], 'ears_rss_mb': found['ears_']['rss_mb']}
         row |= {'blocks': self.blocks.read_text(encoding='ascii') or 0, 'margins': len(heard.late)}
         row |= {f'late_p{n}_ms': share(heard.late, n / 100) for n in (50, 99, 100)}
+        row |= {'robot_late_ms': self.plan.robot.late()}
         row |= {'verdict_gap_s': heard.gap, 'sent': sum(self.plan.robot.sent())}
         row |= {'missed': self.listener.behind, 'raised': heard.raised}
         row |= {'unexpected': heard.unexpected, 'acknowledged': heard.acknowledged}

@@ -1,7 +1,8 @@
 """The robot of bench_soak.py: 200 Hz joint states and 400 Hz IMU from messages made beforehand.
 
-Its argument is a file of two int64 that it counts up: messages sent of each input. On stdin it
-takes the name of what it does from then on: a key of DOINGS.
+Its argument is a file of int64: messages sent of each input, which it counts up, and by how much
+(ns) it was late to send one at most since that was last set to 0. On stdin it takes the name of
+what it does from then on: a key of DOINGS.
 """
 
 import math
@@ -31,6 +32,8 @@ from ugv_acceptance.nodes.executor import end, ros
 
 NS = 1_000_000_000
 JOINTS_HZ, IMU_HZ = 200, 400
+# The file's size, and where the largest delay stands in it.
+SIZE, LATE = 32, 24
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint', 'flipper_joint')
 # Folded; stretched out, which with LOAD (kg) in the hand is too much for the shoulder.
 CALM, REACH, LOAD = np.array((0.0, 2.0, -2.5, 2.0)), np.array((0.0, 0.0, 0.0, 2.0)), 2.2
@@ -126,7 +129,9 @@ class Stream:
             self.count[self.at : self.at + 8] = sent.to_bytes(8, 'little')
 
 
-def publish_all(streams: list[Stream], made: dict[str, Messages], imu: Messages) -> None:
+def publish_all(
+    streams: list[Stream], made: dict[str, Messages], imu: Messages, count: mmap.mmap
+) -> None:
     """Publish as stdin says until it ends."""
     told = ['calm']
     Thread(
@@ -139,6 +144,9 @@ def publish_all(streams: list[Stream], made: dict[str, Messages], imu: Messages)
             streams[0].messages, streams[0].index = made[doing], 0
             streams[1].messages = [] if doing in ('silent imu', 'mute') else imu
         elapsed = time.monotonic_ns() - start
+        behind = elapsed - min(stream.due for stream in streams)
+        if behind > int.from_bytes(count[LATE : LATE + 8], 'little'):
+            count[LATE : LATE + 8] = behind.to_bytes(8, 'little')
         for stream in streams:
             stream.publish_until(elapsed)
         wait = min(stream.due for stream in streams) - (time.monotonic_ns() - start)
@@ -151,7 +159,7 @@ def main() -> None:
     made, imu = {name: make() for name, make in DOINGS.items()}, imus()
     load = bytearray(inertia_cdr(0, 'gripper_link', LOAD, (0.0,) * 3))
     with Path(sys.argv[1]).open('r+b') as file, ros():
-        count = mmap.mmap(file.fileno(), 24)
+        count = mmap.mmap(file.fileno(), SIZE)
         node = rclpy.create_node('robot')
         quick = qos_of(Offered('reliable'))
         joints = node.create_publisher(JointState, 'joint_states', quick)
@@ -168,7 +176,7 @@ def main() -> None:
             Stream(attitude.publish, [], NS // IMU_HZ, count, 8),
             Stream(held.publish, [load], NS, count, 16),
         ]
-        publish_all(streams, made, imu)
+        publish_all(streams, made, imu, count)
         end(node)
 
 

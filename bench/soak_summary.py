@@ -20,6 +20,7 @@ CURVES = {
     'late_p50_ms': 'lateness p50, ms',
     'late_p99_ms': 'lateness p99, ms',
     'late_p100_ms': 'lateness max, ms',
+    'robot_late_ms': 'robot late to send, ms',
     'verdict_gap_s': 'between verdicts, s',
     'load': 'load of the machine',
 }
@@ -38,9 +39,9 @@ def told(path: Path, of: dict[str, Any]) -> tuple[str, str]:
     counts = {name: of[name].sum() for name in ('raised', 'unexpected', 'acknowledged', 'refused')}
     counts |= {'faults': of['faults'][-1], 'without an alert': of['silent'][-1]}
     sent, missed = of['sent'][-1], of['missed'][-1]
+    hours = of['t_s'][-1] / 3600.0
     return (
-        f'{path.stem}: {of["t_s"][-1] / 3600.0:.2f} h, {sent:,.0f} messages sent, {missed:,.0f} '
-        'not yet counted by the monitor at the end',
+        f'{path.stem}: {hours:.2f} h, {sent:,.0f} messages sent, {missed:,.0f} not counted at the end',
         '  alerts: ' + ', '.join(f'{name} {number:.0f}' for name, number in counts.items()),
     )
 
