@@ -41,7 +41,7 @@ def told(path: Path, of: dict[str, Any]) -> tuple[str, str]:
     sent, missed = of['sent'][-1], of['missed'][-1]
     hours = of['t_s'][-1] / 3600.0
     return (
-        f'{path.stem}: {hours:.2f} h, {sent:,.0f} messages sent, {missed:,.0f} not counted at the end',
+        f'{path.stem}: {hours:.2f} h, {sent:,.0f} messages sent, {missed:,.0f} missed at the end',
         '  alerts: ' + ', '.join(f'{name} {number:.0f}' for name, number in counts.items()),
     )
 
