@@ -1,12 +1,19 @@
-"""The process of a node: which transports of Fast DDS it opens."""
+"""The process of a node: the transports of Fast DDS it opens, and how its messages are taken."""
 
+import gc
 import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
+from nodes.live_case import Live
 
+import ugv_acceptance
+from ugv_acceptance.config import load
+from ugv_acceptance.nodes.console_feed import ConsoleNode
 from ugv_acceptance.nodes.executor import (
     LOOPBACK,
     PROFILES,
@@ -14,6 +21,9 @@ from ugv_acceptance.nodes.executor import (
     TRANSPORT,
     UDP,
     choose_transport,
+    spin_within,
+    spun_by_thread,
+    take_what_came,
 )
 
 # Says which files of shared memory a node's process holds open, and where its sockets listen.
@@ -89,3 +99,67 @@ def test_only_the_addresses_of_this_machine_are_heard() -> None:
 def test_other_machines_are_heard_by_default() -> None:
     """Without a discovery range a node binds every address, as the same check shows."""
     assert '00000000' in opened()['bound']
+
+
+def test_all_that_is_due_is_taken_in_one_go(live: Live) -> None:
+    """What is due runs in its order; what that asks for waits for the next time."""
+    ran: list[int] = []
+
+    def work(number: int) -> None:
+        ran.append(number)
+        if number < 3:
+            live.executor.create_task(work, number + 3)
+
+    for number in range(3):
+        live.executor.create_task(work, number)
+    take_what_came(live.executor)
+    assert ran == [0, 1, 2]
+    take_what_came(live.executor)
+    assert ran == [0, 1, 2, 3, 4, 5]
+
+
+def test_what_is_waited_for_ends_the_waiting(live: Live) -> None:
+    """An answer is seen when it comes, not at the end of the time given."""
+    ran: list[int] = []
+    for number in range(3):
+        live.executor.create_task(ran.append, number)
+    spin_within(live.executor, lambda: len(ran) == 2, 3600.0)
+    assert ran == [0, 1]
+
+
+def test_a_thread_that_takes_messages_ends_with_its_block(live: Live) -> None:
+    """A thread that was told to wait an hour for messages ends as soon as it is not needed."""
+    driver = live.driver()
+    live.executor.remove_node(driver)
+    with spun_by_thread(driver):
+        pass
+    live.executor.add_node(driver)
+
+
+def test_a_console_that_is_open_for_weeks_needs_no_more_memory() -> None:
+    """A thousand frames leave no objects behind."""
+    console = ConsoleNode(load())
+    try:
+        before = objects_after(console, 200)
+        assert objects_after(console, 1000) - before < 300
+    finally:
+        console.close()
+
+
+def objects_after(console: Any, frames: int) -> int:
+    """Return how many blocks of memory Python holds after so many frames."""
+    for _ in range(frames):
+        console.snapshot()
+    gc.collect()
+    return sys.getallocatedblocks()
+
+
+def test_only_the_executor_makes_the_call_that_leaks() -> None:
+    """Each spin_until_future_complete of EventsExecutor leaks; one module makes it, seldom."""
+    code = Path(ugv_acceptance.__file__).parent
+    calling = [
+        path.name
+        for path in code.rglob('*.py')
+        if 'spin_until_future_complete(' in path.read_text(encoding='utf-8')
+    ]
+    assert calling == ['executor.py']

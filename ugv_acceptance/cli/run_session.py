@@ -273,8 +273,8 @@ def _do(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> bo
 @contextmanager
 def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> Iterator['Runner']:
     """Start the robot (if simulated), the monitor and the runner; always end them all."""
-    from ugv_acceptance.nodes.executor import ros
-    from ugv_acceptance.nodes.runner_world import Guard, spinning
+    from ugv_acceptance.nodes.executor import ros, spun_by_thread
+    from ugv_acceptance.nodes.runner_world import Guard
     from ugv_acceptance.nodes.subprocess_node import child
     from ugv_acceptance.run.actuation import Hands
     from ugv_acceptance.run.runner import Runner
@@ -292,7 +292,7 @@ def _live(asked: Asked, config: 'Config', folder: 'RunFolder', shown: Steps) -> 
             config, lambda reason: say_stop(shown.console, reason), shown.moved, asked.mode
         )
         stack.callback(guard.destroy_node)
-        stack.enter_context(spinning(guard))
+        stack.enter_context(spun_by_thread(guard))
         hands = Hands(guard, asked.mode, asking(shown.console))
         made = Runner(config, folder, guard, hands, lambda: stop.asked, asked.attempts)
         made.wait_for_all(START)

@@ -18,7 +18,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from ugv_acceptance.config import Config
@@ -39,7 +38,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.console_operator import ConsoleOperator
-from ugv_acceptance.nodes.executor import Stop, ros
+from ugv_acceptance.nodes.executor import Stop, ros, take_what_came
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 from ugv_acceptance.nodes.operator_client import MONITOR
@@ -88,7 +87,7 @@ class ConsoleNode(Node):
         self.create_subscription(
             JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
-        self._executor, self._never = EventsExecutor(), Future()
+        self._executor = EventsExecutor()
         self._operator = ConsoleOperator(self, self._executor, config, session, self.book)
         self._executor.add_node(self)
 
@@ -103,7 +102,7 @@ class ConsoleNode(Node):
 
     def snapshot(self) -> Snapshot:
         """Process the messages that came since the last call and return the present state."""
-        self._executor.spin_until_future_complete(self._never, timeout_sec=0.0)
+        take_what_came(self._executor)
         silent = not all(newest.waiting for newest in self._heard.values())
         for name, newest in self._heard.items():
             # The count is read after what is handed on was counted, never before.

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.nodes.executor import Stop, ros
+from ugv_acceptance.nodes.executor import Stop, ros, spin_within
 from ugv_acceptance.nodes.monitor.operator_desk import DEPTH, DONE, load_message
 from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
 
@@ -111,7 +111,7 @@ class OperatorClient:
         while not answered.done() and not stopped() and time.monotonic() < end:
             self._out.publish(message)
             left = max(end - time.monotonic(), 0.0)
-            executor.spin_until_future_complete(answered, timeout_sec=min(AGAIN, left))
+            spin_within(executor, lambda: answered.done() or stopped(), min(AGAIN, left))
         self._waiting.pop(number, None)
         if not answered.done():
             raise BadSample(f'{command.do}: the monitor does not answer ({self.where()})')

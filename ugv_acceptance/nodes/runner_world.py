@@ -6,8 +6,7 @@ That is done on the thread that takes messages, so it does not wait for the runn
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Inertia, InertiaStamped, Twist, Vector3
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
@@ -32,7 +30,6 @@ from ugv_acceptance.bag.cdr import joint_state_decoder
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import Config
 from ugv_acceptance.monitoring.senders import check_named, full_names
-from ugv_acceptance.nodes.executor import PATIENCE
 from ugv_acceptance.nodes.monitor.operator_desk import DONE
 from ugv_acceptance.nodes.monitor.own_description import MOST
 from ugv_acceptance.nodes.monitor.own_description import QOS as OWN
@@ -374,25 +371,3 @@ class Guard(Node):
 
 def _nothing(_: bytes) -> None:
     """Ignore a message: it is only recorded."""
-
-
-@contextmanager
-def spinning(guard: Guard) -> Iterator[None]:
-    """Take messages on a separate thread, so that recording and brake never wait."""
-    executor, over = EventsExecutor(), threading.Event()
-    executor.add_node(guard)
-    never: Future = Future()
-
-    def spin() -> None:
-        while not over.is_set():
-            executor.spin_until_future_complete(never, timeout_sec=PATIENCE)
-
-    thread = threading.Thread(target=spin, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
-        executor.remove_node(guard)
-        executor.shutdown()
