@@ -110,9 +110,7 @@ def guarded_file(folder: Path, repository: Path) -> str:
 
 
 @pytest.fixture(scope='module')
-def site(
-    tmp_path_factory: pytest.TempPathFactory, repository: Path
-) -> Iterator[Guarded]:
+def site(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Iterator[Guarded]:
     """Return a monitor that has margins and operators."""
     config = guarded_file(tmp_path_factory.mktemp('operators'), repository)
     with live_nodes() as live:
@@ -121,9 +119,11 @@ def site(
         made = Guarded(live, monitor, live.driver(namespace=SPACE), panel, stranger)
         panel.create_subscription(Log, '/rosout', made.hear, 100)
         live.until(
-            lambda: session_of(monitor).evaluator.margins is not None
-            and panel.out.get_subscription_count()
-            and stranger.out.get_subscription_count(),
+            lambda: (
+                session_of(monitor).evaluator.margins is not None
+                and panel.out.get_subscription_count()
+                and stranger.out.get_subscription_count()
+            ),
             made.driver.send,
         )
         yield made
