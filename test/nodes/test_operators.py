@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -211,7 +212,8 @@ def test_what_operators_declare_is_no_ones_parameter(
 ) -> None:
     """A parameter service does not tell who calls either; a limit can be set unless locked."""
     set_all = f'{SPACE}/acceptance_monitor/set_parameters_atomically'
-    given = [parameter(name, value).to_parameter_msg()]
+    made: Any = parameter(name, value)
+    given = [made.to_parameter_msg()]
     asked = SetParametersAtomically.Request(parameters=given)
     result = site.live.call(SetParametersAtomically, set_all, asked).result
     assert not result.successful
