@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -110,9 +111,7 @@ def guarded_file(folder: Path, repository: Path) -> str:
 
 
 @pytest.fixture(scope='module')
-def site(
-    tmp_path_factory: pytest.TempPathFactory, repository: Path
-) -> Iterator[Guarded]:
+def site(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Iterator[Guarded]:
     """Return a monitor that has margins and operators."""
     config = guarded_file(tmp_path_factory.mktemp('operators'), repository)
     with live_nodes() as live:
@@ -121,9 +120,11 @@ def site(
         made = Guarded(live, monitor, live.driver(namespace=SPACE), panel, stranger)
         panel.create_subscription(Log, '/rosout', made.hear, 100)
         live.until(
-            lambda: session_of(monitor).evaluator.margins is not None
-            and panel.out.get_subscription_count()
-            and stranger.out.get_subscription_count(),
+            lambda: (
+                session_of(monitor).evaluator.margins is not None
+                and panel.out.get_subscription_count()
+                and stranger.out.get_subscription_count()
+            ),
             made.driver.send,
         )
         yield made
@@ -211,7 +212,8 @@ def test_what_operators_declare_is_no_ones_parameter(
 ) -> None:
     """A parameter service does not tell who calls either; a limit can be set unless locked."""
     set_all = f'{SPACE}/acceptance_monitor/set_parameters_atomically'
-    given = [parameter(name, value).to_parameter_msg()]
+    made: Any = parameter(name, value)
+    given = [made.to_parameter_msg()]
     asked = SetParametersAtomically.Request(parameters=given)
     result = site.live.call(SetParametersAtomically, set_all, asked).result
     assert not result.successful

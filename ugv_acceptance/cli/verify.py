@@ -157,15 +157,21 @@ def again(
     for key, first in _LATER.items():  # written before results said it
         if first not in told:
             found.pop(key, None)
-    if not all('worst_s' in alert for alert in told.get('alerts', ())):
-        for alert in found['alerts']:
-            del alert['worst_s']
-    if not any('acknowledged_from' in alert for alert in told.get('alerts', ())):
-        for alert in found['alerts']:
-            alert.pop('acknowledged_from', None)
+    _without_later_keys(told, found)
     if 'urdf_sha256' not in told['robot']:
         _without_description(found)
     return found
+
+
+def _without_later_keys(told: Json, found: Json) -> None:
+    """Take from the alerts of a result what older ones did not say."""
+    alerts = told.get('alerts', ())
+    if not all('worst_s' in alert for alert in alerts):
+        for alert in found['alerts']:
+            del alert['worst_s']
+    if not any('acknowledged_from' in alert for alert in alerts):
+        for alert in found['alerts']:
+            alert.pop('acknowledged_from', None)
 
 
 def _drills(told: Json) -> list[str]:

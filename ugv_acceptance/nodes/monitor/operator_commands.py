@@ -106,7 +106,8 @@ def service_refusal(operators: Collection[str] | None, instead: str) -> str:
 def operate(session: Session, message: DiagnosticStatus, sender: str = '') -> list[Change]:
     """Carry out the command in a message; return the changes. Raises AcceptanceError if refused.
 
-    `sender` is the node that sent it. A command about a named alert that would change nothing is refused, with what its state is.
+    `sender` is the node that sent it. A command about a named alert that would change nothing is
+    refused, with what its state is.
     """
     return [replace(change, sender=sender) for change in _changes(session, message)]
 

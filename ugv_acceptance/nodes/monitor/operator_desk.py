@@ -3,8 +3,9 @@
 An answer is a DiagnosticStatus as well: `name` is the command, `hardware_id` who gave it, as the
 command claims, `level` OK or, if it was refused, WARN; `message` what was done or why not, in a
 sentence. Its values have the `id` of the command, `result`: done or refused, and `from`: the node
-that sent it. Where the configuration names `operators`, only their commands are taken. A command that comes twice with one id, from
-a client that heard no answer, is carried out once and answered twice.
+that sent it. Where the configuration names `operators`, only their commands are taken. A command
+that comes twice with one id, from a client that heard no answer, is carried out once and answered
+twice.
 """
 
 from collections.abc import Callable
@@ -122,7 +123,7 @@ class OperatorDesk:
         self._say()
         return self._answer(message, sender, asked, result, said, found)
 
-    def _answer(  # noqa: PLR0913 - all that an answer has
+    def _answer(
         self,
         message: DiagnosticStatus,
         sender: Sender,

@@ -122,7 +122,7 @@ class SenderSubscription(Waitable):  # type: ignore[misc] - rclpy has no types h
 
     def _next(self) -> tuple[Any, bytes | None] | None:
         if self._rcl is None:
-            taken = self._handle.take_message(self._kind, False)  # noqa: FBT003 - not raw
+            taken = self._handle.take_message(self._kind, False)  # not raw
             return None if taken is None else (taken[0], None)
         found = self._rcl.take(self._handle.pointer)
         return None if found is None else (deserialize_message(found[0], self._kind), found[1])
