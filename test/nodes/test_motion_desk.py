@@ -99,11 +99,18 @@ class Site:
         return [a for a in mine if a.values['result'] in results]
 
     def ask(self, message: JointTrajectory) -> Answer:
-        """Ask once and return the answer."""
+        """Ask, again every three seconds as a client does, and return the answer."""
         results = ('permitted', 'refused', 'not_known')
-        before = len(self.of(message, *results))
-        self.out.publish(message)
-        self.until(lambda: len(self.of(message, *results)) > before)
+        before, again = len(self.of(message, *results)), 0.0
+
+        def answered() -> bool:
+            nonlocal again
+            if time.monotonic() >= again:
+                again = time.monotonic() + 3.0
+                self.out.publish(message)
+            return len(self.of(message, *results)) > before
+
+        self.until(answered)
         return self.of(message, *results)[before]
 
     def permitted(self, message: JointTrajectory) -> Answer:
@@ -218,7 +225,7 @@ def test_a_monitor_that_is_not_active_permits_nothing(site: Site) -> None:
     site.permitted(motion(0.1, 0.0))
     site.monitor.trigger_deactivate()
     assert site.withdrawn(motion(0.1, 0.0)).values['cause'] == 'monitor'
-    said = site.ask(motion(0.1, 0.0))
+    said = site.ask(motion(0.12, 0.0))
     assert (said.values['result'], said.text) == (
         'not_known',
         'not known: the monitor is not active',
@@ -231,7 +238,8 @@ def test_a_monitor_that_is_not_active_permits_nothing(site: Site) -> None:
     site.monitor.trigger_configure()
     site.monitor.trigger_activate()
     site.until(lambda: session_of(site.monitor).evaluator.margins is not None)
-    reasons = site.ask(motion(0.1, 0.0)).values['reasons']
+    site.until(lambda: not session_of(site.monitor).level)
+    reasons = site.ask(motion(0.14, 0.0)).values['reasons']
     assert 'nobody told the payload' in reasons
     assert 'nobody told the ground' in reasons
 
