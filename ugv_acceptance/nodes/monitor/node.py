@@ -47,13 +47,15 @@ from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.parameter_desk import ParameterDesk
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.parameter_types import FittingParameters
+from ugv_acceptance.nodes.transport import transport_now
 
 NAME = 'acceptance_monitor'
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
 
-class Monitor(LifecycleNode):
+class Monitor(FittingParameters, LifecycleNode):
     """The monitor's node. `listener` is called with every verdict and change of an alert."""
 
     def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
@@ -71,6 +73,7 @@ class Monitor(LifecycleNode):
         self.own = OwnDescription(self, self._on_description)
         # Whether it is to bring itself up as soon as the robot tells its URDF.
         self._awaits = False
+        self._transport = transport_now().values()
         self.parameter_desk = ParameterDesk(self, lambda: self.session, lambda: self._margins)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
@@ -268,7 +271,9 @@ class Monitor(LifecycleNode):
         """Publish the verdict and the diagnostics."""
         status = self.verdict()
         self.output.verdict(status)
-        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.output.diagnostics(
+            diagnostics_of(status, self.config, self.session, self._inputs, self._transport)
+        )
         self.listener('verdict', status)
 
     def _on_change(self) -> None:
