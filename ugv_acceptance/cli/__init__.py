@@ -43,6 +43,7 @@ VERBS = (
     'run',
     'simulate',
     'drill',
+    'check',
     'model',
     'map',
     'paper',

@@ -45,7 +45,7 @@ def describe(config: Config, posture: str = '', tilt: str = '', payload: str = '
     """
     robot = config.settings.robot
     q = posture_from(robot, posture)
-    roll, pitch = _tilt_from(tilt)
+    roll, pitch = tilt_from(tilt)
     gravity = tilted_gravity(robot, tilt)
     load = payload_from(robot, payload)
     mechanics = mechanics_of(robot)
@@ -103,19 +103,25 @@ def posture_from(robot: Robot, text: str) -> list[float]:
     out; positions given beside it replace the pose's. Raises BadConfig for a pose or joint that the
     robot has not, or a value that is no position.
     """
-    q = dict(zip(robot.joint_names, rest_posture(robot).tolist(), strict=True))
+    at_rest = dict(zip(robot.joint_names, rest_posture(robot).tolist(), strict=True))
+    return list((at_rest | positions_from(robot, text)).values())
+
+
+def positions_from(robot: Robot, text: str) -> dict[str, float]:
+    """Return the joints that such a text tells, with their positions (rad, m), and no others."""
+    q: dict[str, float] = {}
     first, _, rest = text.partition(',')
     if first.strip() and '=' not in first and robot.poses:
         q |= pose_named(robot, first.strip(), '--posture')
         text = rest
     for name, value in _pairs(text, '--posture'):
-        if name not in q:
-            known = ', '.join(q) or 'none'
-            hint = nearest_name(name, q)
+        if name not in robot.joint_names:
+            known = ', '.join(robot.joint_names) or 'none'
+            hint = nearest_name(name, robot.joint_names)
             raise BadConfig(f'--posture: expected a measured joint ({known}), got {name}{hint}')
         kind = 'length' if robot.joint(name).slides else 'angle'
         q[name] = quantity(value, kind, f'--posture {name}={value}')
-    return list(q.values())
+    return q
 
 
 def payload_from(robot: Robot, text: str) -> Payload:
@@ -144,12 +150,12 @@ def warn(sentences: Iterable[str]) -> None:
 
 def tilted_gravity(robot: Robot, text: str) -> Vector:
     """Return gravity (m/s2) in `base_link` at a tilt such as 'roll=10deg,pitch=5deg'."""
-    roll, pitch = _tilt_from(text)
+    roll, pitch = tilt_from(text)
     x, y, z = rotation_from_rpy((roll, pitch, 0.0))[2]
     return (-robot.gravity * x, -robot.gravity * y, -robot.gravity * z)
 
 
-def _tilt_from(text: str) -> tuple[float, float]:
+def tilt_from(text: str) -> tuple[float, float]:
     """Return roll and pitch (rad) of 'roll=10deg,pitch=5deg'."""
     tilt = {'roll': 0.0, 'pitch': 0.0}
     for name, value in _pairs(text, '--tilt'):

@@ -31,12 +31,17 @@ from ugv_acceptance.cli.plain_text import (
 )
 
 COLOURS = {
-    **dict.fromkeys(('PASS', 'OK'), 'bold green'),
-    **dict.fromkeys(('FAIL', 'DANGER', 'BAD INPUT', 'BROKEN'), 'bold red'),
-    **dict.fromkeys(('INCONCLUSIVE', 'CAUTION', 'DOUBTFUL'), 'bold yellow'),
+    **dict.fromkeys(('PASS', 'OK', 'PERMITTED'), 'bold green'),
+    **dict.fromkeys(('FAIL', 'DANGER', 'BAD INPUT', 'BROKEN', 'REFUSED'), 'bold red'),
+    **dict.fromkeys(('INCONCLUSIVE', 'CAUTION', 'DOUBTFUL', 'NOT KNOWN'), 'bold yellow'),
     'NO DATA': 'bold magenta',
 }
-MARKS = {'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]', 'BAD INPUT': '[!]'}
+MARKS = {
+    **dict.fromkeys(('PASS', 'PERMITTED'), '[OK]'),
+    **dict.fromkeys(('FAIL', 'REFUSED'), '[X]'),
+    **dict.fromkeys(('INCONCLUSIVE', 'NOT KNOWN'), '[?]'),
+    'BAD INPUT': '[!]',
+}
 # What standard output is called as a file.
 _STDOUT = {'/dev/stdout', '/dev/fd/1', '/proc/self/fd/1'}
 # A word; a number and its unit are one.

@@ -79,6 +79,16 @@ def _carried(omega: Vec, alpha: Vec, arm: Vec) -> Vec:
 
 def joint_forces(tree: Tree, pose: Pose, motion: Motion, loads: Sequence[Load]) -> list[Scalar]:
     """Return the torque (N m; N if prismatic) every joint must exert to cause the motion."""
+    return forces_and_support(tree, pose, motion, loads)[0]
+
+
+def forces_and_support(
+    tree: Tree, pose: Pose, motion: Motion, loads: Sequence[Load]
+) -> tuple[list[Scalar], Vec, Vec]:
+    """Return `joint_forces`, and what holds the base still meanwhile.
+
+    That is the force (N) of the ground on the robot, and its moment (N m) about the base's origin.
+    """
     forces: list[Vec] = []
     moments: list[Vec] = []
     for k, body in enumerate(tree.bodies):
@@ -92,7 +102,7 @@ def joint_forces(tree: Tree, pose: Pose, motion: Motion, loads: Sequence[Load]) 
                 force, moment = add(force, more[0]), add(moment, more[1])
         forces.append(force)
         moments.append(moment)
-    return _gather(tree, pose, forces, moments)
+    return _gather(tree, pose, forces, moments), forces[0], moments[0]
 
 
 def _inertial(mass: Scalar, arm: Vec, motion: Motion, k: int) -> tuple[Vec, Vec]:

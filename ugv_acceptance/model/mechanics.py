@@ -93,7 +93,7 @@ def mechanics_of(robot: Robot) -> Mechanics:
         robot,
         tree,
         _carried_contacts(robot, tree),
-        compile_kernel(_posture_formula(robot, tree), [*names, *load]),
+        compile_kernel(posture_formula(robot, tree), [*names, *load]),
         compile_kernel(_holding_formula(robot, tree), [*names, *load, *gravity]),
         compile_kernel(_force_formula(robot, tree), [*names * 3, *gravity, *load]),
     )
@@ -106,7 +106,7 @@ def with_contacts(mechanics: Mechanics, contacts: Sequence[Contact]) -> Mechanic
     """
     robot = replace(mechanics.robot, contacts=tuple(contacts))
     load = ['payload_mass', 'payload_x', 'payload_y', 'payload_z']
-    formula = _posture_formula(robot, mechanics.tree)
+    formula = posture_formula(robot, mechanics.tree)
     kernel = compile_kernel(formula, [*robot.joint_names, *load])
     return replace(mechanics, robot=robot, posture=kernel)
 
@@ -128,7 +128,8 @@ def _vectors(drives: Sequence[Drive], values: Sequence[Vec], joints: int) -> lis
     return list(zip(x, y, z, strict=True))
 
 
-def _posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
+def posture_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
+    """Return the formula of `Mechanics.posture`."""
     drives, n = drives_of(robot, tree), len(robot.joint_names)
     pairs = _carried_contacts(robot, tree)
 
@@ -183,7 +184,7 @@ def laws_of(robot: Robot, q: Sequence[Scalar]) -> tuple[Scalar, ...]:
 
 
 def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]:
-    posture = _posture_formula(robot, tree)
+    posture = posture_formula(robot, tree)
 
     def formula(*inputs: Scalar) -> tuple[Any, ...]:
         torque_gradients, *rest = posture(*inputs[:-3])
@@ -195,7 +196,8 @@ def _holding_formula(robot: Robot, tree: Tree) -> Callable[..., tuple[Any, ...]]
     return formula
 
 
-def _loads(robot: Robot, tree: Tree, pose: Pose, mass: Scalar, cog: Vec) -> list[Load]:
+def payload_of(robot: Robot, tree: Tree, pose: Pose, mass: Scalar, cog: Vec) -> list[Load]:
+    """Return the payload (kg, m in its link) as a load of the pose; [] where nothing carries it."""
     if robot.payload_link is None:
         return []
     body, point = point_of(tree, pose, robot.payload_link, cog)
@@ -212,7 +214,7 @@ def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
         )
         gx, gy, gz, mass, x, y, z = inputs[3 * n :]
         pose = pose_of(tree, q)
-        loads = _loads(robot, tree, pose, mass, (x, y, z))
+        loads = payload_of(robot, tree, pose, mass, (x, y, z))
         motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
         forces = joint_forces(tree, pose, motion, loads)
         laws = laws_of(robot, inputs[:n]) or (0.0,) * n
@@ -233,5 +235,5 @@ def posture_once(
 
     Runs the same formula with floats, because compiling takes longer than one run.
     """
-    formula = _posture_formula(robot, tree_of(robot))
+    formula = posture_formula(robot, tree_of(robot))
     return Posture(*formula(*q, mass, *cog))

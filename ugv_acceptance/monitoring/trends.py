@@ -81,6 +81,10 @@ class Trends:
             self._due = margins.time + SPACING
             self._recent.append(margins)
 
+    def recent(self, now: int) -> list[Margins]:
+        """Return margins of the last second before `now` (ns), 50 ms or more apart."""
+        return [m for m in self._recent if m.time > now - SPAN]
+
     def near_misses(self) -> tuple[NearMiss, ...]:
         """Return the smallest tilt left and the smallest torque margin (by share of its limit)."""
         names, limits = self.settings.robot.joint_names, self.settings.limits.torque
@@ -104,7 +108,7 @@ class Trends:
 
         Empty if there are too few samples in the last second before `now` (ns).
         """
-        recent = [m for m in self._recent if m.time > now - SPAN]
+        recent = self.recent(now)
         if len(recent) < LEAST:
             return ()
         time = np.array([m.time - now for m in recent]) / 1e9

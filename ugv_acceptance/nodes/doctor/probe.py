@@ -19,6 +19,7 @@ from ugv_acceptance.nodes.executor import RANGE, ros, spin
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.publishers import MARGIN_TOPICS
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
+from ugv_acceptance.nodes.transport import Transport, transport_now, vendor_by
 
 # Samples of an input that are kept.
 KEPT = 5000
@@ -32,8 +33,9 @@ _MARGINS = frozenset(topic.rpartition('/')[2] for topic in MARGIN_TOPICS)
 class Heard:
     """The messages of one input: receipt times (ns), samples, and the publishers.
 
-    `publishers` are (node, type, why its QoS does not match). `alike` are the other topics with
-    messages of the input's type, except those a monitor publishes.
+    `publishers` are (node, type, why its QoS does not match), `vendors` their nodes' DDS where that
+    is known. `alike` are the other topics with messages of the input's type, except those a monitor
+    publishes.
     """
 
     topic: str
@@ -43,6 +45,7 @@ class Heard:
     times: list[int] = field(default_factory=list)
     samples: list[Any] = field(default_factory=list)
     malformed: list[str] = field(default_factory=list)
+    vendors: dict[str, str] = field(default_factory=dict)
 
     def take(self, decode: Callable[[bytes], JointStateSample | ImuSample], data: bytes) -> None:
         """Decode a message and keep it, or the reason why it cannot be read."""
@@ -74,6 +77,7 @@ class Surroundings:
     """The ROS environment, and the messages received on both inputs in `seconds`.
 
     An input that the configuration does not use is None. `robot` is what the robot tells of itself.
+    `server` and `peers` are where discovery asks, '' for nowhere.
     """
 
     distribution: str
@@ -85,6 +89,9 @@ class Surroundings:
     joint_states: Heard | None
     imu: Heard | None
     robot: Told | None = None
+    transport: Transport | None = None
+    server: str = ''
+    peers: str = ''
 
 
 def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
@@ -122,6 +129,9 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             inputs.get('joint_states'),
             inputs.get('imu'),
             Told(own.topic, tuple(own.heard.values()), own.obstacle()),
+            transport_now(),
+            os.environ.get('ROS_DISCOVERY_SERVER', ''),
+            os.environ.get('ROS_STATIC_PEERS', ''),
         )
         node.destroy_node()
         return found
@@ -162,6 +172,8 @@ def _look(node: Node, heard: Heard, topic: Topic) -> None:
         name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
         bad = level == QoSCompatibility.ERROR
         heard.publishers.append((name, info.topic_type, reason if bad else ''))
+        if vendor := vendor_by(bytes(info.endpoint_gid)):
+            heard.vendors[name] = vendor
     heard.alike = [
         name
         for name, types in node.get_topic_names_and_types()

@@ -36,6 +36,7 @@ from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
 from ugv_acceptance.nodes.monitor.guarded import guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
+from ugv_acceptance.nodes.monitor.motion_desk import MotionDesk
 from ugv_acceptance.nodes.monitor.ok_output import OkOutput
 from ugv_acceptance.nodes.monitor.operator_commands import (
     all_reset,
@@ -47,13 +48,15 @@ from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.parameter_desk import ParameterDesk
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.parameter_types import FittingParameters
+from ugv_acceptance.nodes.transport import transport_now
 
 NAME = 'acceptance_monitor'
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
 
-class Monitor(LifecycleNode):
+class Monitor(FittingParameters, LifecycleNode):
     """The monitor's node. `listener` is called with every verdict and change of an alert."""
 
     def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
@@ -71,6 +74,7 @@ class Monitor(LifecycleNode):
         self.own = OwnDescription(self, self._on_description)
         # Whether it is to bring itself up as soon as the robot tells its URDF.
         self._awaits = False
+        self._transport = transport_now().values()
         self.parameter_desk = ParameterDesk(self, lambda: self.session, lambda: self._margins)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
@@ -82,6 +86,9 @@ class Monitor(LifecycleNode):
         self.create_service(Trigger, '~/reset', self._reset)
         self.desk = OperatorDesk(
             self, lambda: self.session, lambda: self._inputs, self._tell, self.say
+        )
+        self.motions = MotionDesk(
+            self, lambda: self.session, lambda: self._inputs, self.output, self.steady
         )
         self.say()
 
@@ -268,7 +275,9 @@ class Monitor(LifecycleNode):
         self.ok.fall()
         status = self.verdict()
         self.output.verdict(status)
-        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.output.diagnostics(
+            diagnostics_of(status, self.config, self.session, self._inputs, self._transport)
+        )
         self.listener('verdict', status)
 
     def _on_change(self) -> None:

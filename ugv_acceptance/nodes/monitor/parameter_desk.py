@@ -25,6 +25,7 @@ from ugv_acceptance.nodes.monitor.parameters import (
     unknown,
 )
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput
+from ugv_acceptance.nodes.parameter_types import declare
 
 
 class ParameterDesk:
@@ -56,7 +57,7 @@ class ParameterDesk:
         node, tunables = self._node, knobs_of(defaults)
         for tunable in tunables:
             if not node.has_parameter(tunable.name):
-                node.declare_parameter(tunable.name, tunable.get(defaults), tunable.descriptor())
+                declare(node, tunable.name, tunable.get(defaults), tunable.descriptor())
         given = [name for name in node._parameter_overrides if not node.has_parameter(name)]  # noqa: SLF001 - rclpy has no public way
         for warning in unknown(given, tunables):
             node.get_logger().warning(warning)
