@@ -52,7 +52,9 @@ def rnea_of(path: str, given: Trajectory) -> Callable[[], object]:
     """Return a loop over the points in Pinocchio: torques only."""
     model = pin.buildModelFromUrdf(path)
     data, flat = model.createData(), np.zeros(model.nv)
-    points = [pin.integrate(model, pin.neutral(model), np.resize(q, model.nv)) for q in given.positions]
+    points = [
+        pin.integrate(model, pin.neutral(model), np.resize(q, model.nv)) for q in given.positions
+    ]
 
     def run() -> None:
         for q in points:

@@ -1,11 +1,12 @@
-"""Random trajectories, asked of `check` and carried out in MuJoCo: which does it let pass wrongly?
+"""Random trajectories, asked of `check` and carried out in MuJoCo: what does it let pass wrongly.
 
 Each has its own slope, load, points and way of interpolation, and begins where the robot stands and
 holds its arm. MuJoCo's motors are position servos with the configured limits, on a robot with a
 free base; they are given the positions of the trajectory, as a controller gives them. It goes wrong
-where the robot leaves its stance by more than 2 deg, or a motor is at its limit in any time step.
-`check` is asked with limits of just that: no tilt left, 100 % of the torque. Speeds and ranges of
-joints are left out on both sides; so are trajectories that come near the ground.
+where the robot leaves its stance by more than 2 deg, or a motor is at its limit for two time steps
+(5 ms: contacts make single ones jump). `check` is asked with limits of just that: no tilt left,
+100 % of the torque. Speeds and ranges of joints are left out on both sides, and so are
+trajectories that come near the ground.
 
     nice python -m bench.check_trial [--runs 1000] [--seed 1] [--config packbot] [--workers 1]
 """
@@ -54,12 +55,12 @@ from ugv_acceptance.type_aliases import Floats
 
 # The ground of simulated runs, but of rubber: what slips in MuJoCo hops from contact to contact.
 GROUND = replace(BUILD, friction=2.0)
-# Natural frequency (rad/s) of the servos, on the inertia of the outstretched arm: a tenth softer than
-# the check assumes. Stiffer ones, as in simulated runs, shake a light joint on a free base.
+# Natural frequency (rad/s) of the servos, on the inertia of the outstretched arm: a tenth softer
+# than the check assumes. Stiffer ones, as in simulated runs, shake a light joint on a free base.
 SERVO = 1.8 / CORNER
 KINDS = ('linear', 'cubic', 'quintic')
 # Steepest slope (rad), heaviest load (kg, of PackBot), slowest and fastest mean speed (rad/s).
-STEEPEST, HEAVIEST, SPEEDS = math.radians(25.0), 4.0, (0.15, 0.8)
+STEEPEST, HEAVIEST, SPEEDS = math.radians(28.0), 6.0, (0.15, 0.8)
 # Points of a trajectory, the first left out, and its longest time (s).
 FEWEST, MOST, LONGEST = 1, 5, 6.0
 # Least time (s) from point to point.
@@ -88,7 +89,8 @@ class Case:
 class Truth:
     """What MuJoCo did: `lean` (rad) off the stance, `share` of a motor's limit, both the most.
 
-    `unloaded`: all weight was on one edge of the support polygon for a moment.
+    The share is one that lasts for two time steps. `unloaded`: all weight was on one edge of the
+    support polygon for a moment.
     """
 
     lean: float
@@ -162,9 +164,9 @@ def _moved(robot: Robot) -> list[int]:
 
 
 def _points(poses: Poses, rng: np.random.Generator, count: int) -> Floats:
-    """Return postures (n, j): half of the time with short ways from one to the next."""
+    """Return postures (n, j): some with short ways from one to the next."""
     first = poses.anywhere()
-    near = float(rng.uniform(0.15, 1.0)) if rng.random() < 0.7 else 1.0
+    near = float(rng.uniform(0.15, 1.0)) if rng.random() < 0.4 else 1.0
     found = [first]
     for _ in range(count):
         found.append(found[-1] + near * (poses.anywhere() - found[-1]))
@@ -236,12 +238,12 @@ def truth_of(settings: Settings, case: Case) -> Truth:
     mujoco.mj_step(model, data, nstep=round(SETTLE / model.opt.timestep))
     rest, motor = attitude(vehicle, data), vehicle.motor[moved]
     weight, limit = _Weight(vehicle), np.array(settings.limits.torque)
-    lean = share = 0.0
+    lean, share, used = 0.0, 0.0, np.zeros(len(limit))
     for k, target in enumerate(_targets(case, moved, model.opt.timestep)):
         data.ctrl[motor] = target
         mujoco.mj_step(model, data)
-        used = np.abs(data.actuator_force[vehicle.motor]) / limit
-        share = max(share, float(used.max(initial=0.0)))
+        before, used = used, np.abs(data.actuator_force[vehicle.motor]) / limit
+        share = max(share, float(np.minimum(before, used).max(initial=0.0)))
         if k % STRIDE:
             continue
         weight.take(data)
@@ -331,7 +333,9 @@ def print_table(results: Sequence[Result]) -> None:
     print(f'saturates {sum(of.truth.share >= 1.0 - 1e-9 for of in results)}')
     for name, some in (('nothing happened', needless), ('nothing lifted either', kept)):
         of_all, of_fine = len(some) / len(results), len(some) / max(len(fine), 1)
-        kinds = ', '.join(f'{kind} {n}' for kind, n in sorted(Counter(r.kind for r in some).items()))
+        kinds = ', '.join(
+            f'{kind} {n}' for kind, n in sorted(Counter(r.kind for r in some).items())
+        )
         print(f'needlessly refused, {name}: {of_all:.1%} of all, {of_fine:.1%} of those ({kinds})')
     print(f'refused {len(refused)} of {len(results)}', flush=True)
     for of in missed:

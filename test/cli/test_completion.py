@@ -37,6 +37,8 @@ def bash(typed: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         ('model -c packbot_', ['packbot_eod']),
         ('verify r.json --config ab', ['abitobot']),
         ('evaluate run --ground ', ['flat', 'uneven', 'stairs']),
+        ('check reach.yaml --ground u', ['uneven']),
+        ('check reach.yaml --config packbot_eod --posture ST', ['STOW', 'STAIRS']),
         ('map ', ['torque', 'rollover', 'payload', 'drag']),
         ('map drag --orientation nose-down', ['nose-down', 'nose-down-right', 'nose-down-left']),
         ('map --y elbow', ['elbow_joint']),

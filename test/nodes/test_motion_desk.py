@@ -4,9 +4,11 @@ Its driver sends what each test needs; every test leaves the robot at rest, told
 """
 
 import math
+import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -99,11 +101,18 @@ class Site:
         return [a for a in mine if a.values['result'] in results]
 
     def ask(self, message: JointTrajectory) -> Answer:
-        """Ask once and return the answer."""
+        """Ask, again every three seconds as a client does, and return the answer."""
         results = ('permitted', 'refused', 'not_known')
-        before = len(self.of(message, *results))
-        self.out.publish(message)
-        self.until(lambda: len(self.of(message, *results)) > before)
+        before, again = len(self.of(message, *results)), 0.0
+
+        def answered() -> bool:
+            nonlocal again
+            if time.monotonic() >= again:
+                again = time.monotonic() + 3.0
+                self.out.publish(message)
+            return len(self.of(message, *results)) > before
+
+        self.until(answered)
         return self.of(message, *results)[before]
 
     def permitted(self, message: JointTrajectory) -> Answer:
@@ -218,7 +227,7 @@ def test_a_monitor_that_is_not_active_permits_nothing(site: Site) -> None:
     site.permitted(motion(0.1, 0.0))
     site.monitor.trigger_deactivate()
     assert site.withdrawn(motion(0.1, 0.0)).values['cause'] == 'monitor'
-    said = site.ask(motion(0.1, 0.0))
+    said = site.ask(motion(0.12, 0.0))
     assert (said.values['result'], said.text) == (
         'not_known',
         'not known: the monitor is not active',
@@ -231,7 +240,8 @@ def test_a_monitor_that_is_not_active_permits_nothing(site: Site) -> None:
     site.monitor.trigger_configure()
     site.monitor.trigger_activate()
     site.until(lambda: session_of(site.monitor).evaluator.margins is not None)
-    reasons = site.ask(motion(0.1, 0.0)).values['reasons']
+    site.until(lambda: not session_of(site.monitor).level)
+    reasons = site.ask(motion(0.14, 0.0)).values['reasons']
     assert 'nobody told the payload' in reasons
     assert 'nobody told the ground' in reasons
 
@@ -253,6 +263,31 @@ def test_a_permission_that_is_not_used_expires(site: Site) -> None:
     site.permitted(motion(0.1, 0.0))
     site.until(lambda: site.of(motion(0.1, 0.0), 'expired'))
     assert not site.of(motion(0.1, 0.0), 'withdrawn')
+
+
+def test_the_gate_of_the_documentation_goes_on_a_permission_alone(site: Site) -> None:
+    """Its code, as printed: it names trajectories as the monitor does, and goes only if it may."""
+    page = (Path(__file__).parents[2] / 'docs/ros_interface.md').read_text(encoding='utf-8')
+    (code,) = re.findall(r'```python\n(import hashlib.*?)```', page, re.DOTALL)
+    names: dict[str, Any] = {
+        'JointTrajectory': JointTrajectory,
+        'DiagnosticStatus': DiagnosticStatus,
+    }
+    exec(code, names)  # noqa: S102 - our own documentation
+    gone: list[JointTrajectory] = []
+    gate = names['Gate'](site.driver, gone.append)
+    site.until(gate.out.get_subscription_count)
+    for message, goes in ((motion(-0.5, -1.0, -1.5), False), (motion(0.1, 0.0), True)):
+        assert names['sha256_of'](message) == name_of(message)
+
+        def asked(message: JointTrajectory = message) -> bool:
+            due = time.monotonic() > gate.asked + 3.0  # as whoever hears no answer
+            if (gate.waiting is None or due) and not gone:
+                gate.ask(message)
+            return bool(gone or site.of(message, 'refused'))
+
+        site.until(asked)
+        assert bool(gone) is goes
 
 
 def test_neither_noise_nor_a_flood_keeps_the_monitor_from_its_work(site: Site) -> None:

@@ -215,7 +215,7 @@ def test_a_fault_of_ours_is_false(live: Live) -> None:
 def test_the_lock_in_the_documentation_is_open_only_while_the_word_is_true(
     live: Live, repository: Path
 ) -> None:
-    """The team's own node of docs/ros_interface.md, run as it stands there: locked, open, locked."""
+    """The node of docs/ros_interface.md, run as it stands there: locked, open, locked."""
     text = (repository / 'docs' / 'ros_interface.md').read_text('utf-8')
     (code,) = re.findall(r'```python\n(.*?)```', text, re.DOTALL)
     locks, words, driver = Words(), words_of(live), live.driver()

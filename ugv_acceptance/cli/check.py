@@ -1,4 +1,4 @@
-"""`ugv-acceptance check TRAJECTORY`: may the arm move so, with this load, on this ground?"""
+"""`ugv-acceptance check TRAJECTORY`: whether the arm may move so, with this load and ground."""
 
 import math
 from pathlib import Path

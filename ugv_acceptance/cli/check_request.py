@@ -96,7 +96,9 @@ def _chosen(bag: 'Bag', topic: str, found: list['Logged'], when: str) -> 'Logged
     asked = quantity(when, 'time', '--when')
     before = [message for s, message in zip(seconds, found, strict=True) if s <= asked + 5e-3]
     if not before:
-        raise BadConfig(f'--when {when}: {topic} has none before: the first is at {seconds[0]:.2f} s')
+        raise BadConfig(
+            f'--when {when}: {topic} has none before: the first is at {seconds[0]:.2f} s'
+        )
     return before[-1]
 
 
@@ -120,9 +122,7 @@ def conditions_of(
     )
 
 
-def _told(
-    settings: 'Settings', trajectory: 'Trajectory', told: dict[str, float]
-) -> Iterator[bool]:
+def _told(settings: 'Settings', trajectory: 'Trajectory', told: dict[str, float]) -> Iterator[bool]:
     """Yield whether the posture tells of each joint of a trajectory."""
     pairs = zip(settings.robot.joint_names, settings.joints, strict=True)
     names = {of.topic_name: name for name, of in pairs}

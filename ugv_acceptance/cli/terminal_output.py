@@ -37,8 +37,10 @@ COLOURS = {
     'NO DATA': 'bold magenta',
 }
 MARKS = {
-    **{'PASS': '[OK]', 'FAIL': '[X]', 'INCONCLUSIVE': '[?]', 'BAD INPUT': '[!]'},
-    **{'PERMITTED': '[OK]', 'REFUSED': '[X]', 'NOT KNOWN': '[?]'},
+    **dict.fromkeys(('PASS', 'PERMITTED'), '[OK]'),
+    **dict.fromkeys(('FAIL', 'REFUSED'), '[X]'),
+    **dict.fromkeys(('INCONCLUSIVE', 'NOT KNOWN'), '[?]'),
+    'BAD INPUT': '[!]',
 }
 # What standard output is called as a file.
 _STDOUT = {'/dev/stdout', '/dev/fd/1', '/proc/self/fd/1'}

@@ -117,5 +117,3 @@ def _wrong(document: Document, path: Sequence[str | int], expected: str, got: ob
 def _short(found: object) -> str:
     text = repr(found)
     return text if len(text) <= 60 else f'{text[:57]}...'
-
-

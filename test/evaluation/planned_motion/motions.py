@@ -45,13 +45,15 @@ def one_joint(axis: tuple[float, float, float] = (0.0, -1.0, 0.0)) -> Robot:
 
 
 def settings_of(robot: Robot, torque: float = 40.0, **limits: Any) -> Settings:
-    """Return settings of a robot whose topic calls each joint as the robot does, and `_m` behind."""
+    """Return settings of a robot whose messages call each joint as it does, with `_m` behind."""
     names = robot.joint_names
     given = Limits((torque,) * len(names), **({'tip_error': 0.0, 'tip_warn': 0.0} | limits))
     return Settings(robot, tuple(JointInput(f'{name}_m') for name in names), ImuInput(), given)
 
 
-def way(points: Sequence[float], times: Sequence[float], rates: Any = None, more: Any = None) -> Trajectory:
+def way(
+    points: Sequence[float], times: Sequence[float], rates: Any = None, more: Any = None
+) -> Trajectory:
     """Return a trajectory of the one joint."""
     tables = [None if x is None else np.array(x, np.float64)[:, None] for x in (rates, more)]
     return Trajectory(('lift_m',), np.array(times, np.float64), np.array(points)[:, None], *tables)

@@ -29,7 +29,7 @@ G = 9.81
 
 
 def test_a_slow_motion_needs_what_the_arm_weighs_at_its_level_place() -> None:
-    """m g l where the arm is level, on a way whose ends are above and below it."""
+    """M g l where the arm is level, on a way whose ends are above and below it."""
     found = check_motion(settings_of(one_joint()), way([-0.4], [60.0]), level(0.5))
     assert found.joint is not None
     assert found.joint.torque == pytest.approx(MASS * G * LONG, rel=2e-3)
@@ -70,7 +70,7 @@ def test_points_so_close_that_they_are_a_curve_cost_its_acceleration() -> None:
 
 
 def test_the_reaction_of_the_arm_tips_as_its_moment_says() -> None:
-    """Under acceleration the tilt left to the rear is that of weight and reaction about the edge."""
+    """Under acceleration the tilt left to the rear is that of weight and reaction together."""
     start, change, time, rate = math.pi / 2.0, -0.5, 0.4, -1.0
     given = way([start + change, start - 0.9], [time, 3.0], [rate, 0.0])
     found = check_motion(settings_of(one_joint()), given, level(start))

@@ -56,8 +56,6 @@ from ugv_acceptance.type_aliases import Floats
 AT_RANGE, AT_SPEED = 1e-3, 1.01
 
 
-
-
 def check_motion(
     settings: Settings, trajectory: Trajectory, conditions: Conditions
 ) -> CheckedMotion:
@@ -90,7 +88,10 @@ class MotionChecker:
             names = ', '.join(unknown[:4])
             return CheckedMotion(NOT_KNOWN, (f'{names}: no joint that the robot is known by',))
         start, missing = standing_joints(self.settings, conditions, moved)
-        missing += [*not_known(self.settings, conditions), *drives(self.settings, moved, self.wheels)]
+        missing += [
+            *not_known(self.settings, conditions),
+            *drives(self.settings, moved, self.wheels),
+        ]
         if missing or conditions.gravity is None or conditions.payload is None:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]

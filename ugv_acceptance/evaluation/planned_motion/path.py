@@ -3,9 +3,9 @@
 As joint_trajectory_controller has it: between two points that both have accelerations and rates
 along a polynomial of degree 5, with rates of degree 3, else straight. A joint moves by no more
 than STEP (SLIDE) between two moments, one that carries contact points (a flipper, on which the
-margin hangs more steeply) by a part of it. Where the rate changes at once, a drive takes some time for
-it: a position servo of natural frequency w that is damped at least critically, and is given the
-positions, accelerates by at most the change over 2 / w.
+margin hangs more steeply) by a part of it. Where the rate changes at once, a drive takes some time
+for it: a position servo of natural frequency w that is damped at least critically, and is given
+the positions, accelerates by at most the change over 2 / w.
 """
 
 from dataclasses import dataclass
@@ -132,9 +132,7 @@ def steps_of(path: Path, most: Floats) -> NDArray[np.intp]:
     return np.clip(steps, least, MOST)
 
 
-def samples_of(
-    path: Path, steps: NDArray[np.intp], corner: float = CORNER
-) -> Samples:
+def samples_of(path: Path, steps: NDArray[np.intp], corner: float = CORNER) -> Samples:
     """Return the moments to look at, given in how many `steps` (n - 1,) to go from knot to knot.
 
     A drive takes up another rate within `corner` (s).
