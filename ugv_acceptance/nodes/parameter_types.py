@@ -54,7 +54,7 @@ def declare(
 
 
 def _range(descriptor: ParameterDescriptor) -> str:
-    (found,) = [*descriptor.floating_point_range, *descriptor.integer_range]
+    found = (list(descriptor.floating_point_range) + list(descriptor.integer_range))[0]
     return f'{found.from_value:g} to {found.to_value:g}'
 
 
