@@ -4,6 +4,7 @@ What they start is started here as launch would, where it is no node of its own.
 """
 
 import ast
+import json
 import re
 from collections.abc import Iterator
 from importlib.metadata import entry_points
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from console.servers import COMMAND, address_of, running
+from robot_recipe import launched
 
 LAUNCH_FILES = sorted((Path(__file__).resolve().parents[1] / 'launch').glob('*.launch.py'))
 NODES = {'Node', 'LifecycleNode'}
@@ -130,11 +132,12 @@ def test_an_argument_that_is_not_given_leaves_the_parameter_to_the_file() -> Non
     """
     path = LAUNCH_FILES[0].with_name('monitor.launch.py')
     assert {defaults(path)[name] for name in parameters_of(path)} == {''}
-    (made,) = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.DictComp)]
-    (only_if,) = made.generators[0].ifs
-    assert ast.unparse(only_if) == 'context.perform_substitution(LaunchConfiguration(name))'
-    (node,) = calls(path, NODES)
-    assert ast.unparse(keywords(node)['parameters']) == '[*filter(None, (file, parameters))]'
+    (words,) = launched(path, {'params_file': '/robot.yaml'})
+    assert words[-3:] == ['--params-file', '/robot.yaml', '{}']
+    given = {'publish_rate': '10', 'black_box': '/data', 'lock_parameters': 'true'}
+    (words,) = launched(path, {'params_file': '/robot.yaml', **given})
+    told = {'publish_rate': 10.0, 'black_box': '/data', 'lock_parameters': True}
+    assert json.loads(words[-1]) == {'/**': {'ros__parameters': told}}
 
 
 @pytest.mark.parametrize('name', ['params_file', 'black_box', 'publish_rate', 'respawn'])

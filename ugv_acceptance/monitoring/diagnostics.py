@@ -23,7 +23,7 @@ from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
 from ugv_acceptance.monitoring.input_status import InputSources, input_status
 from ugv_acceptance.monitoring.message_order import in_order
 from ugv_acceptance.monitoring.session import Session
-from ugv_acceptance.monitoring.status import Status
+from ugv_acceptance.monitoring.status import Status as Status  # noqa: PLC0414 - others take it from here
 
 # What stands in place of torques while the arm touches the ground with permission.
 TORQUE_NOT_JUDGED = 'torque not judged: the hand may touch the ground'

@@ -54,7 +54,7 @@ def declare(
 
 
 def _range(descriptor: ParameterDescriptor) -> str:
-    (found,) = [*descriptor.floating_point_range, *descriptor.integer_range]
+    found = (list(descriptor.floating_point_range) + list(descriptor.integer_range))[0]
     return f'{found.from_value:g} to {found.to_value:g}'
 
 
@@ -131,7 +131,14 @@ def _cut(text: str) -> str:
     return text if len(text) <= _SHOWN else f'{text[: _SHOWN - 4]} ...'
 
 
-class FittingParameters(Node if TYPE_CHECKING else object):
+# To type checkers it is a node; before Node among the bases of a class it must not be one.
+if TYPE_CHECKING:
+    _Base = Node
+else:
+    _Base = object
+
+
+class FittingParameters(_Base):
     """A node whose parameters can be set to integers where doubles are declared.
 
     To be named before Node among the bases of a class.
