@@ -129,7 +129,8 @@ def steps_of(path: Path, most: Floats) -> NDArray[np.intp]:
     travel = 5.0 * np.abs(np.diff(path.hull, axis=1)).max(axis=1, initial=0.0)
     steps = np.ceil(np.minimum(travel / most, MOST).max(axis=1, initial=0.0)).astype(np.intp)
     least = np.where(path.degree == 1, LEAST[1], np.where(path.degree == 3, LEAST[3], LEAST[5]))
-    return np.clip(steps, least, MOST)
+    found: NDArray[np.intp] = np.clip(steps, least, MOST)
+    return found
 
 
 def samples_of(path: Path, steps: NDArray[np.intp], corner: float = CORNER) -> Samples:
