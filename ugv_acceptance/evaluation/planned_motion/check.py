@@ -131,7 +131,7 @@ class _Work:
     def answer(self, conditions: Conditions, points: int) -> CheckedMotion:
         """Return the answer of a trajectory of so many points."""
         self.points = points
-        self.unknown += not_configured(self.settings)
+        self.unknown.extend(not_configured(self.settings))
         self._judge_joints()
         found = self._margins(self.checker.mechanics)
         joints = self._judge_torques(found)
