@@ -60,7 +60,7 @@ def trajectory_from(data: bytes) -> TrajectoryMessage:
     names = tuple(cursor.text(f'joint_names[{i}]') for i in range(number))
     count = _some(cursor.count('points'), MOST_POINTS, 'points', 'points')
     points = _Points(data, number, little=cursor.little)
-    points.hashed += [name.encode() + b'\0' for name in names]
+    points.hashed.extend(name.encode() + b'\0' for name in names)
     points.read(cursor.pos, count)
     positions, *others = (points.rows[name] for name in FIELDS)
     return TrajectoryMessage(
