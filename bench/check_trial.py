@@ -32,7 +32,6 @@ from ugv_acceptance.evaluation.planned_motion import (
 )
 from ugv_acceptance.evaluation.planned_motion.path import STEP, Knots, path_of, samples_of, steps_of
 from ugv_acceptance.evaluation.planned_motion.path import Path as Way
-from ugv_acceptance.evaluation.planned_motion.request import CORNER
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.clearance import clearance
 from ugv_acceptance.model.mechanics import mechanics_of
@@ -55,9 +54,10 @@ from ugv_acceptance.type_aliases import Floats
 
 # The ground of simulated runs, but of rubber: what slips in MuJoCo hops from contact to contact.
 GROUND = replace(BUILD, friction=2.0)
-# Natural frequency (rad/s) of the servos, on the inertia of the outstretched arm: a tenth softer
-# than the check assumes. Stiffer ones, as in simulated runs, shake a light joint on a free base.
-SERVO = 1.8 / CORNER
+# Natural frequency (rad/s) of the servos, on the inertia of the outstretched arm: stiffer ones, as
+# in simulated runs, shake a light joint on a free base. The time (s) they take for another rate.
+SERVO = 36.0
+CORNER = 2.5 / SERVO
 KINDS = ('linear', 'cubic', 'quintic')
 # Steepest slope (rad), heaviest load (kg, of PackBot), slowest and fastest mean speed (rad/s).
 STEEPEST, HEAVIEST, SPEEDS = math.radians(28.0), 6.0, (0.15, 0.8)
@@ -153,7 +153,9 @@ def case_of(settings: Settings, number: int, seed: int) -> Case:
         x, y, z = gravity.tolist()
         if trajectory.times[-1] < LONGEST and _clear(settings, trajectory, way[0], moved, load):
             start = tuple(way[0].tolist())
-            return Case(kind, slope, trajectory, Conditions((x, y, z), load, None, start))
+            return Case(
+                kind, slope, trajectory, Conditions((x, y, z), load, None, start, corner=CORNER)
+            )
 
 
 def _moved(robot: Robot) -> list[int]:

@@ -52,6 +52,8 @@ from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import INVERTED, NO_CONTACT, SIDES, STATES, UNKNOWN
 from ugv_acceptance.type_aliases import Floats
 
+# Share of a torque limit that is kept: no drive follows its plan exactly.
+RESERVE = 0.02
 # A plan at its joint's range or speed is not past it: rad or m, share of the speed.
 AT_RANGE, AT_SPEED = 1e-3, 1.01
 
@@ -131,7 +133,7 @@ class _Work:
     def answer(self, conditions: Conditions, points: int) -> CheckedMotion:
         """Return the answer of a trajectory of so many points."""
         self.points = points
-        self.unknown += not_configured(self.settings)
+        self.unknown.extend(not_configured(self.settings))
         self._judge_joints()
         found = self._margins(self.checker.mechanics)
         joints = self._judge_torques(found)
@@ -209,9 +211,10 @@ class _Work:
             time, point = float(self.samples.time[row]), int(self.samples.point[row])
             uses.append(JointUse(name, float(size[row]), limit, time, point, joint.slides))
         uses.sort(key=lambda use: -use.share)
+        most = limits.torque_error - RESERVE
         for use in uses:
-            if use.share >= limits.torque_error:
-                self.refusals.append(words.use_words(use, limits.torque_error, self.points))
+            if use.share >= most:
+                self.refusals.append(words.use_words(use, most, self.points))
             elif use.share >= limits.torque_warn:
                 self.cautions.append(words.use_words(use, limits.torque_warn, self.points))
         if unlimited:

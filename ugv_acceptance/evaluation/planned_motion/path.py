@@ -4,8 +4,9 @@ As joint_trajectory_controller has it: between two points that both have acceler
 along a polynomial of degree 5, with rates of degree 3, else straight. A joint moves by no more
 than STEP (SLIDE) between two moments, one that carries contact points (a flipper, on which the
 margin hangs more steeply) by a part of it. Where the rate changes at once, a drive takes some time
-for it: a position servo of natural frequency w that is damped at least critically, and is given
-the positions, accelerates by at most the change over 2 / w.
+for it: a critically damped position servo of natural frequency w, which is given the positions,
+accelerates by at most 0.37 w of the change; 0.4 w where the arm's inertia is half of that which the
+servo is tuned for, 0.5 w where it is next to none.
 """
 
 from dataclasses import dataclass

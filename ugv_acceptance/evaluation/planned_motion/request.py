@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.type_aliases import Floats
 
-# Time (s) in which a drive takes up another rate: 2 / w of a position servo of w = 40 rad/s.
+# Time (s) in which a drive takes up another rate: 2.5 / w of a position servo of w = 50 rad/s.
 CORNER = 0.05
 
 
