@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from ugv_acceptance import BadBag
@@ -74,10 +75,10 @@ def cost(joints: int, imu: int, seconds: float) -> str:
 
 def settle(process: 'subprocess.Popen[bytes]') -> None:
     """Wait until a process has come up: it takes next to nothing while nothing comes."""
-    time.sleep(3.0)
-    before = cpu(process.pid)
-    while time.sleep(1.0) or cpu(process.pid) - before > 0.05:
-        before = cpu(process.pid)
+    before, now = -1.0, 0.0
+    while now - before > 0.05:
+        time.sleep(2.0)
+        before, now = now, cpu(process.pid)
 
 
 def killed(times: int, split: str, seed: int) -> bool:
@@ -92,7 +93,7 @@ def killed(times: int, split: str, seed: int) -> bool:
             path, after = Path(folder) / f'run_{k}', rng.uniform(0.5, 8.0)
             words = ['--split', split] if split else []
             with child('-c', CODE, 'record', '--out', str(path), *words) as process:
-                until(lambda path=path: any(map(_holds, path.glob('*.mcap'))))
+                until(partial(_begun, path))
                 time.sleep(after)
                 process.kill()
                 end = time.time_ns()
@@ -110,8 +111,8 @@ def killed(times: int, split: str, seed: int) -> bool:
     return good == times
 
 
-def _holds(file: Path) -> bool:
-    return file.stat().st_size > 2_000
+def _begun(path: Path) -> bool:
+    return any(file.stat().st_size > 2_000 for file in path.glob('*.mcap'))
 
 
 def left_in(path: Path, end: int) -> tuple[int, float] | None:

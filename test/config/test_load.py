@@ -10,7 +10,7 @@ import pytest
 from config.robot_files import URDF, YAML, write_robot
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.config import Config, load
+from ugv_acceptance.config import Config, load, name_and_topics
 from ugv_acceptance.model.robot import Mimic
 
 
@@ -33,6 +33,19 @@ def test_numbers_come_out_in_si(tmp_path: Path) -> None:
     assert settings.limits.torque == pytest.approx((40.67453845, 100.0))
     assert (settings.joints[0].sign, settings.joints[0].offset) == (-1.0, math.pi / 2)
     assert settings.robot.contacts[0].position == (1.0, 1.0, 0.0)
+
+
+def test_name_and_topics_need_no_urdf(tmp_path: Path) -> None:
+    """Where only the robot tells its URDF they come from the file alone, else they are the same."""
+    path = write_robot(tmp_path, YAML, URDF)
+    config = load(path)
+    assert name_and_topics(path) == (config.name, config.topics)
+    line = next(line for line in YAML.splitlines() if line.startswith('urdf:'))
+    alone = tmp_path / 'alone.yaml'
+    alone.write_text(YAML.replace(line, 'topics: {imu: {name: my_imu}, joint_states: null}'))
+    name, topics = name_and_topics(alone)
+    assert (name, topics.names) == (config.name, (None, 'my_imu', config.topics.payload.name))
+    assert topics.payload == config.topics.payload
 
 
 def test_defaults_are_those_of_the_settings(tmp_path: Path) -> None:

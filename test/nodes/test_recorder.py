@@ -14,7 +14,7 @@ import pytest
 import rclpy
 import yaml
 from geometry_msgs.msg import InertiaStamped
-from nodes.live_case import FOLDED, Live, imu, joints, session_of
+from nodes.live_case import FOLDED, Live, imu, joints, parameter, session_of
 from nodes.tf2_type import provide_tf2_msgs
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Imu
@@ -42,7 +42,9 @@ KEPT, LOST = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
 
 def qos(reliability: ReliabilityPolicy, durability: DurabilityPolicy = LOST) -> QoSProfile:
     """Return what a publisher offers."""
-    return QoSProfile(depth=100, reliability=reliability, durability=durability)
+    make: Any = QoSProfile
+    made: QoSProfile = make(depth=100, reliability=reliability, durability=durability)
+    return made
 
 
 @contextmanager
@@ -265,8 +267,8 @@ def test_another_limit_or_load_of_the_monitor_is_never_passed_over(
     with recording(live, tmp_path / 'run') as (node, _):
         live.until(lambda: parameters_told(node) and heard(node, '/imu/data') > 50, driver.send)
         before = parameters_told(node)
-        value = rclpy.parameter.Parameter('limits.torque_warn', value=0.5)
-        assert monitor.set_parameters([value])[0].successful
+        half = parameter('limits__torque_warn', 0.5)
+        assert monitor.set_parameters([half])[0].successful
         live.until(lambda: parameters_told(node) > before, driver.send)
         wait(live, driver, 1.0)
     told = parameters_in(open_recording(tmp_path / 'run'))

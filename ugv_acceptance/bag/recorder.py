@@ -85,8 +85,8 @@ class Recorder:
         if self.free < self.room.reserve:
             self._writer.close()
             raise BadBag(
-                f'{self.folder}: expected at least {self.room.reserve / 1e6:.0f} MB left on the '
-                f'disk, which are to stay free, got {self.free / 1e6:.0f} MB'
+                f'{self.folder}: expected at least {self.room.reserve / 1e6:.6g} MB left on the '
+                f'disk, which are to stay free, got {self.free / 1e6:.6g} MB'
             )
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
         self._thread.start()
@@ -190,8 +190,10 @@ class Recorder:
             raise FileNotFoundError(errno.ENOENT, 'the file is gone', str(self._writer.path))
         self.free = free_bytes(self.folder)
         if self.free < self.room.reserve:
-            left = f'{self.free / 1e6:.0f} of {self.room.reserve / 1e6:.0f} MB'
-            self.trouble = f'{left} that are to stay free are left on the disk'
+            self.trouble = (
+                f'{self.free / 1e6:.3g} MB are left on the disk, and {self.room.reserve / 1e6:.3g} '
+                'MB are to stay free'
+            )
 
 
 def free_bytes(folder: Path) -> int:

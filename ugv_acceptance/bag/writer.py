@@ -116,7 +116,8 @@ class BagWriter:
     @property
     def written_bytes(self) -> int:
         """Bytes in all files."""
-        return self._bytes + (0 if self._file.closed else self._mcap.written)
+        present = self.path.name not in {part.name for part in self._parts[-1:]}
+        return self._bytes + (self._mcap.written if present else 0)
 
     def _new_file(self) -> tuple[Path, FileIO, McapWriter]:
         path = self.directory / f'{self.directory.name}_{len(self._parts)}.mcap'

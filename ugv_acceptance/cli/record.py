@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ['CONTEXT', 'record']
 
 # Seconds between looks at how much the recordings take that stay.
-_PRUNE = 10.0
+PRUNE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,10 +143,12 @@ def carry_out(asked: Asked, arguments: list[str]) -> str:
     """Record until it is interrupted, over, or cannot go on; return why it could not."""
     from ugv_acceptance.bag.recorder import Recorder
     from ugv_acceptance.cli.record_status import Lines, Panel, Progress, print_summary
-    from ugv_acceptance.cli.terminal_output import console_of, said_of_work
+    from ugv_acceptance.cli.terminal_output import complain, console_of, said_of_work
     from ugv_acceptance.nodes.executor import end, ros, spin
     from ugv_acceptance.nodes.recorder import RecorderNode
 
+    # Before it looks at the room on the disk: that is what old recordings are deleted for.
+    _prune(asked, complain)
     with ros(arguments) as stop:
         recorder = Recorder(asked.folder, asked.room)
         progress = Progress(recorder, asked.room.reserve, time.monotonic())
@@ -156,10 +159,7 @@ def carry_out(asked: Asked, arguments: list[str]) -> str:
             with shown:
                 node = RecorderNode(recorder, asked.topics, asked.extra, shown.tell)
                 node.create_timer(1.0, _drawing(shown, node), clock=node.steady)
-                pruner = _pruner(asked, shown.tell)
-                if pruner is not None:
-                    node.create_timer(_PRUNE, pruner, clock=node.steady)
-                    pruner()
+                node.create_timer(PRUNE, partial(_prune, asked, shown.tell), clock=node.steady)
                 spin(node, stop, lambda: _is_over(recorder, progress, asked.seconds))
                 node.close()
         finally:
@@ -183,18 +183,14 @@ def _is_over(recorder: 'Recorder', progress: 'Progress', seconds: float | None) 
     return bool(recorder.trouble) or (seconds is not None and progress.seconds >= seconds)
 
 
-def _pruner(asked: Asked, tell: Callable[[str], None]) -> Callable[[], None] | None:
-    """Return what deletes older recordings; None where nobody asked for it."""
-    keep = asked.keep
-    if keep is None:
-        return None
+def _prune(asked: Asked, tell: Callable[[str], None]) -> None:
+    """Delete older recordings, if that was asked for, and say which."""
+    if asked.keep is None:
+        return
     from ugv_acceptance.bag.recordings_kept import prune
 
-    def pruned() -> None:
-        try:
-            for path in prune(asked.robot, keep, asked.folder):
-                tell(f'deleted {path}, as --keep asks')
-        except (AcceptanceError, OSError) as error:
-            tell(f'--keep: {error}')
-
-    return pruned
+    try:
+        for path in prune(asked.robot, asked.keep, asked.folder):
+            tell(f'deleted {path}, as --keep asks')
+    except (AcceptanceError, OSError) as error:
+        tell(f'--keep: {error}')
