@@ -35,7 +35,7 @@ COLCON := out/colcon
 # Files and folders of tests that `make colcon` leaves to `make pytest`: what depends on the versions of Python and
 # NumPy is in the others, and in the nodes.
 ONCE := $(foreach name,angles bag_player console_after console_inputs foxglove_bridge hand_may_touch imu_mounting kills layers levels monitor_control monitor_inputs operator \
-    own_description packbot_simulator page_of_ plain_english recipe relaxed restarted robot_listener run_verb soak \
+    own_description packbot_simulator page_of_ parameter_types plain_english recipe relaxed restarted robot_listener run_verb soak \
     stamps tell termination viewers words, \
     '--ignore-glob=*test_$(name)*') \
     $(foreach folder,advice bench campaign cases chassis cli configure console drill effort error_rate hardening monitoring offline plan \

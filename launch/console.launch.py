@@ -36,12 +36,19 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 'token', default_value='', description='word that a browser must bring'
             ),
+            DeclareLaunchArgument(
+                'respawn',
+                default_value='false',
+                description='true: start the console again whenever it ends by itself',
+            ),
             Node(
                 package='ugv_acceptance',
                 executable='ugv-acceptance',
                 name='acceptance_console',
                 namespace=LaunchConfiguration('namespace'),
                 output='screen',
+                respawn=LaunchConfiguration('respawn'),
+                respawn_delay=2.0,
                 arguments=[
                     'console',
                     ['--config=', LaunchConfiguration('config')],

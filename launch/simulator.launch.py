@@ -22,6 +22,7 @@ def generate_launch_description() -> LaunchDescription:
         'config': LaunchConfiguration('config'),
         'namespace': LaunchConfiguration('namespace'),
     }
+    watched = {**robot, 'params_file': LaunchConfiguration('params_file')}
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -36,7 +37,12 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 'console', default_value='true', description='serve the operator page as well'
             ),
-            IncludeLaunchDescription(ours('monitor.launch.py'), launch_arguments=robot.items()),
+            DeclareLaunchArgument(
+                'params_file',
+                default_value='',
+                description='YAML file of parameters of the monitor; config counts before it',
+            ),
+            IncludeLaunchDescription(ours('monitor.launch.py'), launch_arguments=watched.items()),
             IncludeLaunchDescription(
                 ours('console.launch.py'),
                 launch_arguments=robot.items(),

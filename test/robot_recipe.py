@@ -213,12 +213,37 @@ def launched(path: Path, given: Mapping[str, str]) -> Iterator[list[str]]:
                 share = entity.words[0].words[0]
                 handed = {key: value_of(v, values) for key, v in named['launch_arguments']}
                 yield from launched(path.with_name(share.words[0][-1]), handed)
+            case 'OpaqueFunction':
+                nodes = named['function'](Context(values))
+                yield from (node_words(node.named, values) for node in nodes)
             case _:
-                parameters = {k: value_of(v, values) for k, v in named['parameters'][0].items()}
-                wild = {'/**': {'ros__parameters': parameters}}
-                words = [str(value_of(word, values)) for word in named.get('arguments', ())]
-                name = f'__node:={named["name"]}'
-                yield [named['executable'], *words, '--ros-args', '-r', name, json.dumps(wild)]
+                yield node_words(named, values)
+
+
+@dataclass(frozen=True)
+class Context:
+    """Stands for launch's context, which knows the arguments of a launch file."""
+
+    values: Mapping[str, str]
+
+    def perform_substitution(self, given: Any) -> str:
+        """Return what is told for an argument."""
+        return str(value_of(given, self.values))
+
+
+def node_words(named: Mapping[str, Any], values: Mapping[str, str]) -> list[str]:
+    """Return the words that start a node; the last are its parameters, as JSON."""
+    parameters: dict[str, Any] = {}
+    files: list[str] = []
+    for given in named['parameters']:
+        if isinstance(given, dict):
+            parameters |= {k: value_of(v, values) for k, v in given.items()}
+        else:
+            files += ['--params-file', given]
+    wild = {'/**': {'ros__parameters': parameters}} if parameters else {}
+    words = [str(value_of(word, values)) for word in named.get('arguments', ())]
+    name = f'__node:={named["name"]}'
+    return [named['executable'], *words, '--ros-args', '-r', name, *files, json.dumps(wild)]
 
 
 def started(command: str, folder: Path) -> list[list[str]]:
@@ -232,8 +257,10 @@ def started(command: str, folder: Path) -> list[list[str]]:
     for number, words in enumerate(found):
         words[0] = str(prefix / 'lib' / package / words[0])
         file = folder / f'parameters_{number}.yaml'
-        file.write_text(words.pop(), encoding='utf-8')  # JSON is YAML
-        words += ['--params-file', str(file)]
+        told = words.pop()
+        if json.loads(told):
+            file.write_text(told, encoding='utf-8')  # JSON is YAML
+            words += ['--params-file', str(file)]
     return found
 
 

@@ -35,7 +35,7 @@ def trial(count: int, seed: int = 0) -> Outcome:
     rng, taken, bad, seen = Random(seed), 0, list[str](), list[Margins]()
     with ros_context(), live_nodes() as live:
         monitor, driver = live.running()
-        tunables = monitor.tunables
+        tunables = monitor.parameter_desk.tunables
         session_of(monitor).on_margins = lambda _stamp, margins: seen.append(margins)
         for k in range(count):
             names = rng.sample(sorted(VALUES), 1 + rng.randrange(4))

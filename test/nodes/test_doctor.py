@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from config.robot_files import YAML, write_robot
 from nodes.live_case import FOLDED, NAMES, Live, imu, joints
+from rclpy.utilities import get_rmw_implementation_identifier
 from sensor_msgs.msg import JointState
 
 from ugv_acceptance import BadSample
@@ -312,6 +313,10 @@ def test_it_hears_a_real_robot(live: Live) -> None:
     assert 'OK      joint names: all 4' in text
     assert 'OK      imu gravity' in text
     assert 'OK      imu orientation' in text
+    assert f'transport: {get_rmw_implementation_identifier()}: ' in text
+    assert 'room for about' in text
+    assert f'discovery: ROS_DOMAIN_ID {os.environ.get("ROS_DOMAIN_ID", "0")}, range ' in text
+    assert 'middleware' not in text
 
 
 @pytest.mark.parametrize(

@@ -295,13 +295,13 @@ def test_random_sets_are_wholly_taken_or_wholly_refused(live: Live, data: st.Dat
     monitor: Any = live.nodes[0] if live.nodes else live.monitor()
     names = data.draw(st.sets(st.sampled_from(sorted(VALUES)), min_size=1))
     values = {name: data.draw(VALUES[name]) for name in names}
-    before = {k.name: monitor.get_parameter(k.name).value for k in monitor.tunables}
+    before = {k.name: monitor.get_parameter(k.name).value for k in monitor.parameter_desk.tunables}
     taken = put(monitor, **values).successful
-    after = {k.name: monitor.get_parameter(k.name).value for k in monitor.tunables}
+    after = {k.name: monitor.get_parameter(k.name).value for k in monitor.parameter_desk.tunables}
     new = {name.replace('__', '.'): value for name, value in values.items()}
     assert after == (before | new if taken else before)
     used = session_of(monitor).settings
-    told = {k.name: k.get(used) for k in monitor.tunables}
+    told = {k.name: k.get(used) for k in monitor.parameter_desk.tunables}
     assert {k: v for k, v in told.items() if v != pytest.approx(after[k])} == {}
     assert used.limits.torque_warn <= used.limits.torque_error
 

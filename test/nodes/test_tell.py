@@ -142,7 +142,7 @@ def test_an_alarm_is_acknowledged_then_reset_and_neither_before_its_time(site: S
     code, out, refusal = site.tell('reset')
     assert (code, out) == (1, '')
     assert (
-        'refused: reset: TIP_OVER front (DANGER) is over, not acknowledged: acknowledge first'
+        'refused: reset: acknowledge first: TIP_OVER front (DANGER) is over, not acknowledged'
         in refusal
     )
     code, said, _ = site.tell('acknowledge', 'tip_over', '--by', 'Ada', '--note', 'stands well')

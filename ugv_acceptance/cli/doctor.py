@@ -49,12 +49,14 @@ def consult(config: Path | None, urdf: Path | None, seconds: float, args: list[s
         tell(console, 'FAIL', 'ROS', 'not found', _NO_ROS)
         return AILING
     from ugv_acceptance.nodes.doctor.checks import examine
+    from ugv_acceptance.nodes.doctor.network import network
     from ugv_acceptance.nodes.doctor.probe import listen
     from ugv_acceptance.nodes.monitor.own_description import load_live
 
     loaded = load_live(config, urdf, args)
     say(said_of_work(), f'Listening for {seconds:g} s; let the robot stand still.')
-    return _print(list(examine(listen(loaded.topics, seconds, args), loaded)))
+    around = listen(loaded.topics, seconds, args)
+    return _print([*examine(around, loaded), *network(around)])
 
 
 def _print(findings: 'Sequence[Finding]') -> int:

@@ -44,7 +44,7 @@ class AlertBook:
             subject,
             level,
             state.value + (', shelved' if shelved else ''),
-            message.removeprefix(f'{how}: '),
+            values.get('happened') or message.removeprefix(f'{how}: '),
             values.get('do', ''),
             _whole(values.get('start_ns')) or 0,
             None if state.active else _whole(values.get('end_ns')) or 0,

@@ -27,8 +27,9 @@ class Finding:
 class Heard:
     """The messages of one input: receipt times (ns), samples, and the publishers.
 
-    `publishers` are (node, type, why its QoS does not match). `alike` are the other topics with
-    messages of the input's type, except those a monitor publishes. `sampled` are the receipt times
+    `publishers` are (node, type, why its QoS does not match), `vendors` their nodes' DDS where that
+    is known. `alike` are the other topics with messages of the input's type, except those a monitor
+    publishes. `sampled` are the receipt times
     of `samples`; empty: the samples are the messages of `times`. `still` are samples of a time in
     which the robot stood still; None: whoever asked for them lets it stand still.
     """
@@ -42,6 +43,7 @@ class Heard:
     malformed: list[str] = field(default_factory=list)
     sampled: list[int] = field(default_factory=list)
     still: list[Any] | None = None
+    vendors: dict[str, str] = field(default_factory=dict)
 
     def take(self, decode: Callable[[bytes], JointStateSample | ImuSample], data: bytes) -> None:
         """Decode a message and keep it, or the reason why it cannot be read."""

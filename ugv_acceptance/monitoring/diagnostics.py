@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from dataclasses import replace
+from types import MappingProxyType
 
 from ugv_acceptance import __version__
 from ugv_acceptance.config import Config
@@ -11,7 +11,6 @@ from ugv_acceptance.evaluation.alerts.alarms import Alarm, Change, State, key_of
 from ugv_acceptance.evaluation.alerts.messages import suspect_of
 from ugv_acceptance.evaluation.alerts.rules import urgency
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, OK, STALE, WARN, Alert
-from ugv_acceptance.evaluation.criteria.imu_mounting import mounting_words
 from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_words
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
@@ -21,25 +20,17 @@ from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
+from ugv_acceptance.monitoring.input_status import InputSources, input_status
+from ugv_acceptance.monitoring.message_order import in_order
 from ugv_acceptance.monitoring.session import Session
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """One diagnostic status: `level` as in DiagnosticStatus, name, a sentence, and values."""
-
-    level: int
-    name: str
-    message: str
-    values: dict[str, object] = field(default_factory=dict)
-
+from ugv_acceptance.monitoring.status import Status as Status
 
 # What stands in place of torques while the arm touches the ground with permission.
 TORQUE_NOT_JUDGED = 'torque not judged: the hand may touch the ground'
 
 
 def verdict_of(session: Session) -> Status:
-    """Return the verdict line for the operator: most severe cause, what is left, what to do."""
+    """Return the verdict line for the operator: most severe cause, what to do, what is left."""
     alarm_tracker, now = session.alarm_tracker, session.clock.now()
     margins, active = session.evaluator.margins, session.active
     session.advisory.renew(now, active)
@@ -97,7 +88,7 @@ def _worst(
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
     do = advisory.do(first)
     sentence = session.faults.sentence(_now(first, session), session.settings)
-    text = '; '.join([f'{sentence}{more}', *_more(left, sentence), do])
+    text = in_order(sentence, do, *_more(left, sentence), more=more)
     own = {
         **_named(first),
         'do': do,
@@ -180,6 +171,7 @@ def _severity(alert: Alert) -> tuple[int, int]:
 def alert_status(change: Change, session: Session) -> Status:
     """Return a change of an alarm as a status, ready to be published."""
     alert, rule = change.alert, change.alert.rule
+    sentence, do = session.faults.sentence(alert, session.settings), session.advisory.do(alert)
     shelved = session.alarm_tracker.alarms.shelved(key_of(rule))
     values: dict[str, object] = {
         'state': change.how,
@@ -190,7 +182,8 @@ def alert_status(change: Change, session: Session) -> Status:
         'end_ns': '' if alert.end is None else alert.end,
         'peak': float(alert.peak),
         'worst_ns': _worst_ns(alert),
-        'do': session.advisory.do(alert),
+        'happened': sentence,
+        'do': do,
         'class': suspect_of(rule.code),
         'alarm': change.state.value,
         'offers': ','.join(_offers(change, shelved=shelved)),
@@ -201,8 +194,9 @@ def alert_status(change: Change, session: Session) -> Status:
         'limits_hash': session.limits_hash,
     }
     level = OK if change.how in {'cleared', 'reset'} else rule.level
-    sentence = session.faults.sentence(alert, session.settings)
-    return Status(level, f'{rule.code} {rule.subject}', f'{change.how}: {sentence}', values)
+    wanted = do if change.state.active else ''
+    text = in_order(sentence, wanted, before=f'{change.how}: ')
+    return Status(level, f'{rule.code} {rule.subject}', text, values)
 
 
 def _offers(change: Change, *, shelved: bool) -> Iterator[str]:
@@ -285,58 +279,39 @@ def _doubted(status: Status) -> Status:
 
 def unavailable(problem: str) -> Status:
     """Return the verdict (STALE) of a monitor that is not active, with the `problem` if any."""
-    text = f'the monitor is not active: {problem}' if problem else 'the monitor is not active'
-    return Status(STALE, '', text, {'do': problem or 'configure and activate it'})
-
-
-class Subscribed(Protocol):
-    """What diagnostics need to know of a subscription."""
-
-    @property
-    def topic_name(self) -> str:
-        """The name of its topic, with remappings and namespace applied."""
-
-
-class Publishing(Protocol):
-    """What diagnostics need to know of the publishers of an input."""
-
-    @property
-    def restarted(self) -> Sequence[str]:
-        """Names of the drivers that were restarted."""
-
-
-class InputSources(Protocol):
-    """What diagnostics need of the inputs' subscriptions; see nodes/monitor/subscriptions.py."""
-
-    @property
-    def publishers(self) -> Mapping[str, Sequence[str]]:
-        """The full names of the nodes that publish each input."""
-
-    @property
-    def subscriptions(self) -> Mapping[str, Subscribed]:
-        """The subscription of each input."""
-
-    @property
-    def voices(self) -> Mapping[str, Publishing]:
-        """The live publishers of each input, see publisher_identity.py."""
+    do = problem or 'configure and activate it'
+    return Status(STALE, '', f'the monitor is not active: {do}', {'do': do})
 
 
 def diagnostics_of(
-    verdict: Status, config: Config | None, session: Session | None, inputs: 'InputSources | None'
+    verdict: Status,
+    config: Config | None,
+    session: Session | None,
+    inputs: InputSources | None,
+    transport: Mapping[str, object] = MappingProxyType({}),
 ) -> list[Status]:
-    """Return all statuses for /diagnostics; the first is the monitor itself."""
-    statuses = [_monitor(verdict, config, session)]
+    """Return all statuses for /diagnostics; the first is the monitor itself.
+
+    `transport` are values that say how messages reach it.
+    """
+    statuses = [_monitor(verdict, config, session, transport)]
     if session is not None:
         active = session.active
         moving = session.evaluator.moving
         found = margin_statuses(session.evaluator, active, moving)
         statuses += map(_doubted, found) if session.evaluator.joints.doubted else found
-        statuses += [_input(name, session, inputs, active) for name in session.counts]
+        worst_first = sorted(active, key=_severity, reverse=True)
+        statuses += [input_status(name, session, inputs, worst_first) for name in session.counts]
     return statuses
 
 
-def _monitor(verdict: Status, config: Config | None, session: Session | None) -> Status:
-    values: dict[str, object] = {'version': __version__}
+def _monitor(
+    verdict: Status,
+    config: Config | None,
+    session: Session | None,
+    transport: Mapping[str, object],
+) -> Status:
+    values: dict[str, object] = {'version': __version__, **transport}
     if config is not None:
         values |= {
             'robot': config.name,
@@ -352,37 +327,3 @@ def _monitor(verdict: Status, config: Config | None, session: Session | None) ->
             'use_sim_time': session.stamps.simulated,
         }
     return Status(verdict.level, 'Monitor', verdict.message, {**values, **verdict.values})
-
-
-def _input(
-    name: str, session: Session, inputs: 'InputSources | None', active: list[Alert]
-) -> Status:
-    count, now = session.counts[name], session.clock.now()
-    mine = [a for a in active if a.rule.subject == name]
-    nodes = inputs.publishers.get(name, []) if inputs else []
-    age = (now - count.last) / 1e9 if count.taken else float('nan')
-    rate = session.rates.get(name, 0.0)
-    values: dict[str, object] = {
-        'topic': inputs.subscriptions[name].topic_name if inputs else '',
-        'rate_hz': rate,
-        'age_s': age,
-        'messages': count.taken,
-        'malformed': count.malformed,
-        'lost': count.lost,
-        'publishers': len(nodes),
-        'published_by': ', '.join(nodes),
-    }
-    if inputs and inputs.voices[name].restarted:
-        values['restarted'] = ', '.join(inputs.voices[name].restarted)
-    if name == 'imu':
-        of = session.evaluator.orientations
-        values |= {f'orientation_{how}': number for how, number in of.items()}
-        mount = session.evaluator.mount
-        values['mounting'] = mounting_words(mount.settings, mount.found, mount.why)
-    if count.reason:
-        values['last_malformed'] = count.reason
-    level = max([a.rule.level for a in mine], default=OK)
-    if not count.taken and name != 'payload':
-        level = STALE
-    text = '; '.join(session.faults.sentence(a, session.settings) for a in mine)
-    return Status(level, f'Input {name}', text or f'{rate:.1f} Hz', values)

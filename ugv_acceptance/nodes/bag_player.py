@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from rosgraph_msgs.msg import Clock
 from ugv_acceptance import AcceptanceError, BadBag, BadConfig
 from ugv_acceptance.bag.raw import Logged, Offered, messages, offered
 from ugv_acceptance.bag.reader import Bag, open_bag
+from ugv_acceptance.nodes import parameter_types
 from ugv_acceptance.nodes.executor import BAD_INPUT, Stop, ros
 from ugv_acceptance.nodes.monitor.parameters import described
 from ugv_acceptance.nodes.replay_stamps import NS, Stamped, Stamps, stamped
@@ -172,7 +174,7 @@ def _clock_at(now: int) -> Clock:
 
 def play_from(node: Node) -> Play:
     """Return the options of a replay from the parameters of a node."""
-    declare = node.declare_parameter
+    declare = partial(parameter_types.declare, node)
     declare('bag', '', described('recording: a rosbag2 folder or one file'))
     declare('rate', 1.0, described('speed, as a multiple of real time', 0.001, 1000.0))
     declare('loop', False, described('start again at the end'))

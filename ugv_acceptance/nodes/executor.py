@@ -15,16 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.exceptions import InvalidParameterTypeException
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import get_rmw_implementation_identifier, ok, try_shutdown
 
-from ugv_acceptance import AcceptanceError
+from ugv_acceptance import AcceptanceError, BadConfig
+from ugv_acceptance.nodes.ros_arguments import initialise
 
 BAD_INPUT = 2
 # Longest time (s) until a signal is noticed.
@@ -86,9 +86,11 @@ def ros(args: list[str] | None = None) -> Iterator[Stop]:
         stop.asked, stop.signal = True, number
 
     before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
+        initialise(args)
         yield stop
+    except InvalidParameterTypeException as error:
+        raise BadConfig(f'ROS arguments: {str(error).rpartition(":")[0]}') from None
     finally:
         try_shutdown()
         # Once asked to end, a second Ctrl-C must not break off what is left of it.

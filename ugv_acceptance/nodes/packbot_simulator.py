@@ -12,6 +12,7 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +32,12 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.told_robot import description_message
 from ugv_acceptance.config import load
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.nodes import parameter_types
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.parameters import described
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
+from ugv_acceptance.nodes.parameter_types import FittingParameters
 
 NAME = 'packbot_simulator'
 # Behind by more than this (s), the simulation lets time slip instead of catching up.
@@ -43,7 +46,7 @@ SLIP = 0.25
 CLOCK_STEP = 0.01
 
 
-class Simulator(Node):
+class Simulator(FittingParameters, Node):
     """The simulated robot as a node; `slipped` (s) is the real time it could not keep up with."""
 
     def __init__(self, **node: Any) -> None:  # noqa: ANN401 - as Node does
@@ -88,7 +91,7 @@ class Simulator(Node):
         self._next_clock = 0.0
 
     def _declare(self) -> None:
-        declare = self.declare_parameter
+        declare = partial(parameter_types.declare, self)
         declare('config', 'packbot', described('YAML file, or the name of one that ships'))
         declare('seed', 1, described("of the sensors' noise and the faults"))
         declare('rate', 1.0, described('speed, as a multiple of real time', 0.01, 100.0))

@@ -298,7 +298,7 @@ class Guard(Node):
             values = {v.key: v.value for v in status.values}
             alert = values.get('level', ''), values.get('code', ''), values.get('subject', '')
             if values.get('state') == 'raised':
-                self.brake.raised(alert, status.message)
+                self.brake.raised(alert, values.get('happened', status.message))
             elif values.get('state') == 'cleared':
                 self.brake.active.discard(alert)
 

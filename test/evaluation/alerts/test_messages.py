@@ -54,7 +54,7 @@ RAD = math.radians(1.0)
          ('while it does not turn, the acceleration of imu differs from gravity by '
           '90 %: it is in g')),
         ('IMU_INCONSISTENT', 'imu', ERROR, 0.1, 28.6 * RAD,
-         'while the IMU does not turn, its orientation and acceleration disagree by 29 deg'),
+         'orientation and acceleration of the IMU disagree by 29 deg while it does not turn'),
         ('INPUT_STALE', 'imu', ERROR, 0.5, 1.0, 'no message from imu'),
     ],
 )  # fmt: skip

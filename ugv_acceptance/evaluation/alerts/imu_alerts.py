@@ -24,7 +24,7 @@ IMU_ALERTS = {
         'The IMU does not measure gravity correctly: tilt cannot be trusted.',
     ),
     'IMU_INCONSISTENT': AlertText(
-        'while the IMU does not turn, its orientation and acceleration disagree by {excess}{at}',
+        'orientation and acceleration of the IMU disagree by {excess}{at} while it does not turn',
         'check the IMU: its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',

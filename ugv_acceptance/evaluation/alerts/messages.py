@@ -219,7 +219,7 @@ ALERTS = {
     ),
     'EFFORT_SIGN': AlertText(
         'the effort of {subject} has the opposite sign of what its load requires',
-        'if nothing supports the arm, set effort_sign of this joint in the configuration',
+        'set effort_sign of this joint in the configuration, if nothing supports the arm',
         FailureSource.DESIGN,
         level=WARN,
     ),

@@ -18,6 +18,7 @@ from ugv_acceptance.nodes.executor import RANGE, ros, spin
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
 from ugv_acceptance.nodes.monitor.publishers import MARGIN_TOPICS
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
+from ugv_acceptance.nodes.transport import Transport, transport_now, vendor_by
 
 # Seconds until all publishers should be known; then the listening begins.
 DISCOVERY = 4.0
@@ -30,6 +31,7 @@ class Surroundings:
     """The ROS environment, and the messages received on both inputs in `seconds`.
 
     An input that the configuration does not use is None. `robot` is what the robot tells of itself.
+    `server` and `peers` are where discovery asks, '' for nowhere.
     """
 
     distribution: str
@@ -41,6 +43,9 @@ class Surroundings:
     joint_states: Heard | None
     imu: Heard | None
     robot: Told | None = None
+    transport: Transport | None = None
+    server: str = ''
+    peers: str = ''
 
 
 def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
@@ -78,6 +83,9 @@ def listen(topics: Topics, seconds: float, args: list[str]) -> Surroundings:
             inputs.get('joint_states'),
             inputs.get('imu'),
             Told(own.topic, tuple(own.heard.values()), own.obstacle()),
+            transport_now(),
+            os.environ.get('ROS_DISCOVERY_SERVER', ''),
+            os.environ.get('ROS_STATIC_PEERS', ''),
         )
         node.destroy_node()
         return found
@@ -118,6 +126,8 @@ def _look(node: Node, heard: Heard, topic: Topic) -> None:
         name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
         bad = level == QoSCompatibility.ERROR
         heard.publishers.append((name, info.topic_type, reason if bad else ''))
+        if vendor := vendor_by(bytes(info.endpoint_gid)):
+            heard.vendors[name] = vendor
     heard.alike = [
         name
         for name, types in node.get_topic_names_and_types()

@@ -6,11 +6,9 @@ false. Inputs are subscribed as raw bytes on activation, so an inactive monitor 
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -45,25 +43,18 @@ from ugv_acceptance.nodes.monitor.operator_commands import (
 )
 from ugv_acceptance.nodes.monitor.operator_desk import INACTIVE, OperatorDesk
 from ugv_acceptance.nodes.monitor.own_description import OwnDescription
-from ugv_acceptance.nodes.monitor.parameters import (
-    LOAD,
-    TunableParameter,
-    changed,
-    check_at_rest,
-    check_locked,
-    declare_all,
-    knobs_of,
-    unknown,
-)
+from ugv_acceptance.nodes.monitor.parameter_desk import ParameterDesk
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput, MarkerOutput, StatusOutput
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
+from ugv_acceptance.nodes.parameter_types import FittingParameters
+from ugv_acceptance.nodes.transport import transport_now
 
 NAME = 'acceptance_monitor'
 # Called with ('alert' or 'verdict', the status).
 Listener = Callable[[str, Status], None]
 
 
-class Monitor(LifecycleNode):
+class Monitor(FittingParameters, LifecycleNode):
     """The monitor's node. `listener` is called with every verdict and change of an alert."""
 
     def __init__(self, listener: Listener = lambda _kind, _status: None, **node: Any) -> None:  # noqa: ANN401 - handed on to rclpy
@@ -72,9 +63,7 @@ class Monitor(LifecycleNode):
         self.config: Config | None = None
         self.session: Session | None = None
         self.problem = ''
-        self._settings: Settings | None = None
         self._sources: tuple[Source, ...] = ()
-        self.tunables: tuple[TunableParameter, ...] = ()
         self._inputs: Inputs | None = None
         self._margins: MarginOutput | None = None
         self._tick: Timer | None = None
@@ -83,11 +72,10 @@ class Monitor(LifecycleNode):
         self.own = OwnDescription(self, self._on_description)
         # Whether it is to bring itself up as soon as the robot tells its URDF.
         self._awaits = False
-        declare_all(self)
+        self._transport = transport_now().values()
+        self.parameter_desk = ParameterDesk(self, lambda: self.session, lambda: self._margins)
         self.output = StatusOutput(self)
         self.markers = MarkerOutput(self, lambda: self.session)
-        self.add_on_set_parameters_callback(self._judge_parameters)
-        self.add_post_set_parameters_callback(self._take_parameters)
         # Steady: a frozen /clock must not silence the diagnostics.
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, guarded(self, self._every_second), clock=self.steady)
@@ -105,7 +93,7 @@ class Monitor(LifecycleNode):
 
         Where the robot itself tells its URDF, that is done as soon as it does.
         """
-        if not self._value('autostart'):
+        if not self.parameter_desk.value('autostart'):
             return
         if self.own.is_needed(*self._files()):
             self._awaits = True
@@ -159,29 +147,22 @@ class Monitor(LifecycleNode):
         return failure if self.problem else success
 
     def _files(self) -> tuple[Path, Path | None]:
-        urdf = self._value('urdf')
-        return Path(self._value('config')), Path(urdf) if urdf else None
+        urdf = self.parameter_desk.value('urdf')
+        return Path(self.parameter_desk.value('config')), Path(urdf) if urdf else None
 
     def _configure(self) -> None:
         self._adopt(self.own.complete(*self._files(), wait=not self._awaits))
 
     def _adopt(self, config: Config) -> None:
-        self.config = config
-        defaults, self._sources = self.config.settings, sources_from(self.config)
-        tunables = knobs_of(defaults)
-        for tunable in tunables:
-            if not self.has_parameter(tunable.name):
-                self.declare_parameter(tunable.name, tunable.get(defaults), tunable.descriptor())
-        given = [name for name in self._parameter_overrides if not self.has_parameter(name)]
-        for warning in [*self.config.warnings, *unknown(given, tunables)]:
+        self.config, self._sources = config, sources_from(config)
+        for warning in config.warnings:
             self.get_logger().warning(warning)
-        values = {tunable.name: self._value(tunable.name) for tunable in tunables}
-        self._settings, self.tunables = changed(defaults, tunables, values), tunables
-        self.output.hardware_id = self.config.serial or self.config.name
-        self._margins = MarginOutput(self, self._settings)
+        settings = self.parameter_desk.adopt(config.settings)
+        self.output.hardware_id = config.serial or config.name
+        self._margins = MarginOutput(self, settings)
 
     def _activate(self) -> None:
-        if self._settings is None or self.config is None:
+        if self.parameter_desk.settings is None or self.config is None:
             raise BadConfig('expected a configured monitor')
         if self.own.is_newer(self.config):
             told = self.own.complete(*self._files(), wait=False)
@@ -190,14 +171,16 @@ class Monitor(LifecycleNode):
         self._start()
 
     def _start(self) -> None:
-        if self._settings is None or self.config is None:
+        if self.parameter_desk.settings is None or self.config is None:
             raise BadConfig('expected a configured monitor')
-        self.session = self._new_session(self._settings)
+        self.session = self._new_session(self.parameter_desk.settings)
         self._box = black_box_of(self, self.config, self.session)
         self._lamps = Lamps(self.session, self._box, self.session.clock.now())
-        self._inputs = Inputs(self, self.config.topics, self.session, self._value('depth'))
-        self._take_rates()
-        tick = self._settings.delays.tick
+        self._inputs = Inputs(
+            self, self.config.topics, self.session, self.parameter_desk.value('depth')
+        )
+        self.parameter_desk.take_rates()
+        tick = self.session.settings.delays.tick
         self._tick = self.create_timer(tick, guarded(self, self._on_tick), clock=self.steady)
         for data in list(self.own.heard):
             self._on_description(data)
@@ -219,7 +202,7 @@ class Monitor(LifecycleNode):
             self._margins.publish if self._margins else lambda _stamp, _margins: None,
             self._on_change,
             lambda text: self.get_logger().warning(text, throttle_duration_sec=5.0),
-            stamps=StampShift(bool(self._value('use_sim_time'))),
+            stamps=StampShift(bool(self.parameter_desk.value('use_sim_time'))),
             sources=self._sources,
         )
 
@@ -236,11 +219,10 @@ class Monitor(LifecycleNode):
         self._inputs = self._tick = self.session = self._box = None
 
     def _clean_up(self) -> None:
-        for tunable in self.tunables:
-            self.undeclare_parameter(tunable.name)
+        self.parameter_desk.forget()
         if self._margins is not None:
             self._margins.destroy()
-        self.tunables, self._margins, self.config, self._settings = (), None, None, None
+        self._margins = self.config = None
 
     # Time
 
@@ -250,7 +232,7 @@ class Monitor(LifecycleNode):
         if session.stamps.simulated:
             session.stamps.follow(session.clock.now(), self.get_clock().now().nanoseconds)
         session.tick()
-        self._tell_load()
+        self.parameter_desk.tell_load()
         self._tell(session.alarm_tracker.alarms.advance(now := session.clock.now()))
         if self._box is not None:
             self._box.advance(now)
@@ -263,7 +245,7 @@ class Monitor(LifecycleNode):
         if self._awaits:
             self._try_again()
         if self.session is not None and self._inputs is not None:
-            self._inputs.look_around(self._value('allowed_publishers'))
+            self._inputs.look_around(self.parameter_desk.value('allowed_publishers'))
             self.session.measure_rates()
             self.session.feel()
             if self.config is not None:
@@ -285,7 +267,9 @@ class Monitor(LifecycleNode):
         """Publish the verdict and the diagnostics."""
         status = self.verdict()
         self.output.verdict(status)
-        self.output.diagnostics(diagnostics_of(status, self.config, self.session, self._inputs))
+        self.output.diagnostics(
+            diagnostics_of(status, self.config, self.session, self._inputs, self._transport)
+        )
         self.listener('verdict', status)
 
     def _on_change(self) -> None:
@@ -306,7 +290,7 @@ class Monitor(LifecycleNode):
         if self._box is not None:
             self._box.alerts(session.clock.now(), raised, serialize_message(message))
 
-    # Services and parameters
+    # Services
 
     def _acknowledge(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         response.success, response.message = self.session is not None, INACTIVE
@@ -325,52 +309,6 @@ class Monitor(LifecycleNode):
             response.message = 'started a new evaluation: filters, alerts and clock are fresh'
             self.say()
         return response
-
-    def _value(self, name: str) -> Any:  # noqa: ANN401 - a parameter's value
-        return self.get_parameter(name).value
-
-    def _judge_parameters(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Accept or refuse a set of parameters as a whole, with the reason; apply nothing."""
-        values = {parameter.name: parameter.value for parameter in parameters}
-        try:
-            if self.session is not None:
-                check_at_rest(values)
-                if self._value('lock_parameters'):
-                    check_locked(values, self.tunables)
-            if self._settings is not None:
-                changed(self._in_force(self._settings), self.tunables, values)
-        except (BadConfig, TypeError, ValueError) as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _take_parameters(self, parameters: list[Parameter]) -> None:
-        values = {parameter.name: parameter.value for parameter in parameters}
-        if self._settings is not None:
-            self._settings = changed(self._in_force(self._settings), self.tunables, values)
-            if self.session is not None:
-                self.session.adopt(self._settings)
-        self._take_rates()
-
-    def _in_force(self, settings: Settings) -> Settings:
-        """Return settings with the payload in use, which a message may have declared."""
-        load = settings.robot.payload if self.session is None else self.session.evaluator.payload
-        return replace(settings, robot=replace(settings.robot, payload=load))
-
-    def _tell_load(self) -> None:
-        """Set the payload's parameters to the payload in use after a message has changed it."""
-        if self._settings is None or self._in_force(self._settings) == self._settings:
-            return
-        self._settings = self._in_force(self._settings)
-        told = [
-            Parameter(k.name, value=k.get(self._settings)) for k in self.tunables if k.name in LOAD
-        ]
-        self.set_parameters_atomically(told)
-
-    def _take_rates(self) -> None:
-        rate = self._value('publish_rate')
-        if self._margins is not None and self._settings is not None:
-            self._margins.period = int(1e9 / rate) if rate > 0 else 0
-            self._margins.limits = self._settings.limits.torque
 
 
 def build(config: str | None, urdf: str | None, listener: Listener) -> Monitor:

@@ -109,7 +109,7 @@ def operate(session: Session, message: DiagnosticStatus) -> list[Change]:
         # Refused with the reason: only a warning can be shelved.
         return alarms.shelve(now, key_of(chosen[0].rule), int(o.seconds * 1e9), o.who, o.note)
     if not changes:
-        raise BadSample(f'{o.do}: {_words(chosen)}: {_NEEDS[o.do]}')
+        raise BadSample(f'{o.do}: {_NEEDS[o.do]}: {_words(chosen)}')
     return changes
 
 
@@ -130,7 +130,7 @@ def _operate_all(alarms: Alarms, now: int, o: Operation) -> list[Change]:
     over = [a for a in alarms.table.values() if a.state is State.RETURNED_UNACKNOWLEDGED]
     unseen = [alarm for alarm in over if latches(alarm.rule)]
     if unseen and not changes:
-        raise BadSample(f'reset: {_words(unseen)}: acknowledge first')
+        raise BadSample(f'reset: acknowledge first: {_words(unseen)}')
     return changes
 
 

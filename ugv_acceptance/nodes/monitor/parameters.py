@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -25,6 +26,7 @@ from ugv_acceptance.evaluation.permitted_limits import (
 )
 from ugv_acceptance.evaluation.settings import ALWAYS, LEVEL, Settings
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.nodes import parameter_types
 
 ATTITUDES = ('auto', 'orientation', 'accelerometer')
 # Stands for a limit that is not known, so not judged (an infinite number has no range).
@@ -95,7 +97,7 @@ def check_locked(values: Mapping[str, Any], tunables: Sequence[TunableParameter]
 
 def declare_all(node: Node) -> None:
     """Declare the parameters that exist before the robot's files are read."""
-    declare = node.declare_parameter
+    declare = partial(parameter_types.declare, node)
     declare('config', 'packbot', described('YAML file, or the name of one that ships'))
     declare('urdf', '', described('URDF in place of the one the YAML names'))
     what = 'configure and activate at once; false: a lifecycle manager does'
