@@ -64,7 +64,9 @@ def test_a_beginning_holds_all_messages_up_to_its_end(chunk: int, tmp_path: Path
     until = sorted(time for _, _, time, _ in written)[40]
     topics = choose_topics(bag)
     reading = bag.beginning(until).batches(topics)
-    got = [t for b in reading for c in (*b.joints, *b.imu) for t in c.log_time.tolist()]
+    batches = list(reading)
+    got = [t for b in batches for c in b.joints for t in c.log_time.tolist()]
+    got += [t for b in batches for c in b.imu for t in c.log_time.tolist()]
     inputs = {topics.joint_states, topics.imu}
     assert sorted(got) == sorted(t for name, _, t, _ in written if name in inputs and t <= until)
     assert reading.facts.findings == ()

@@ -71,7 +71,7 @@ def test_a_configuration_of_this_folder_is_offered_too(
 
 @pytest.mark.parametrize('verb', ['info', 'doctor'])
 def test_recordings_are_offered(verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """rosbag2 folders and files of recordings, and with a slash the folders on the way to others."""
+    """rosbag2 folders, files of recordings, and with a slash the folders on the way to others."""
     monkeypatch.chdir(tmp_path)
     for name in ('run1/metadata.yaml', 'runs/day/run2.mcap', 'run.mcap', 'run.yaml', '.run.mcap'):
         Path(name).parent.mkdir(parents=True, exist_ok=True)

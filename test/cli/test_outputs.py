@@ -298,6 +298,7 @@ WRONG = {
     ('evaluate', '--junit'): [('m.json', 'expected .xml; for JSON use --json')],
     ('evaluate', '--annotate'): [('m.xml', 'expected .mcap; for JUnit XML use --junit')],
     ('evaluate', '--init-criteria'): [('m.txt', 'expected .yaml or .yml')],
+    ('info', '--json'): [('m.csv', 'expected .json')],
     ('plan', '--card'): [('m.yml', 'expected .html or .htm; for YAML use --out')],
     ('plan', '--out'): [('m.html', 'expected .yaml or .yml; for HTML use --card')],
     ('plan', '-o'): [('m.json', 'expected .yaml or .yml')],

@@ -1,18 +1,21 @@
 """The inputs of a recording as they would have been heard, and where the robot stood still."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import TypeVar
 
 import numpy as np
 
 from ugv_acceptance.bag.cdr import ImuSample, JointStateSample
 from ugv_acceptance.bag.reader import Bag, Topics
+from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.evaluation.inputs.frames import same_frame
 from ugv_acceptance.evaluation.samples import ImuColumns, JointStateColumns
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.inspection.heard import KEPT, Heard
 
+AnyInput = TypeVar('AnyInput', JointStateColumns, ImuColumns)
 # A robot that stands still does so for this long (ns), with no longer silence between messages.
 LONG, SILENCE = 1_000_000_000, 200_000_000
 
@@ -29,25 +32,34 @@ def hear(bag: Bag, joints: Heard | None, imu: Heard | None, how: ImuInput) -> No
     for batch in reading:
         told += batch.joints
         felt += batch.imu
-    for heard, held, sample in ((joints, told, _joint_state), (imu, felt, _imu)):
-        if heard is None:
-            continue
-        times = sorted(chain.from_iterable(columns.log_time.tolist() for columns in held))
-        every = max(1, -(-len(times) // KEPT))
-        rows = sorted(_rows(held, every), key=lambda row: row[0])
-        heard.times = times
-        heard.samples = [sample(held[k], i) for _, k, i in rows]
-        heard.sampled = [time for time, _, _ in rows]
-        count, reason = reading.facts.malformed.get(heard.topic, (0, ''))
-        heard.malformed = [reason] * count
+    facts = reading.facts
+    if joints is not None:
+        _fill(joints, told, _joint_state, facts)
     if imu is not None:
+        _fill(imu, felt, _imu, facts)
         imu.still = [_imu(felt[k], i) for _, k, i in _standing(felt, how)]
+
+
+def _fill(
+    heard: Heard,
+    held: Sequence[AnyInput],
+    sample: Callable[[AnyInput, int], JointStateSample | ImuSample],
+    facts: Facts,
+) -> None:
+    """Fill in the times of all messages, samples of them, and why some cannot be decoded."""
+    times = sorted(chain.from_iterable(columns.log_time.tolist() for columns in held))
+    rows = sorted(_rows(held, max(1, -(-len(times) // KEPT))), key=lambda row: row[0])
+    heard.times = times
+    heard.samples = [sample(held[k], i) for _, k, i in rows]
+    heard.sampled = [time for time, _, _ in rows]
+    count, reason = facts.malformed.get(heard.topic, (0, ''))
+    heard.malformed = [reason] * count
 
 
 _Row = tuple[int, int, int]  # log time (ns), number of the columns, row in them
 
 
-def _rows(held: Sequence[JointStateColumns] | Sequence[ImuColumns], every: int) -> Iterator[_Row]:
+def _rows(held: Sequence[AnyInput], every: int) -> Iterator[_Row]:
     """Yield every so many messages, wherever one group of columns ends and the next begins."""
     seen = 0
     for k, columns in enumerate(held):
