@@ -14,7 +14,7 @@ SHELL := bash
 .SHELLFLAGS := -euo pipefail -c
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help venv tools second-tools demo test lint docs pytest second-run colcon recipe versions hardening error-rate clean distclean
+.PHONY: help venv tools second-tools demo test lint ament-lint docs pytest second-run colcon recipe versions hardening error-rate clean distclean
 
 # The ROS wheels set this for their own children; in a child of another virtual environment it makes the wrong
 # libraries load.
@@ -49,6 +49,7 @@ help:
 	@echo 'make demo       the main job on a recorded run: live margins and alerts, then the verdict on the bag'
 	@echo 'make test       everything CI checks: lint, the tests here, the tests on Python 3.12 + NumPy 1.26'
 	@echo 'make lint       ruff and mypy --strict'
+	@echo 'make ament-lint ROS'\''s own linters on what is installed on a robot, with our settings'
 	@echo 'make docs       the documentation as a site, out/site/index.html; a warning is an error'
 	@echo 'make pytest     the tests on $(PYTHON) alone; ARGS="-k stability" chooses some'
 	@echo 'make colcon     colcon build and colcon test on Python 3.12 + NumPy 1.26, as on a robot'
@@ -125,6 +126,12 @@ docs: tools
 	.venv/bin/python -m sphinx -W --keep-going -q -b html docs out/site
 	@echo 'The documentation: out/site/index.html'
 endif
+
+# As `rosdep install` brings them, or from wheels in an environment of their own. A code that is left out here ruff checks.
+ament-lint:
+	command -v ament_flake8 ament_pep257 > /dev/null || { echo 'expected ament_flake8 and ament_pep257 on PATH: rosdep install brings them'; exit 1; }
+	ament_flake8 --config requirements/ament_flake8.ini ugv_acceptance launch setup.py
+	ament_pep257 --add-ignore D213 D301 D401 D402 D403 D413 -- ugv_acceptance launch setup.py > out/ament_pep257.txt || { grep -v '^checking' out/ament_pep257.txt; exit 1; }
 
 pytest: tools
 	.venv/bin/python -m pytest -n $(JOBS) --dist worksteal $(ARGS)

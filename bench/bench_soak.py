@@ -1,7 +1,7 @@
 """Hours of the real monitor over DDS at 200 Hz joint states + 400 Hz IMU: memory, CPU, lateness.
 
-    nice python -m bench.bench_soak alarms --hours 2 --domain 151 --out /tmp/soak
-    python -m bench.bench_soak --summary /tmp/soak/*.csv --picture /tmp/soak/soak.svg
+    nice python -m bench.bench_soak alarms --hours 2 --domain 151 --out out/soak
+    python -m bench.bench_soak --summary out/soak/{quiet,alarms,faults}.csv --picture soak.svg
 
 Stretches: `quiet` (the robot stands), `alarms` (the arm swings out with a load that is too much,
 every half minute; an operator acknowledges), `faults` (inputs drop out, the driver is killed and

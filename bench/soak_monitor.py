@@ -1,8 +1,7 @@
 """The monitor of bench_soak.py: the real one, and a thread that says how many objects it holds.
 
-    python bench/soak_monitor.py FILE [ROS arguments]
-
-FILE gets the number of Python's allocated blocks of memory, anew every few seconds.
+It is started with a file and ROS arguments. The file gets the number of Python's allocated blocks
+of memory, anew every few seconds.
 """
 
 import sys

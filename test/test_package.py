@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 from importlib.metadata import requires
 from pathlib import Path
 from zipfile import ZipFile
@@ -24,6 +25,21 @@ DATA_FOLDERS = [
     'rviz',
     'schema',
     'urdf',
+]
+
+# What the source archive has besides, so that what came out of it can be tested and read.
+BESIDE = [
+    'bench',
+    'docs',
+    'requirements',
+    'sros2',
+    'test',
+    'CHANGELOG.rst',
+    'CONTRIBUTING.md',
+    'LICENSE',
+    'Makefile',
+    'README.md',
+    'SECURITY.md',
 ]
 
 # A requirement's rosdep key is python3-<its name>, except:
@@ -123,6 +139,9 @@ def test_a_wheel_made_from_the_source_archive_is_whole(repository: Path, tmp_pat
     )
     subprocess.run([sys.executable, 'setup.py', '-q', 'sdist'], cwd=source, check=True)
     (archive,) = (source / 'dist').glob('*.tar.gz')
+    with tarfile.open(archive) as packed:
+        held = {name.partition('/')[2] for name in packed.getnames()}
+    assert files_below(source, ['ugv_acceptance', *DATA_FOLDERS, *BESIDE]) <= held
     pip = [sys.executable, '-m', 'pip', 'wheel', '-q', '--no-index', '--no-deps']
     subprocess.run([*pip, '--no-build-isolation', '-w', tmp_path, archive], check=True)
     (wheel,) = tmp_path.glob('*.whl')
@@ -130,13 +149,18 @@ def test_a_wheel_made_from_the_source_archive_is_whole(repository: Path, tmp_pat
         name.partition('/data/share/ugv_acceptance/')[2] or name
         for name in ZipFile(wheel).namelist()
     }
-    expected = {
+    expected = files_below(source, ['ugv_acceptance', *DATA_FOLDERS])
+    assert expected <= inside
+
+
+def files_below(source: Path, places: list[str]) -> set[str]:
+    """Return the files in these folders, and these files, as seen from the source."""
+    return {
         path.relative_to(source).as_posix()
-        for folder in ['ugv_acceptance', *DATA_FOLDERS]
-        for path in (source / folder).rglob('*')
+        for place in places
+        for path in [source / place, *(source / place).rglob('*')]
         if path.is_file() and '__pycache__' not in path.parts
     }
-    assert expected <= inside
 
 
 def test_no_file_names_a_machine_or_a_registry(repository: Path) -> None:

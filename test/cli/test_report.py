@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.cli import evaluate, verify
+from ugv_acceptance.offline.judge import RESULT_VERSION
 
 SHIPPED = Path(__file__).resolve().parents[2] / 'bags'
 EVIL = '<script>alert(1)</script>'
@@ -322,6 +323,18 @@ def test_another_recording_has_another_hash(papers: Path) -> None:
     assert done.output.startswith('[X] DIFFERS')
     differences = done.output.partition('differences')[2]
     assert differences.split()[0].startswith('bag.sha256')
+
+
+def test_a_result_of_an_older_version_says_where_it_is_told_what_to_do(
+    tmp_path: Path, repository: Path
+) -> None:
+    """The refusal names the page about upgrading, and that page names the version."""
+    path = tmp_path / 'r.json'
+    path.write_text('{"version": 1}', 'utf-8')
+    said = str(run(VERIFY, path).exception)
+    page = (repository / 'docs' / 'upgrading.md').read_text('utf-8')
+    assert 'docs/upgrading.md' in said
+    assert f'| {RESULT_VERSION} (was 1) | `verify` refuses it |' in page
 
 
 @pytest.mark.parametrize(

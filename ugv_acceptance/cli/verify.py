@@ -89,7 +89,8 @@ def read_result(path: Path) -> Json:
         raise AcceptanceError(f'{path}: expected the result of one recording, got a list or less')
     if told.get('version') != RESULT_VERSION:
         raise AcceptanceError(
-            f'{path}: expected a result of version {RESULT_VERSION}, got {told.get("version")!r}'
+            f'{path}: expected a result of version {RESULT_VERSION}, got '
+            f'{told.get("version")!r}; evaluate the recording again (docs/upgrading.md)'
         )
     for key, kind in (('bag', dict), ('robot', dict), ('criteria', dict), ('verdict', str)):
         if not isinstance(told.get(key), kind):
