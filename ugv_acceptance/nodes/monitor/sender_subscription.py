@@ -69,7 +69,7 @@ class _Rcl:
         self._free(ctypes.byref(self._data))
 
 
-class SenderSubscription(Waitable):  # type: ignore[misc] - rclpy has no types here
+class SenderSubscription(Waitable):
     """Subscribes to `topic` of a node, and calls `take` with every message and its publisher."""
 
     def __init__(self, node: Node, kind: Any, topic: str, qos: QoSProfile, take: Take) -> None:  # noqa: ANN401 - a message's class
