@@ -49,6 +49,9 @@ def node(module: str, *arguments: str) -> Iterator['subprocess.Popen[str]']:
         process.communicate(timeout=60)
 
 
+parameter_from: Any = Parameter.from_parameter_msg
+
+
 def values_of(live: Live, at: str, *names: str) -> list[Any]:
     """Return parameters as others get them."""
     answer = live.call(GetParameters, f'{at}/get_parameters', GetParameters.Request(names=names))
@@ -199,7 +202,7 @@ def test_what_is_no_number_is_refused_by_name(
     monitor = live.monitor()
     before = session_of(monitor).settings
     told = ParameterMessage(name=name.replace('__', '.'), value=get_parameter_value(text))
-    result = monitor.set_parameters_atomically([Parameter.from_parameter_msg(told)])
+    result = monitor.set_parameters_atomically([parameter_from(told)])
     assert not result.successful
     assert result.reason.startswith(f'parameter {reason}')
     assert session_of(monitor).settings == before
@@ -220,7 +223,7 @@ def test_an_empty_list_of_any_type_empties_the_allowed_publishers(live: Live) ->
     monitor = live.monitor(allowed_publishers=['/other'])
     for empty in EMPTY:
         told = ParameterMessage(name='allowed_publishers', value=empty)
-        result = monitor.set_parameters_atomically([Parameter.from_parameter_msg(told)])
+        result = monitor.set_parameters_atomically([parameter_from(told)])
         assert (result.successful, result.reason) == (True, '')
         assert monitor.get_parameter('allowed_publishers').value == ['']
 

@@ -25,7 +25,7 @@ IMU_ALERTS = {
     ),
     'IMU_INCONSISTENT': AlertText(
         'orientation and acceleration of the IMU disagree by {excess}{at} while it does not turn',
-        'check the IMU: its orientation may be a default value, or its axes swapped',
+        'check the IMU; its orientation may be a default value, or its axes swapped',
         FailureSource.SENSOR,
         'The IMU contradicts itself: tilt cannot be trusted.',
     ),
@@ -45,7 +45,7 @@ IMU_ALERTS = {
     'IMU_CONTRADICTION': AlertText(
         'averaged over {window:.0f} s, the acceleration of {subject} contradicts its orientation '
         'by {excess}{at}',
-        'check the IMU: its orientation may be stuck, drift, or have other axes; or its '
+        'check the IMU; its orientation may be stuck, drift, or have other axes; or its '
         'acceleration',
         FailureSource.SENSOR,
         'Orientation and acceleration of the IMU contradict each other: tilt cannot be trusted.',
@@ -58,7 +58,7 @@ IMU_ALERTS = {
     ),
     'IMU_ROTATION': AlertText(
         'rates and orientation of {subject} contradict each other: {found}',
-        'check the IMU: its orientation may be stuck or of another sensor; or its rates',
+        'check the IMU; its orientation may be stuck or of another sensor; or its rates',
         FailureSource.SENSOR,
         'The orientation of the IMU does not turn as its rates say: tilt cannot be trusted.',
     ),
