@@ -134,7 +134,9 @@ class Site:
 def running() -> Iterator[Site]:
     """Return a monitor that has margins, and hears questions."""
     with live_nodes() as live:
-        monitor = live.monitor(arguments=('-r', f'__ns:={SPACE}'))
+        # A busy machine stops this process for a second now and then: that is no silence here.
+        patient = {'delays__stale_after_s': 2.0, 'delays__off_s': 0.0}
+        monitor = live.monitor(arguments=('-r', f'__ns:={SPACE}'), **patient)
         site = Site(live, monitor, live.driver(namespace=SPACE))
         site.until(lambda: session_of(monitor).evaluator.margins is not None)
         node = site.driver
