@@ -134,7 +134,9 @@ class Site:
 def running() -> Iterator[Site]:
     """Return a monitor that has margins, and hears questions."""
     with live_nodes() as live:
-        monitor = live.monitor(arguments=('-r', f'__ns:={SPACE}'))
+        # A busy machine stops this process for a second now and then: that is no silence here.
+        patient = {'delays__stale_after_s': 2.0, 'delays__off_s': 0.0}
+        monitor = live.monitor(arguments=('-r', f'__ns:={SPACE}'), **patient)
         site = Site(live, monitor, live.driver(namespace=SPACE))
         site.until(lambda: session_of(monitor).evaluator.margins is not None)
         node = site.driver
@@ -203,7 +205,7 @@ def hand(site: Site) -> None:
 MISSING = {
     'silent': (silent, 'NO DATA'),
     'another driver': (another, 'SECOND_PUBLISHER'),
-    'swaying': (swaying, 'attitude changed'),
+    'swaying': (swaying, 'attitude changed|leans otherwise'),
     'stairs': (unlevel, 'stairs'),
     'hand': (hand, 'hand_may_touch'),
 }
@@ -217,7 +219,7 @@ def test_where_something_is_missing_nothing_is_permitted(site: Site, state: str)
     bring(site)
     said = site.ask(motion(0.2, 0.0))
     assert (said.level, said.values['result']) == (STALE, 'not_known')
-    assert reason in said.values['reasons']
+    assert re.search(reason, said.values['reasons'])
     assert site.withdrawn(motion(0.1, 0.0)).level == STALE
     site.silent = False
 
