@@ -24,6 +24,7 @@ from rclpy.node import Node
 from std_msgs.msg import Bool
 
 from ugv_acceptance.monitoring.ok_word import SETTLED
+from ugv_acceptance.nodes.executor import end
 
 # Stale limit (s) of inputs at 100 Hz, and what is promised above it.
 LIMIT, ABOVE = 0.1, 0.1
@@ -113,9 +114,9 @@ def once(how: str, number: int, folder: str) -> tuple[float, float]:
     names = ('--ros-args', '-r', f'__ns:={space}')
     monitor = 'from ugv_acceptance.nodes.monitor.node import main; main()'
     with running('-c', monitor, *names), running('-c', DRIVER, path, *names) as driver:
-        end = time.monotonic() + PATIENCE
+        latest = time.monotonic() + PATIENCE
         true_for = 0
-        while true_for < STEADY and time.monotonic() < end:
+        while true_for < STEADY and time.monotonic() < latest:
             executor.spin_once(timeout_sec=0.5)
             true_for = true_for + 1 if gate.heard and gate.heard[-1][1] else 0
         time.sleep(random.uniform(0.0, 0.2))  # any phase of the timers
@@ -126,7 +127,7 @@ def once(how: str, number: int, folder: str) -> tuple[float, float]:
         with open(path) as file:  # noqa: PTH123 - one line
             good = int(file.read())
     executor.shutdown()
-    gate.destroy_node()
+    end(gate)
     true = [at for at, word in gate.heard if word and at >= good]
     false = [at for at, word in gate.heard if not word and at >= good]
     if not false or true_for < STEADY:

@@ -337,18 +337,23 @@ def test_after_a_gap_it_takes_a_second_again() -> None:
     assert robot.stand(2.0).why == ''
 
 
+def waits(robot: Robot) -> bool:
+    """Return whether the trend is not known yet."""
+    return robot.session.evaluator.waits_for_trend
+
+
 @pytest.mark.parametrize('ground', ['uneven', 'stairs'])
 def test_on_rough_ground_it_waits_for_the_trend(ground: str) -> None:
     """From the moment it is entered until it is known whether the robot begins to tip: false."""
     robot = ready()
     rough = replace(SETTINGS, ground=replace(SETTINGS.ground, kind=ground))
     robot.session.adopt(rough)
-    assert robot.session.evaluator.waits_for_trend
+    assert waits(robot)
     assert robot.word.why_not() == 'whether the robot begins to tip is not known yet'
     since = robot.at
-    while robot.session.evaluator.waits_for_trend:
+    while waits(robot):
         robot.stand(0.01)
-        assert robot.true <= since or not robot.session.evaluator.waits_for_trend
+        assert robot.true <= since or not waits(robot)
     assert robot.stand(0.1).why == ''
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from nodes.live_case import Driver, Live, session_of
@@ -85,11 +86,16 @@ class Words:
         return max([when, *(at for at, word in self.heard if word)])
 
 
+def asking(seconds: float) -> Any:
+    """Return the quality of service of a gate that asks for a deadline."""
+    profile: Any = QoSProfile
+    return profile(depth=1, deadline=Duration(seconds=seconds))
+
+
 def words_of(live: Live, namespace: str = '') -> Words:
     """Return what a gate of motion hears: it asks for a deadline of 0.3 s."""
     words, gate = Words(), live.add(Node('gate', namespace=namespace))
-    qos = QoSProfile(depth=1, deadline=Duration(seconds=0.3))
-    gate.create_subscription(Bool, TOPIC, words.take, qos)
+    gate.create_subscription(Bool, TOPIC, words.take, asking(0.3))
     return words
 
 
@@ -195,7 +201,8 @@ def test_the_verdict_says_why_not(live: Live) -> None:
     _, driver, words = ready(live)
 
     def said() -> str:
-        return {p.key: p.value for p in driver.verdicts[-1].values}.get('ok', '')
+        values = {pair.key: str(pair.value) for pair in driver.verdicts[-1].values}
+        return values.get('ok', '')
 
     live.until(lambda: said() == 'yes', driver.send)
     live.until(lambda: said() == 'no: margins not known')
@@ -240,7 +247,6 @@ def test_the_deadline_that_is_offered_is_kept(live: Live) -> None:
     heard: dict[float, list[Bool]] = {DEADLINE: [], DEADLINE / 2: []}
     gate = live.add(Node('gate'))
     for seconds, taken in heard.items():
-        qos = QoSProfile(depth=1, deadline=Duration(seconds=seconds))
-        gate.create_subscription(Bool, TOPIC, taken.append, qos)
+        gate.create_subscription(Bool, TOPIC, taken.append, asking(seconds))
     live.until(lambda: len(heard[DEADLINE]) >= 10)
     assert heard[DEADLINE / 2] == []

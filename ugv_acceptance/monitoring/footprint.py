@@ -6,6 +6,7 @@ not take a margin for the position of one.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import Settings
@@ -41,16 +42,18 @@ def footprint_of(evaluator: LiveEvaluator) -> Footprint | None:
     footing = stance.footing if stance is not None else None
     stands = footing is not None and margins.stability.state < NO_CONTACT
     corners = footing.polygon if footing is not None and stands else ()
-    return in_frame(evaluator.settings, [posture.contacts[k] for k in corners], posture.cog)
+    contacts: Any = posture.contacts
+    center: Any = posture.cog
+    return in_frame(evaluator.settings, [contacts[k] for k in corners], center)
 
 
-def in_frame(settings: Settings, polygon: Sequence[Sequence[float]], center: Vector) -> Footprint:
+def in_frame(settings: Settings, polygon: Sequence[Vector], center: Vector) -> Footprint:
     """Return a footprint of points in the axes of the root link (m), in those of its frame."""
     seen = seen_from(settings) or _numbers
     return Footprint(tuple(map(seen, polygon)), seen(center))
 
 
-def seen_from(settings: Settings) -> Callable[[Sequence[float]], Vector] | None:
+def seen_from(settings: Settings) -> Callable[[Vector], Vector] | None:
     """Return how points in root axes (m) are seen from the frame of `settings`; None: as they are.
 
     The frame is that of viewers, `robot.base_frame`.
@@ -60,13 +63,13 @@ def seen_from(settings: Settings) -> Callable[[Sequence[float]], Vector] | None:
         return None
     back = transpose(rotation)
 
-    def seen(point: Sequence[float]) -> Vector:
+    def seen(point: Vector) -> Vector:
         return _numbers(rotate(back, subtract(point, xyz)))
 
     return seen
 
 
-def _numbers(v: Sequence[float]) -> Vector:
+def _numbers(v: Sequence[Any]) -> Vector:
     """Return a vector as floats; given floats, the model's formulas return floats."""
     x, y, z = v
     return float(x), float(y), float(z)

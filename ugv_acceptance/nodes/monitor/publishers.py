@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import PointStamped, PolygonStamped
@@ -112,10 +113,10 @@ class MarginOutput:
     ) -> None:
         self._node, self._session = node, session
         names = settings.robot.joint_names
+        kinds: list[tuple[str, Any]] = [(topic, JointState) for topic in MARGIN_TOPICS]
         self._publishers: list[Publisher] = [
-            node.create_publisher(JointState, topic, 10) for topic in MARGIN_TOPICS
+            node.create_publisher(kind, topic, 10) for topic, kind in (*kinds, *FOOTPRINT_TOPICS)
         ]
-        self._publishers += [node.create_publisher(kind, t, 10) for t, kind in FOOTPRINT_TOPICS]
         self._joints, self._sides = JointStateBytes(names), JointStateBytes(TILTS)
         self._wanted = [False] * len(self._publishers)
         self._due = 0
