@@ -71,8 +71,7 @@ class LiveEvaluator:
     the alert rules and the log of alerts, `evaluated` counts the margins computed. `payload` is the
     newest that could be used; while not `load_known`, the newest declared could not. `ground` says
     whether the arm touches the ground, `chassis` what its IMU feels, `joints` merges joint states,
-    `fresh` has the timeouts of joint states and IMU. The margins rest on `posture` and
-    `chassis.stance`.
+    `fresh` has the inputs' timeouts. The margins rest on `posture` and `chassis.stance`.
     """
 
     settings: Settings
