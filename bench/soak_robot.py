@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import rclpy
 from geometry_msgs.msg import InertiaStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
@@ -29,6 +28,7 @@ from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr, str
 from ugv_acceptance.bag.raw import Offered
 from ugv_acceptance.nodes.bag_player import qos_of
 from ugv_acceptance.nodes.executor import end, ros
+from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
 NS = 1_000_000_000
 JOINTS_HZ, IMU_HZ = 200, 400
@@ -165,8 +165,7 @@ def main() -> None:
         joints = node.create_publisher(JointState, 'joint_states', quick)
         attitude = node.create_publisher(Imu, 'imu/data', quick)
         held = node.create_publisher(InertiaStamped, 'payload', 10)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        own = node.create_publisher(String, 'robot_description', latched)
+        own = node.create_publisher(String, 'robot_description', LATCHED)
         own.publish(string_message(URDF.read_text(encoding='utf-8')))
         while not (joints.get_subscription_count() and attitude.get_subscription_count()):
             time.sleep(0.05)
