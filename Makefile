@@ -130,6 +130,7 @@ endif
 # As `rosdep install` brings them, or from wheels in an environment of their own. A code that is left out here ruff checks.
 ament-lint:
 	command -v ament_flake8 ament_pep257 > /dev/null || { echo 'expected ament_flake8 and ament_pep257 on PATH: rosdep install brings them'; exit 1; }
+	@mkdir -p out
 	ament_flake8 --config requirements/ament_flake8.ini ugv_acceptance launch setup.py
 	ament_pep257 --add-ignore D213 D301 D401 D402 D403 D413 -- ugv_acceptance launch setup.py > out/ament_pep257.txt || { grep -v '^checking' out/ament_pep257.txt; exit 1; }
 
