@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from ugv_acceptance import BadConfig
-from ugv_acceptance.model.dynamics import Load, joint_forces, motion_of
+from ugv_acceptance.model.dynamics import Load, Motion, joint_forces, motion_of
 from ugv_acceptance.model.expressions import Number, Scalar, Vec, dot, scale
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.robot import Contact, Robot
@@ -204,21 +204,34 @@ def payload_of(robot: Robot, tree: Tree, pose: Pose, mass: Scalar, cog: Vec) -> 
     return [Load(body, mass, point)]
 
 
+def moving_bodies(
+    robot: Robot, tree: Tree, drives: Sequence[Drive], inputs: Sequence[Scalar]
+) -> tuple[Pose, Motion, list[Load]]:
+    """Return pose, motion and payload of the bodies for the inputs of `Mechanics.forces`."""
+    n = len(robot.joint_names)
+    q = body_positions(drives, inputs[:n])
+    qd, qdd = ([inputs[part * n + d.joint] * d.multiplier for d in drives] for part in range(1, 3))
+    gx, gy, gz, mass, x, y, z = inputs[3 * n :]
+    pose = pose_of(tree, q)
+    motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
+    return pose, motion, payload_of(robot, tree, pose, mass, (x, y, z))
+
+
+def needed_torques(
+    robot: Robot, drives: Sequence[Drive], forces: Sequence[Scalar], q: Sequence[Scalar]
+) -> list[Scalar]:
+    """Return what the joints have to give: the bodies' forces less the laws of springs and such."""
+    n = len(robot.joint_names)
+    laws = laws_of(robot, q) or (0.0,) * n
+    return [force - law for force, law in zip(folded(drives, forces, n), laws, strict=True)]
+
+
 def _force_formula(robot: Robot, tree: Tree) -> Callable[..., list[Scalar]]:
     drives, n = drives_of(robot, tree), len(robot.joint_names)
 
     def formula(*inputs: Scalar) -> list[Scalar]:
-        q = body_positions(drives, inputs[:n])
-        qd, qdd = (
-            [inputs[part * n + d.joint] * d.multiplier for d in drives] for part in range(1, 3)
-        )
-        gx, gy, gz, mass, x, y, z = inputs[3 * n :]
-        pose = pose_of(tree, q)
-        loads = payload_of(robot, tree, pose, mass, (x, y, z))
-        motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
-        forces = joint_forces(tree, pose, motion, loads)
-        laws = laws_of(robot, inputs[:n]) or (0.0,) * n
-        return [force - law for force, law in zip(folded(drives, forces, n), laws, strict=True)]
+        pose, motion, loads = moving_bodies(robot, tree, drives, inputs)
+        return needed_torques(robot, drives, joint_forces(tree, pose, motion, loads), inputs[:n])
 
     return formula
 

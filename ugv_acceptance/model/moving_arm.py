@@ -12,19 +12,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from ugv_acceptance.model.dynamics import forces_and_support, motion_of
+from ugv_acceptance.model.dynamics import forces_and_support
 from ugv_acceptance.model.expressions import Number, Scalar, Vec, cross, scale, subtract
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import (
     Mechanics,
     Posture,
     Triple,
-    laws_of,
-    payload_of,
+    moving_bodies,
+    needed_torques,
     posture_formula,
 )
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.tree import body_positions, drives_of, folded, pose_of
+from ugv_acceptance.model.tree import drives_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,18 +68,10 @@ def moving_kernel(mechanics: Mechanics) -> Kernel:
     posture = posture_formula(robot, tree)
 
     def formula(*inputs: Scalar) -> tuple[Any, ...]:
-        q = body_positions(drives, inputs[:n])
-        qd, qdd = (
-            [inputs[part * n + d.joint] * d.multiplier for d in drives] for part in range(1, 3)
-        )
-        gx, gy, gz, mass, x, y, z = inputs[3 * n :]
-        pose = pose_of(tree, q)
-        loads = payload_of(robot, tree, pose, mass, (x, y, z))
-        motion = motion_of(tree, pose, qd, qdd, (gx, gy, gz))
+        pose, motion, loads = moving_bodies(robot, tree, drives, inputs)
         forces, held, moment = forces_and_support(tree, pose, motion, loads)
-        laws = laws_of(robot, inputs[:n]) or (0.0,) * n
-        torque = [f - law for f, law in zip(folded(drives, forces, n), laws, strict=True)]
-        _, whole, cog, contacts, felt, _ = posture(*inputs[:n], mass, x, y, z)
+        torque = needed_torques(robot, drives, forces, inputs[:n])
+        _, whole, cog, contacts, felt, _ = posture(*inputs[:n], *inputs[3 * n + 3 :])
         down: Vec = scale(held, -1.0 / whole)
         # Of what the ground holds, the part that turns about the centre of gravity.
         turn = subtract(moment, cross(cog, held))
