@@ -4,14 +4,17 @@ Each has its own slope, load, points and way of interpolation, and begins where 
 holds its arm. MuJoCo's motors are position servos with the configured limits, on a robot with a
 free base; they are given the positions of the trajectory, as a controller gives them. It goes wrong
 where the robot leaves its stance by more than 2 deg, or a motor is at its limit for two time steps
-(5 ms: contacts make single ones jump). `check` is asked with limits of just that: no tilt left,
-100 % of the torque. Speeds and ranges of joints are left out on both sides, and so are
-trajectories that come near the ground.
+(5 ms: contacts make single ones jump). A joint without end that stands half a turn or more from the
+first point may go either way round, as controllers differ: each way is carried out, and the worst
+counts. `check` is asked with limits of just that: no tilt left, 100 % of the torque, and is told
+the time that these servos take for another rate. Speeds and ranges of joints are left out on both
+sides, and so are trajectories that come near the ground; nothing meets anything but the ground.
 
     nice python -m bench.check_trial [--runs 1000] [--seed 1] [--config packbot] [--workers 1]
 """
 
 import argparse
+import itertools
 import math
 import time
 from collections import Counter
@@ -59,6 +62,8 @@ GROUND = replace(BUILD, friction=2.0)
 SERVO = 36.0
 CORNER = 2.5 / SERVO
 KINDS = ('linear', 'cubic', 'quintic')
+# Kind of a joint without end, and how near to half a turn (rad) it may go either way.
+ENDLESS, NEAR = 'continuous', 0.02
 # Steepest slope (rad), heaviest load (kg, of PackBot), slowest and fastest mean speed (rad/s).
 STEEPEST, HEAVIEST, SPEEDS = math.radians(28.0), 6.0, (0.15, 0.8)
 # Points of a trajectory, the first left out, and its longest time (s).
@@ -214,11 +219,35 @@ def way_of(case: Case, moved: Sequence[int]) -> Way:
     return path_of(Knots(times, q, rates, more, 0))
 
 
+def ways_round(settings: Settings, case: Case) -> Iterator[Case]:
+    """Yield the case with each way round to the first point: from the same place, turns away.
+
+    All joints of the robot turn without end, or none.
+    """
+    moved = _moved(settings.robot)
+    start = np.array(case.conditions.posture)
+    far = np.zeros(len(start))
+    if all(settings.robot.joint(settings.robot.joint_names[j]).kind == ENDLESS for j in moved):
+        far[moved] = case.trajectory.positions[0] - start[moved]
+    ways = [
+        (0.0, math.copysign(math.tau, way)) if abs(way) > math.pi - NEAR else (0.0,)
+        for way in far.tolist()
+    ]
+    for turned in itertools.product(*ways):
+        posture = tuple((start + turned).tolist())
+        yield replace(case, conditions=replace(case.conditions, posture=posture))
+
+
 def _clear(
     settings: Settings, trajectory: Trajectory, start: Floats, moved: Sequence[int], load: Payload
 ) -> bool:
-    case = Case('', (0.0, 0.0), trajectory, Conditions(None, None, None, tuple(start.tolist())))
-    way = way_of(case, moved)
+    told = Conditions(None, None, None, tuple(start.tolist()))
+    cases = ways_round(settings, Case('', (0.0, 0.0), trajectory, told))
+    return all(_one_clear(settings, case, moved, load) for case in cases)
+
+
+def _one_clear(settings: Settings, case: Case, moved: Sequence[int], load: Payload) -> bool:
+    way, start = way_of(case, moved), np.array(case.conditions.posture)
     seen = samples_of(way, steps_of(way, np.full(len(moved), STEP)))
     q = np.tile(start, (len(seen.time), 1))
     q[:, moved] = seen.position
@@ -227,7 +256,13 @@ def _clear(
 
 
 def truth_of(settings: Settings, case: Case) -> Truth:
-    """Carry out a case in MuJoCo."""
+    """Carry out a case in MuJoCo, each way round to the first point, and return the worst."""
+    found = [_carried_out(settings, way) for way in ways_round(settings, case)]
+    lean, share = max(of.lean for of in found), max(of.share for of in found)
+    return Truth(lean, share, any(of.unloaded for of in found))
+
+
+def _carried_out(settings: Settings, case: Case) -> Truth:
     load = case.conditions.payload or Payload()
     vehicle = vehicle_of(replace(settings.robot, payload=load), GROUND)
     _soften(vehicle)

@@ -21,8 +21,11 @@ from ugv_acceptance.evaluation.planned_motion.answer import (
     CheckedMotion,
     JointUse,
     TiltLeft,
+    worst_of,
 )
 from ugv_acceptance.evaluation.planned_motion.asked import (
+    MOST_WAYS,
+    begin_of,
     drives,
     farthest,
     joints_of,
@@ -97,16 +100,25 @@ class MotionChecker:
         if missing or conditions.gravity is None or conditions.payload is None:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]
-        knots, jumps = knots_of(self.settings, trajectory, moved, at)
-        path, most = path_of(knots), farthest(self.settings, self.mechanics, moved)
-        steps = steps_of(path, most)
-        moments = int(steps.sum())
-        if moments > MOST_IN_ALL:
-            return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
-        samples = samples_of(path, steps, conditions.corner)
-        work = _Work(self, path, samples, moved, start, (conditions.gravity, conditions.payload))
-        work.refusals += jumps
-        return work.answer(conditions, len(trajectory.times))
+        begin = begin_of(self.settings, knots_of(self.settings, trajectory, moved), moved, at)
+        if len(begin.ways) > MOST_WAYS:
+            return CheckedMotion(NOT_KNOWN, (words.too_many_ways_words(),))
+        load = conditions.gravity, conditions.payload
+        most = farthest(self.settings, self.mechanics, moved)
+        answers = []
+        for knots in begin.ways:
+            path = path_of(knots)
+            steps = steps_of(path, most)
+            moments = int(steps.sum())
+            if moments > MOST_IN_ALL:
+                return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
+            samples = samples_of(path, steps, conditions.corner)
+            work = _Work(self, path, samples, moved, start, load)
+            work.refusals += begin.jumps
+            work.cautions += begin.cautions
+            work.not_checked += begin.not_checked
+            answers.append(work.answer(conditions, len(trajectory.times)))
+        return worst_of(answers)
 
 
 @dataclass(slots=True)
