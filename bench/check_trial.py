@@ -268,9 +268,13 @@ def _carried_out(settings: Settings, case: Case) -> Truth:
     _soften(vehicle)
     moved, model = _moved(settings.robot), vehicle.model
     data = mujoco.MjData(model)
-    model.opt.gravity[:] = gravity_on_slope(settings.robot.gravity, *case.slope)
-    data.qpos[vehicle.position] = case.conditions.posture
-    data.ctrl[vehicle.motor] = case.conditions.posture
+    gravity = gravity_on_slope(settings.robot.gravity, *case.slope)
+    model.opt.gravity[:] = gravity
+    posture = np.array(case.conditions.posture)
+    # A servo holds its load a little beside its target: it begins where it has come to rest.
+    held = margins(settings.robot, posture, gravity, load).torque
+    data.qpos[vehicle.position] = posture - held / model.actuator_gainprm[vehicle.motor, 0]
+    data.ctrl[vehicle.motor] = posture
     set_brakes(vehicle, on=True)
     mujoco.mj_step(model, data, nstep=round(SETTLE / model.opt.timestep))
     rest, motor = attitude(vehicle, data), vehicle.motor[moved]

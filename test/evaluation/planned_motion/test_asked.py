@@ -49,7 +49,8 @@ def with_number(table: str, value: float) -> Trajectory:
     """Return the good motion with one number replaced."""
     changed = np.array(getattr(GOOD, table), np.float64)
     changed.flat[1] = value
-    return replace(GOOD, **{table: changed})
+    tables: dict[str, Any] = {table: changed}
+    return replace(GOOD, **tables)
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])

@@ -57,6 +57,9 @@ from ugv_acceptance.type_aliases import Floats
 
 # Share of a torque limit that is kept: no drive follows its plan exactly.
 RESERVE = 0.02
+# Least tilt left (rad) whatever the limit: nearer to its edge a robot rocks, and nobody knows what
+# the motors need then.
+ROCKS = math.radians(2.0)
 # A plan at its joint's range or speed is not past it: rad or m, share of the speed.
 AT_RANGE, AT_SPEED = 1e-3, 1.01
 
@@ -141,6 +144,11 @@ class _Work:
     def settings(self) -> Settings:
         """The settings that the answer is by."""
         return self.checker.settings
+
+    @property
+    def _tip_error(self) -> float:
+        """The tilt left (rad) from which a motion is refused."""
+        return max(self.settings.limits.tip_error, ROCKS)
 
     def answer(self, conditions: Conditions, points: int) -> CheckedMotion:
         """Return the answer of a trajectory of so many points."""
@@ -251,8 +259,8 @@ class _Work:
         limits, tilt = self.settings.limits, self._least(found.angle)
         if tilt is None:
             return None
-        if tilt.angle <= limits.tip_error:
-            self.refusals.append(words.tilt_words(tilt, limits.tip_error, self.points))
+        if tilt.angle <= self._tip_error:
+            self.refusals.append(words.tilt_words(tilt, self._tip_error, self.points))
         elif tilt.angle <= limits.tip_warn:
             self.cautions.append(words.tilt_words(tilt, limits.tip_warn, self.points))
         worse = slides_first(self.load[0], tilt.angle, limits.friction)
@@ -296,7 +304,7 @@ class _Work:
             return None
         short = cautious_mechanics(self.settings.robot, ground.pitch)
         tilt = self._least(self._margins(short).angle)
-        limit = self.settings.limits.tip_error
+        limit = self._tip_error
         if tilt is None or tilt.angle <= limit:
             told = 'no tilt is known'
             if tilt is not None:
