@@ -21,6 +21,7 @@ from ugv_acceptance.evaluation.planned_motion import (
     Trajectory,
 )
 from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.type_aliases import Floats
 
 ROUNDS, STEP = 300, 0.1
 NAMES = ('turret_joint', 'shoulder_joint', 'elbow_joint')
@@ -29,7 +30,7 @@ START = (0.0, 1.9, -1.5, np.pi)
 
 def motion(kind: str, count: int) -> Trajectory:
     """Return a slow wave of the arm through so many points, 0.1 s apart."""
-    time = STEP * np.arange(1, count + 1)
+    time: Floats = STEP * np.arange(1, count + 1, dtype=np.float64)
     phase = 2.0 * np.pi * time / time[-1]
     q = np.stack([np.sin(phase), 1.9 - 0.3 * np.sin(phase), -1.5 + 0.3 * np.sin(phase)], axis=1)
     rates = np.gradient(q, time, axis=0)

@@ -6,7 +6,7 @@ from bench.check_trial import Result, judged, run_of
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.planned_motion import PERMITTED, REFUSED
 
-SEED, NUMBERS = 1, range(20)
+SEED, NUMBERS = 1, range(10)
 
 
 @pytest.fixture(scope='module')
@@ -24,7 +24,7 @@ def test_what_tips_or_saturates_was_refused(results: list[Result]) -> None:
 
 
 def test_what_goes_well_is_hardly_ever_refused(results: list[Result]) -> None:
-    """One of these twenty at most."""
+    """One of these ten at most."""
     fine = [of for of in results if not of.truth.wrong]
     assert len(fine) >= len(results) // 2
     assert sum(of.said.verdict == REFUSED for of in fine) <= 1

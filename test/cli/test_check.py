@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bag.bag_cases import STORE
-from bag.test_trajectory import encoded
+from bag.trajectories import encoded
 from cli.here import ugv
 
 from ugv_acceptance.bag.trajectory import TYPE

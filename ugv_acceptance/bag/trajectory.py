@@ -62,13 +62,15 @@ def trajectory_from(data: bytes) -> TrajectoryMessage:
     points = _Points(data, number, little=cursor.little)
     points.hashed.extend(name.encode() + b'\0' for name in names)
     points.read(cursor.pos, count)
-    positions, *others = (points.rows[name] for name in FIELDS)
+    rates, accelerations, effort = (_filled(points.rows[name], number) for name in FIELDS[1:])
     return TrajectoryMessage(
         stamp_of(data),
         names,
         np.array(points.times, np.int64),
-        np.array(positions, np.float64).reshape(count, number),
-        *(None if not any(rows) else _filled(rows, number) for rows in others),
+        np.array(points.rows[FIELDS[0]], np.float64).reshape(count, number),
+        rates,
+        accelerations,
+        effort,
         hashlib.sha256(b''.join(points.hashed)).hexdigest(),
     )
 
@@ -79,7 +81,10 @@ def _some(number: int, most: int, where: str, what: str) -> int:
     return number
 
 
-def _filled(rows: list[tuple[float, ...]], number: int) -> Floats:
+def _filled(rows: list[tuple[float, ...]], number: int) -> Floats | None:
+    """Return numbers (n, m), a row of NaN where a point has none; None where no point has any."""
+    if not any(rows):
+        return None
     return np.array([row or (np.nan,) * number for row in rows], np.float64)
 
 

@@ -26,7 +26,7 @@ from ugv_acceptance.evaluation.planned_motion import (
     Trajectory,
     check_motion,
 )
-from ugv_acceptance.evaluation.settings import ALWAYS, CONTACTS, JointInput, Untold
+from ugv_acceptance.evaluation.settings import ALWAYS, CONTACTS, JointInput, Settings, Untold
 from ugv_acceptance.model.robot import Payload
 
 SETTINGS = settings_of(one_joint())
@@ -49,7 +49,8 @@ def with_number(table: str, value: float) -> Trajectory:
     """Return the good motion with one number replaced."""
     changed = np.array(getattr(GOOD, table), np.float64)
     changed.flat[1] = value
-    return replace(GOOD, **{table: changed})
+    tables: dict[str, Any] = {table: changed}
+    return replace(GOOD, **tables)
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
@@ -181,6 +182,75 @@ def test_the_first_point_is_not_jumped_to() -> None:
     assert ask(jump, level(from_first_point=True)).verdict == PERMITTED
 
 
+def endless() -> Settings:
+    """Return settings of the one joint without ends."""
+    robot = one_joint()
+    lift = replace(robot.joints[0], kind='continuous', lower=-math.inf, upper=math.inf)
+    return settings_of(replace(robot, joints=(lift, *robot.joints[1:])))
+
+
+@pytest.mark.parametrize(
+    ('start', 'first', 'verdict'),
+    [
+        (0.1, 3.0, PERMITTED),  # over the top
+        (0.1, 3.0 - math.tau, REFUSED),  # over the top, or down by its numbers
+        (0.1 + math.tau, 3.0, REFUSED),
+        (0.1, 0.1 + math.pi - 0.01, REFUSED),  # as good as half a turn
+        (0.1, 0.1 + math.pi + 0.01, REFUSED),
+        (math.pi - 0.1, math.pi + 0.1, PERMITTED),
+        (math.pi - 0.1, 0.1 - math.pi, REFUSED),  # by its numbers nearly a whole turn
+        (0.1 + math.tau, 3.0 + math.tau, PERMITTED),
+    ],
+)
+def test_a_joint_without_end_may_go_either_way_round(
+    start: float, first: float, verdict: str
+) -> None:
+    """By its numbers or the shorter way, as controllers differ: permitted if each way is."""
+    found = check_motion(endless(), way([first], [8.0], [0.0]), level(start))
+    assert found.verdict == verdict
+    told = any('either way round' in caution for caution in found.cautions)
+    assert told == (verdict == REFUSED)
+
+
+def test_the_worse_way_round_gives_the_margins() -> None:
+    """The least tilt and the most torque of both ways, however they are refused."""
+    ways = [
+        check_motion(endless(), way([3.0 - turn], [8.0], [0.0]), level(0.1 - turn + back))
+        for turn, back in ((math.tau, 0.0), (math.tau, math.tau))
+    ]
+    both = ways[1]
+    assert both.tilt is not None
+    assert ways[0].tilt is not None
+    assert both.tilt.angle <= ways[0].tilt.angle
+    assert both.joint is not None
+    assert ways[0].joint is not None
+    assert both.joint.share >= ways[0].joint.share
+    assert both.samples > ways[0].samples
+
+
+def test_a_first_point_that_is_told_in_another_turn_is_said() -> None:
+    """Due at once it can only be meant as the place where the joint stands: not checked."""
+    motion = way([0.5, 0.8], [0.0, 2.0], [0.0, 0.0])
+    same, other = (check_motion(endless(), motion, level(0.5 + of)) for of in (0.0, math.tau))
+    assert same.verdict == other.verdict == PERMITTED
+    assert len(other.not_checked) == len(same.not_checked) + 1
+    assert 'whole turns of lift' in ' '.join(other.not_checked)
+
+
+def test_too_many_ways_round_are_not_known() -> None:
+    """Of a robot with more such joints than can be looked at."""
+    told = arm_settings()
+    joints = tuple(
+        replace(of, kind='continuous') if of.kind == 'revolute' else of for of in told.robot.joints
+    )
+    endless_arm = replace(told, robot=replace(told.robot, joints=joints))
+    names = tuple(of.topic_name for of in told.joints)
+    motion = Trajectory(names, np.array([9.0]), np.full((1, len(names)), 4.0))
+    found = check_motion(endless_arm, motion, level(*[0.0] * len(names)))
+    assert (found.verdict, len(names)) == (NOT_KNOWN, 4)
+    assert 'either' in found.reasons[0]
+
+
 def test_the_way_to_the_first_point_is_a_part_of_the_motion() -> None:
     """A heavy arm passes its level place on the way from where it stands."""
     motion = way([1.3, 1.4], [30.0, 31.0], [0.0, 0.0])
@@ -229,6 +299,23 @@ def test_limits_are_those_of_the_live_monitor() -> None:
     assert tilt is not None
     for over, verdict in ((1e-6, REFUSED), (-1e-6, PERMITTED)):
         assert ask(limits=replace(SETTINGS.limits, tip_error=tilt.angle + over)).verdict == verdict
+
+
+def test_nearer_to_tipping_than_two_degrees_is_refused_whatever_the_limit() -> None:
+    """There the robot rocks on one edge, and what its motors need is not known."""
+    steep = 0.0
+    while True:
+        steep += math.radians(0.25)
+        down = (0.0, -9.81 * math.sin(steep), -9.81 * math.cos(steep))
+        found = ask(conditions=replace(level(0.3), gravity=down))
+        assert found.tilt is not None
+        if found.tilt.angle < math.radians(1.9):
+            break
+        if found.tilt.angle > math.radians(2.1):
+            assert found.verdict == PERMITTED
+    assert found.tilt.angle > math.radians(1.0)
+    assert found.verdict == REFUSED
+    assert 'must stay above 2 deg' in found.reasons[0]
 
 
 def test_no_payload_link_carries_no_load() -> None:

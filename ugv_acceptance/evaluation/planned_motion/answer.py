@@ -1,10 +1,13 @@
 """What is answered: permitted, refused or not known, with the least margins and where they are."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 # May it? Refused where a limit is passed that the live monitor calls DANGER, or one of the joint's
 # own. Not known where something is missing without which nobody can say; never permitted then.
 PERMITTED, REFUSED, NOT_KNOWN = 'PERMITTED', 'REFUSED', 'NOT_KNOWN'
+# From the best to the worst.
+_ORDER = (PERMITTED, NOT_KNOWN, REFUSED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +49,11 @@ class CheckedMotion:
     """The answer: `verdict` is PERMITTED, REFUSED or NOT_KNOWN.
 
     `reasons` are sentences: why not permitted, () if it is. `cautions` are sentences on what the
-    monitor would call CAUTION. `tilt` is None where no tilt is known; `cautious` is that of
-    shortened tracks, on ground that is not flat only. `joints` are the joints with a limit, most
-    used first; empty where no torque is known. `not_checked` are sentences on what no answer
-    covers. `duration` (s) is when the motion ends, `samples` how many moments were computed.
+    monitor would call CAUTION, and on what to mind. `tilt` is None where no tilt is known;
+    `cautious` is that of shortened tracks, on ground that is not flat only. `joints` are the joints
+    with a limit, most used first; empty where no torque is known. `not_checked` are sentences on
+    what no answer covers. `duration` (s) is when the motion ends, `samples` how many moments were
+    computed.
     """
 
     verdict: str
@@ -66,3 +70,30 @@ class CheckedMotion:
     def joint(self) -> JointUse | None:
         """The joint that uses most of its limit; None where no torque is known."""
         return self.joints[0] if self.joints else None
+
+
+def worst_of(answers: Sequence[CheckedMotion]) -> CheckedMotion:
+    """Return one answer for a motion that may go several ways: the worst, and the least margins."""
+    if len(answers) == 1:
+        return answers[0]
+    uses: dict[str, JointUse] = {}
+    for use in (use for answer in answers for use in answer.joints):
+        uses[use.joint] = max(uses.get(use.joint, use), use, key=lambda of: of.share)
+    worst = max(answers, key=lambda of: _ORDER.index(of.verdict))
+    return replace(
+        worst,
+        cautions=_together([answer.cautions for answer in answers]),
+        tilt=_least([answer.tilt for answer in answers]),
+        cautious=_least([answer.cautious for answer in answers]),
+        joints=tuple(sorted(uses.values(), key=lambda use: -use.share)),
+        not_checked=_together([answer.not_checked for answer in answers]),
+        samples=sum(answer.samples for answer in answers),
+    )
+
+
+def _together(told: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(sentence for some in told for sentence in some))
+
+
+def _least(tilts: Sequence[TiltLeft | None]) -> TiltLeft | None:
+    return min((tilt for tilt in tilts if tilt), key=lambda tilt: tilt.angle, default=None)

@@ -3,22 +3,28 @@
 Sentences here say why nobody can know; none of them is of a limit that is passed.
 """
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.ground import KINDS
 from ugv_acceptance.evaluation.inputs.turns import turning_of
+from ugv_acceptance.evaluation.planned_motion import words
 from ugv_acceptance.evaluation.planned_motion.path import CARRYING, SLIDE, STEP, Knots
 from ugv_acceptance.evaluation.planned_motion.request import Conditions, Trajectory
 from ugv_acceptance.evaluation.settings import CONTACTS, Settings
 from ugv_acceptance.model.mechanics import Mechanics
+from ugv_acceptance.model.robot import Joint
 from ugv_acceptance.type_aliases import Floats
 
 # A motion that begins at once may begin so far (rad, m) from where the joints stand: encoders.
 NEAR, NEAR_SLIDE = 0.02, 0.005
+# Ways to the first point that are looked at: three joints, each two ways round.
+MOST_WAYS = 8
 # Names that are listed in one sentence.
 FEW = 4
 
@@ -146,40 +152,74 @@ def drives(settings: Settings, moved: Sequence[int], wheels: Sequence[str]) -> l
     return [f'{_listed(turned)} drives the robot: the base is to stand still'] if turned else []
 
 
-def knots_of(
-    settings: Settings,
-    trajectory: Trajectory,
-    moved: Sequence[int],
-    start: Sequence[float] | None,
-) -> tuple[Knots, list[str]]:
-    """Return the points that the joints pass, and sentences on a jump at the start.
-
-    `start` are the positions (m,) of the trajectory's joints before it; None: at its first point.
-    A joint without end counts as standing at the turn that is nearest to its first point.
-    """
+def knots_of(settings: Settings, trajectory: Trajectory, moved: Sequence[int]) -> Knots:
+    """Return the points of a trajectory of the joints `moved`, in the robot's own sense."""
     inputs = [settings.joints[j] for j in moved]
     sign = np.array([of.sign for of in inputs])
     offset = np.array([of.offset for of in inputs])
     none = np.full(trajectory.positions.shape, np.nan)
     rates, more = trajectory.velocities, trajectory.accelerations
-    knots = Knots(
+    return Knots(
         np.asarray(trajectory.times, np.float64),
         sign * trajectory.positions + offset,
         none if rates is None else sign * rates,
         none if more is None else sign * more,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Begin:
+    """How a motion may begin: `ways`, the points with each way to the first; sentences on it.
+
+    `jumps` refuse it, `cautions` and `not_checked` are as those of CheckedMotion.
+    """
+
+    ways: tuple[Knots, ...]
+    jumps: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    not_checked: tuple[str, ...] = ()
+
+
+def begin_of(
+    settings: Settings, knots: Knots, moved: Sequence[int], start: Sequence[float] | None
+) -> Begin:
+    """Return how a motion may begin from `start` (m,); None: at its first point.
+
+    Which way round a joint without end goes to a first point that is half a turn away or more
+    depends on the controller: by its numbers, or the shorter way. Both are returned.
+    """
     if start is None:
-        return knots, []
-    joints = [settings.robot.joint(settings.robot.joint_names[j]) for j in moved]
-    turns = np.array([math.tau if joint.kind == 'continuous' else 0.0 for joint in joints])
+        return Begin((knots,))
+    robot = settings.robot
+    joints = [robot.joint(robot.joint_names[j]) for j in moved]
     at, first = np.array(start), knots.position[0]
-    whole = np.where(turns > 0.0, np.round((first - at) / np.where(turns > 0.0, turns, 1.0)), 0.0)
-    at = at + whole * turns
+    turns = [_turns(joint, way) for joint, way in zip(joints, (first - at).tolist(), strict=True)]
+    names = _listed([joint.name for joint, of in zip(joints, turns, strict=True) if any(of)])
     if knots.time[0] > 0.0:
-        return _with_start(knots, at), []
+        every = itertools.product(*turns)
+        ways = tuple(
+            _with_start(knots, at + math.tau * np.array(of))
+            for of in itertools.islice(every, MOST_WAYS + 1)
+        )
+        return Begin(ways, cautions=(words.round_words(names),) if names else ())
+    short = first - at - math.tau * np.array([of[-1] for of in turns])
     near = np.where(slides_of(settings, moved), NEAR_SLIDE, NEAR)
-    jumps = [k for k, far in enumerate(np.abs(first - at) > near) if far]
-    return knots, [_jump(joints[k].name, joints[k].slides, first[k] - at[k]) for k in jumps]
+    jumps = [k for k, far in enumerate(np.abs(short) > near) if far]
+    told = tuple(_jump(joints[k].name, joints[k].slides, short[k]) for k in jumps)
+    return Begin((knots,), told, not_checked=(words.whole_turn_words(names),) if names else ())
+
+
+def _turns(joint: Joint, way: float) -> tuple[int, ...]:
+    """Return by how many turns a joint may count as away from where it is told to stand.
+
+    `way` (rad, m) is how far its first point is. The last is that of the shorter way round.
+    """
+    if joint.kind != 'continuous':
+        return (0,)
+    nearest = round(way / math.tau)
+    if not nearest and abs(way) > math.pi - NEAR:
+        return (int(math.copysign(1.0, way)), 0)
+    return (0, nearest) if nearest else (0,)
 
 
 def slides_of(settings: Settings, moved: Sequence[int]) -> NDArray[np.bool_]:

@@ -21,8 +21,11 @@ from ugv_acceptance.evaluation.planned_motion.answer import (
     CheckedMotion,
     JointUse,
     TiltLeft,
+    worst_of,
 )
 from ugv_acceptance.evaluation.planned_motion.asked import (
+    MOST_WAYS,
+    begin_of,
     drives,
     farthest,
     joints_of,
@@ -54,6 +57,9 @@ from ugv_acceptance.type_aliases import Floats
 
 # Share of a torque limit that is kept: no drive follows its plan exactly.
 RESERVE = 0.02
+# Least tilt left (rad) whatever the limit: nearer to its edge a robot rocks, and nobody knows what
+# the motors need then.
+ROCKS = math.radians(2.0)
 # A plan at its joint's range or speed is not past it: rad or m, share of the speed.
 AT_RANGE, AT_SPEED = 1e-3, 1.01
 
@@ -97,16 +103,25 @@ class MotionChecker:
         if missing or conditions.gravity is None or conditions.payload is None:
             return CheckedMotion(NOT_KNOWN, tuple(missing))
         at = None if conditions.from_first_point else [start[j] for j in moved]
-        knots, jumps = knots_of(self.settings, trajectory, moved, at)
-        path, most = path_of(knots), farthest(self.settings, self.mechanics, moved)
-        steps = steps_of(path, most)
-        moments = int(steps.sum())
-        if moments > MOST_IN_ALL:
-            return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
-        samples = samples_of(path, steps, conditions.corner)
-        work = _Work(self, path, samples, moved, start, (conditions.gravity, conditions.payload))
-        work.refusals += jumps
-        return work.answer(conditions, len(trajectory.times))
+        begin = begin_of(self.settings, knots_of(self.settings, trajectory, moved), moved, at)
+        if len(begin.ways) > MOST_WAYS:
+            return CheckedMotion(NOT_KNOWN, (words.too_many_ways_words(),))
+        load = conditions.gravity, conditions.payload
+        most = farthest(self.settings, self.mechanics, moved)
+        answers = []
+        for knots in begin.ways:
+            path = path_of(knots)
+            steps = steps_of(path, most)
+            moments = int(steps.sum())
+            if moments > MOST_IN_ALL:
+                return CheckedMotion(NOT_KNOWN, (words.too_long_words(moments, MOST_IN_ALL),))
+            samples = samples_of(path, steps, conditions.corner)
+            work = _Work(self, path, samples, moved, start, load)
+            work.refusals += begin.jumps
+            work.cautions += begin.cautions
+            work.not_checked += begin.not_checked
+            answers.append(work.answer(conditions, len(trajectory.times)))
+        return worst_of(answers)
 
 
 @dataclass(slots=True)
@@ -129,6 +144,11 @@ class _Work:
     def settings(self) -> Settings:
         """The settings that the answer is by."""
         return self.checker.settings
+
+    @property
+    def _tip_error(self) -> float:
+        """The tilt left (rad) from which a motion is refused."""
+        return max(self.settings.limits.tip_error, ROCKS)
 
     def answer(self, conditions: Conditions, points: int) -> CheckedMotion:
         """Return the answer of a trajectory of so many points."""
@@ -239,8 +259,8 @@ class _Work:
         limits, tilt = self.settings.limits, self._least(found.angle)
         if tilt is None:
             return None
-        if tilt.angle <= limits.tip_error:
-            self.refusals.append(words.tilt_words(tilt, limits.tip_error, self.points))
+        if tilt.angle <= self._tip_error:
+            self.refusals.append(words.tilt_words(tilt, self._tip_error, self.points))
         elif tilt.angle <= limits.tip_warn:
             self.cautions.append(words.tilt_words(tilt, limits.tip_warn, self.points))
         worse = slides_first(self.load[0], tilt.angle, limits.friction)
@@ -284,7 +304,7 @@ class _Work:
             return None
         short = cautious_mechanics(self.settings.robot, ground.pitch)
         tilt = self._least(self._margins(short).angle)
-        limit = self.settings.limits.tip_error
+        limit = self._tip_error
         if tilt is None or tilt.angle <= limit:
             told = 'no tilt is known'
             if tilt is not None:

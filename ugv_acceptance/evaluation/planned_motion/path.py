@@ -116,8 +116,8 @@ def path_of(knots: Knots) -> Path:
 
 def _degrees(knots: Knots) -> NDArray[np.intp]:
     """Return the degree of the polynomial from each knot to the next."""
-    rated = np.isfinite(knots.rate).all(axis=1)
-    full = rated & np.isfinite(knots.acceleration).all(axis=1)
+    rated: NDArray[np.bool_] = np.isfinite(knots.rate).all(axis=1)
+    full: NDArray[np.bool_] = rated & np.isfinite(knots.acceleration).all(axis=1)
     both, all_of = rated[:-1] & rated[1:], full[:-1] & full[1:]
     return np.where(all_of, 5, np.where(both, 3, 1)).astype(np.intp)
 
@@ -152,17 +152,18 @@ def samples_of(path: Path, steps: NDArray[np.intp], corner: float = CORNER) -> S
 
 def _at(path: Path, of: NDArray[np.intp], share: Floats) -> tuple[Floats, Floats, Floats]:
     """Return positions, rates and accelerations (s, m) at shares of the way between two knots."""
-    u, t = share[:, None], path.length[of][:, None]
     highest = int(path.degree.max(initial=1))
-    c = path.powers[of]
-    q, v, a = (np.zeros(c[:, 0].shape) for _ in range(3))
+    # A joint's numbers lie side by side: all that follows is quicker.
+    c = path.powers[:, : highest + 1].transpose(1, 2, 0)[:, :, of]
+    q, v, a = (np.zeros(c.shape[1:]) for _ in range(3))
     for k in range(highest, -1, -1):
-        q = q * u + c[:, k]
+        q = q * share + c[k]
         if k >= 1:
-            v = v * u + k * c[:, k]
+            v = v * share + k * c[k]
         if k >= 2:
-            a = a * u + k * (k - 1) * c[:, k]
-    return q, v / t, a / (t * t)
+            a = a * share + k * (k - 1) * c[k]
+    t = path.length[of]
+    return q.T, (v / t).T, (a / (t * t)).T
 
 
 def _corners(

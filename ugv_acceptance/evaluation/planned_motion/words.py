@@ -34,6 +34,30 @@ def too_long_words(moments: int, most: int) -> str:
     )
 
 
+def too_many_ways_words() -> str:
+    """Return that too many joints may go either way round to the first point."""
+    return (
+        'too many joints stand half a turn or more from their first point, and each may go either '
+        'way round: begin the trajectory nearer to where they stand'
+    )
+
+
+def round_words(names: str) -> str:
+    """Return that some joints may go either way round to the first point."""
+    return (
+        f'{names}: half a turn or more from the first point; a controller may go either way round, '
+        'so all are judged; a point on the way, less than half a turn from each, settles it'
+    )
+
+
+def whole_turn_words(names: str) -> str:
+    """Return that the first point of some joints is told in another turn than they stand in."""
+    return (
+        f'whether the controller counts whole turns of {names}: the first point, due at 0 s, is '
+        'told in another turn than that in which it stands, and is taken to be the same place'
+    )
+
+
 def tilt_words(tilt: TiltLeft, limit: float, points: int) -> str:
     """Return that a tilt left is at its limit (rad) or past it."""
     told = tipping_words(tilt.side, tilt.angle)
