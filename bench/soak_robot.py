@@ -165,7 +165,8 @@ def main() -> None:
         joints = node.create_publisher(JointState, 'joint_states', quick)
         attitude = node.create_publisher(Imu, 'imu/data', quick)
         held = node.create_publisher(InertiaStamped, 'payload', 10)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        profile: Any = QoSProfile
+        latched = profile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         own = node.create_publisher(String, 'robot_description', latched)
         own.publish(string_message(URDF.read_text(encoding='utf-8')))
         while not (joints.get_subscription_count() and attitude.get_subscription_count()):
