@@ -206,7 +206,8 @@ def test_a_name_that_cannot_be_a_topic_is_refused(live: Live, tmp_path: Path) ->
 def test_a_wrong_name_of_a_topic_leaves_no_folder_behind(tmp_path: Path, name: str) -> None:
     """It is refused before a recording is begun; nor is an older one deleted for it."""
     room = Room(reserve=0)
-    asked = Asked('x', configured().topics, tmp_path / 'run', room, None, (name,), 1.0, 1.0, True)
+    topics, folder = configured().topics, tmp_path / 'run'
+    asked = Asked('x', topics, folder, room, None, (name,), seconds=1.0, every=1.0, plain=True)
     with pytest.raises(BadConfig, match='--topics'):
         carry_out(asked, [])
     assert not any(tmp_path.iterdir())
