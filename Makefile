@@ -34,7 +34,7 @@ REQUIREMENTS := setup.py setup.cfg $(wildcard requirements/*.txt)
 COLCON := out/colcon
 # Files and folders of tests that `make colcon` leaves to `make pytest`: what depends on the versions of Python and
 # NumPy is in the others, and in the nodes.
-ONCE := $(foreach name,angles bag_player console_after console_inputs doctor footprint foxglove_bridge hand_may_touch imu_mounting kills layers levels monitor_control \
+ONCE := $(foreach name,angles bag_player check_live console_after console_inputs doctor footprint foxglove_bridge hand_may_touch imu_mounting kills layers levels monitor_control \
     monitor_inputs motion_desk ok operator own_description packbot_simulator page_of_ parameter_types plain_english recipe recorder relaxed restarted robot_listener run_verb soak \
     stamps tell termination viewers words, \
     '--ignore-glob=*test_$(name)*') \

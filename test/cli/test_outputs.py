@@ -56,7 +56,7 @@ FOLDERS = {
 # Paths that verbs read; whatever else is a path is written, and stands in one of the tables above.
 READ = {
     'config', 'urdf', 'bag', 'bags', 'criteria', 'result_file', 'failures', 'mission', 'existing',
-    'from_bag', 'plan', 'sources', 'meshes', 'check', 'drill', 'script',
+    'from_bag', 'plan', 'sources', 'meshes', 'check', 'drill', 'script', 'trajectory',
 }  # fmt: skip
 # Parameters that are called otherwise than their options.
 NAMES = {'json_file': '--json', 'csv_file': '--csv', 'init_criteria': '--init-criteria'}

@@ -209,11 +209,17 @@ def test_a_recorded_clock_is_left_out_of_a_replay_of_now(live: Live, tmp_path: P
     assert '/clock' in player(live, Play(path, topics=('/clock',))).publishers
 
 
-def test_a_recorded_word_for_gates_of_motion_is_left_out(live: Live, tmp_path: Path) -> None:
-    """A robot's gate would take a true word of then for one of now: only who names it plays it."""
-    path, word = tmp_path / 'run', '/r1/acceptance_monitor/ok'
+@pytest.mark.parametrize(
+    ('last', 'kind'),
+    [('ok', 'std_msgs/msg/Bool'), ('check_result', 'diagnostic_msgs/msg/DiagnosticStatus')],
+)
+def test_a_recorded_word_for_gates_of_motion_is_left_out(
+    live: Live, tmp_path: Path, last: str, kind: str
+) -> None:
+    """A robot's gate would take a permission of then for one of now: only who names it plays it."""
+    path, word = tmp_path / 'run', f'/r1/acceptance_monitor/{last}'
     with BagWriter(path) as writer:
-        for name, kind in ((word, 'std_msgs/msg/Bool'), ('/t', 'std_msgs/msg/Bool')):
+        for name in (word, '/t'):
             writer.add_topic(name, kind)
             writer.write(name, T0, b'\x00\x01\x00\x00\x01')
     playing = player(live, Play(path))

@@ -22,7 +22,6 @@ from ugv_acceptance.nodes.executor import (
     TRANSPORT,
     UDP,
     choose_transport,
-    spin_within,
     spun_by_thread,
     take_what_came,
 )
@@ -117,15 +116,6 @@ def test_all_that_is_due_is_taken_in_one_go(live: Live) -> None:
     assert ran == [0, 1, 2]
     take_what_came(live.executor)
     assert ran == [0, 1, 2, 3, 4, 5]
-
-
-def test_what_is_waited_for_ends_the_waiting(live: Live) -> None:
-    """An answer is seen when it comes, not at the end of the time given."""
-    ran: list[int] = []
-    for number in range(3):
-        live.executor.create_task(ran.append, number)
-    spin_within(live.executor, lambda: len(ran) == 2, 3600.0)
-    assert ran == [0, 1]
 
 
 def test_a_thread_that_takes_messages_ends_with_its_block(live: Live) -> None:

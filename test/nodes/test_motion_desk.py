@@ -135,8 +135,8 @@ def running() -> Iterator[Site]:
     """Return a monitor that has margins, and hears questions."""
     with live_nodes() as live:
         # A busy machine stops this process for a second now and then: that is no silence here.
-        patient = {'delays__stale_after_s': 2.0, 'delays__off_s': 0.0}
-        monitor = live.monitor(arguments=('-r', f'__ns:={SPACE}'), **patient)
+        space = ('-r', f'__ns:={SPACE}')
+        monitor = live.monitor(arguments=space, delays__stale_after_s=2.0, delays__off_s=0.0)
         site = Site(live, monitor, live.driver(namespace=SPACE))
         site.until(lambda: session_of(monitor).evaluator.margins is not None)
         node = site.driver
@@ -177,7 +177,7 @@ def silent(site: Site) -> None:
 
 def another(site: Site) -> None:
     """Let another node publish joint states too."""
-    other = site.live.driver('another', SPACE)
+    other: Any = site.live.driver('another', SPACE)
     site.until(lambda: session_of(site.monitor).faults.active)
     site.live.executor.remove_node(other)
     site.live.nodes.remove(other)
@@ -226,21 +226,22 @@ def test_where_something_is_missing_nothing_is_permitted(site: Site, state: str)
 
 def test_a_monitor_that_is_not_active_permits_nothing(site: Site) -> None:
     """It withdraws what it permitted, and answers; one that comes up anew has to be told anew."""
+    monitor: Any = site.monitor
     site.permitted(motion(0.1, 0.0))
-    site.monitor.trigger_deactivate()
+    monitor.trigger_deactivate()
     assert site.withdrawn(motion(0.1, 0.0)).values['cause'] == 'monitor'
     said = site.ask(motion(0.12, 0.0))
     assert (said.values['result'], said.text) == (
         'not_known',
         'not known: the monitor is not active',
     )
-    site.monitor.trigger_activate()
+    monitor.trigger_activate()
     site.until(lambda: session_of(site.monitor).evaluator.margins is not None)
     assert site.permitted(motion(0.1, 0.0)).values['payload_by'] == 'operator'
-    site.monitor.trigger_deactivate()
-    site.monitor.trigger_cleanup()
-    site.monitor.trigger_configure()
-    site.monitor.trigger_activate()
+    monitor.trigger_deactivate()
+    monitor.trigger_cleanup()
+    monitor.trigger_configure()
+    monitor.trigger_activate()
     site.until(lambda: session_of(site.monitor).evaluator.margins is not None)
     site.until(lambda: not session_of(site.monitor).level)
     reasons = site.ask(motion(0.14, 0.0)).values['reasons']

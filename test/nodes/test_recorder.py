@@ -13,12 +13,14 @@ from typing import Any
 import pytest
 import rclpy
 import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import InertiaStamped
 from nodes.live_case import FOLDED, Live, imu, joints, parameter, session_of
 from nodes.tf2_type import provide_tf2_msgs
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Imu
-from std_msgs.msg import String
+from std_msgs.msg import Bool, String
+from trajectory_msgs.msg import JointTrajectory
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.bag.encode import inertia_cdr, string_message
@@ -28,6 +30,7 @@ from ugv_acceptance.bag.recorder import Recorder, Room
 from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.bag.told_parameters import parameters_in
 from ugv_acceptance.bag.transforms import transforms_cdr
+from ugv_acceptance.cli.record import Asked, carry_out
 from ugv_acceptance.config import load as configured
 from ugv_acceptance.evaluation.alerts.rules import FAILURES
 from ugv_acceptance.nodes.bag_player import message_type
@@ -197,6 +200,41 @@ def test_a_name_that_cannot_be_a_topic_is_refused(live: Live, tmp_path: Path) ->
     """One line with the option and the name."""
     with pytest.raises(BadConfig, match=r'--topics 1\?'), recording(live, tmp_path / 'run', '1?'):
         pass
+
+
+@pytest.mark.parametrize('name', ['1?', '/a//b', '{nothing}/a', ''])
+def test_a_wrong_name_of_a_topic_leaves_no_folder_behind(tmp_path: Path, name: str) -> None:
+    """It is refused before a recording is begun; nor is an older one deleted for it."""
+    room = Room(reserve=0)
+    topics, folder = configured().topics, tmp_path / 'run'
+    asked = Asked('x', topics, folder, room, None, (name,), seconds=1.0, every=1.0, plain=True)
+    with pytest.raises(BadConfig, match='--topics'):
+        carry_out(asked, [])
+    assert not any(tmp_path.iterdir())
+
+
+def test_what_the_monitor_was_asked_and_permitted_is_recorded(live: Live, tmp_path: Path) -> None:
+    """Its word for programs, planned motions, the answers to them: evidence, never missed."""
+    node = live.add(rclpy.create_node('asking'))
+    outs = [
+        (node.create_publisher(kind, f'/acceptance_monitor/{name}', 10), kind)
+        for name, kind in (
+            ('ok', Bool),
+            ('check', JointTrajectory),
+            ('check_result', DiagnosticStatus),
+        )
+    ]
+
+    def say() -> None:
+        for out, kind in outs:
+            out.publish(kind())
+
+    with recording(live, tmp_path / 'run') as (recorder, _):
+        states = {topic.name: topic for topic in recorder.heard}
+        assert not any(states[out.topic_name].missing for out, _ in outs)
+        live.until(lambda: all(heard(recorder, out.topic_name) for out, _ in outs), say)
+    for out, _ in outs:
+        assert contents(tmp_path / 'run', out.topic_name)
 
 
 def test_what_nobody_publishes_is_told(live: Live, tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ One monitor serves the whole module; its driver sends what each test needs.
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,6 +21,7 @@ from nodes.live_case import ERROR, FOLDED, Driver, Live, live_nodes, parameter, 
 from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.cli.tell import values_of
 from ugv_acceptance.config import load
+from ugv_acceptance.console.snapshot import Awaited
 from ugv_acceptance.evaluation.alerts.alarms import State
 from ugv_acceptance.nodes.console_feed import ConsoleNode
 from ugv_acceptance.nodes.monitor.node import Monitor
@@ -98,12 +99,25 @@ def console_of(site: Site) -> Iterator[ConsoleNode]:
         console.close()
 
 
-def served(site: Site, ask: Callable[[], str]) -> str:
-    """Return what a console's command returns; it waits, so the monitor is spun meanwhile."""
-    with ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(ask)
-        site.until(asked.done)
-        return asked.result()
+def answered(site: Site, console: ConsoleNode, do: str, values: dict[str, Any]) -> str:
+    """Return the answer to a console's command, which its snapshots bring."""
+    return heard(site, console, console.command(do, values))
+
+
+def heard(site: Site, console: ConsoleNode, asked: Awaited) -> str:
+    """Return an answer; 20 snapshots a second bring it, as those of a page do."""
+    said, due = asked(), 0.0
+
+    def show() -> None:
+        nonlocal said, due
+        site.send()
+        if said is None and time.monotonic() >= due:
+            due = time.monotonic() + 0.05
+            console.snapshot()
+            said = asked()
+
+    site.live.until(lambda: said is not None, show)
+    return str(said)
 
 
 def keys(console: ConsoleNode, code: str) -> list[str]:
@@ -216,19 +230,31 @@ def test_a_console_says_what_the_monitor_answered(site: Site) -> None:
     """Whatever an operator does on page or terminal, the text is the answer of the monitor."""
     with console_of(site) as console:
         site.until(lambda: console.snapshot().known)
-        said = served(site, lambda: console.command('ground', {'kind': 'flat', 'by': 'Ada'}))
+        said = answered(site, console, 'ground', {'kind': 'flat', 'by': 'Ada'})
         assert said == 'ground is now flat; before: flat'
         site.pose = STRETCHED
         site.until(lambda: console.snapshot() and len(keys(console, 'TIP_OVER')) == 2)
         asked = {'keys': [*keys(console, 'TIP_OVER'), 'of-another-time'], 'note': 'seen'}
-        said = served(site, lambda: console.command('acknowledge', asked))
+        said = answered(site, console, 'acknowledge', asked)
         assert said.count('TIP_OVER front') == 2
         assert site.states('TIP_OVER') == {State.ACTIVE_ACKNOWLEDGED}
         with pytest.raises(BadSample, match='no alert of this card offers that'):
-            served(site, lambda: console.command('reset', asked))
+            answered(site, console, 'reset', asked)
         load = {'mass_kg': -1.0, 'cog_m': [0.0, 0.0, 0.0]}
         with pytest.raises(BadSample, match='refused: payload: expected a mass from 0'):
-            served(site, lambda: console.command('payload', load))
+            answered(site, console, 'payload', load)
+
+
+def test_a_console_goes_on_while_a_busy_monitor_has_not_answered(site: Site) -> None:
+    """The command does not wait, frames are made all the time, and a late answer is told."""
+    with console_of(site) as console:
+        asked = console.command('ground', {'kind': 'flat', 'by': 'Ada'})
+        # Nobody spins the monitor: it stands still for longer than a page may.
+        until = time.monotonic() + 0.8
+        while time.monotonic() < until:
+            console.snapshot()
+            assert asked() is None
+        assert heard(site, console, asked).startswith('ground is now flat')
 
 
 def test_a_console_follows_what_the_monitor_says_of_itself(site: Site) -> None:

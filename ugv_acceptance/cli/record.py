@@ -145,8 +145,10 @@ def carry_out(asked: Asked, arguments: list[str]) -> str:
     from ugv_acceptance.cli.record_status import Lines, Panel, Progress, print_summary
     from ugv_acceptance.cli.terminal_output import complain, console_of, said_of_work
     from ugv_acceptance.nodes.executor import end, ros, spin
-    from ugv_acceptance.nodes.recorder import RecorderNode
+    from ugv_acceptance.nodes.recorder import RecorderNode, check_topic
 
+    for extra in asked.extra:
+        check_topic(extra)
     # Before it looks at the room on the disk: that is what old recordings are deleted for.
     _prune(asked, complain)
     with ros(arguments) as stop:

@@ -12,7 +12,7 @@ from typing import Any
 from ugv_acceptance import AcceptanceError, BadSample
 from ugv_acceptance.console.frame import describe_robot, frame_of
 from ugv_acceptance.console.safe_map import Axes, MapKey, axes_of, key_of, probe, safe_map
-from ugv_acceptance.console.snapshot import Feed, Snapshot
+from ugv_acceptance.console.snapshot import Awaited, Feed, Snapshot
 from ugv_acceptance.monitoring.drawing import Figure, figure_of
 
 
@@ -32,8 +32,8 @@ MAP = 0.2
 # A client that takes nothing for this long (s) is disconnected; most clients at a time.
 PATIENCE = 10.0
 MOST_CLIENTS = 32
-# Answers that wait for a client.
-_ANSWERS = 32
+# Answers that wait for a client; commands of all clients that wait for an answer.
+_ANSWERS, _AWAITED = 32, 64
 _AS_JSON = json.JSONEncoder(separators=(',', ':'), allow_nan=False).encode
 
 
@@ -73,6 +73,7 @@ class Hub:
     _snapshot: Snapshot = field(init=False)
     _maps: dict[MapKey, str] = field(default_factory=dict)
     _map_due: float = 0.0
+    _awaited: list[tuple[Client, object, Awaited]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._figure = figure_of(self.feed.settings.robot)
@@ -84,6 +85,7 @@ class Hub:
         due = clock()
         while True:
             self._snapshot = self.feed.snapshot()
+            self._answer_awaited()
             if self.clients:
                 self._let_go(clock() - PATIENCE)
                 self._offer_frame()
@@ -151,13 +153,30 @@ class Hub:
             if not isinstance(values, dict) or not isinstance(values.get('do'), str):
                 raise BadSample('expected an object with "do"')
             number = values.get('number')
-            answer = {'ok': True, **self._do(client, values['do'], values)}
+            done = self._do(client, values['do'], values)
         except (AcceptanceError, ValueError, RecursionError) as error:
-            answer = {'ok': False, 'text': str(error)}
-        client.answers.append(as_json({'kind': 'answer', 'number': _small(number), **answer}))
-        client.ready.set()
+            _answer(client, number, {'ok': False, 'text': str(error)})
+            return
+        if callable(done):
+            self._awaited.append((client, number, done))
+        else:
+            _answer(client, number, {'ok': True, **done})
 
-    def _do(self, client: Client, do: str, values: dict[str, Any]) -> dict[str, Any]:
+    def _answer_awaited(self) -> None:
+        """Answer the commands whose answers have come since the last frame."""
+        for waiting in tuple(self._awaited):
+            client, number, said = waiting
+            try:
+                text = said()
+                if text is None:
+                    continue
+                answer = {'ok': True, 'text': text}
+            except AcceptanceError as error:
+                answer = {'ok': False, 'text': str(error)}
+            self._awaited.remove(waiting)
+            _answer(client, number, answer)
+
+    def _do(self, client: Client, do: str, values: dict[str, Any]) -> dict[str, Any] | Awaited:
         settings = self.feed.settings
         if do == 'axes':
             client.axes = axes_of(settings, (str(values.get('x')), str(values.get('y'))))
@@ -166,7 +185,15 @@ class Hub:
         if do == 'probe':
             at = (number_in(values, 'x'), number_in(values, 'y'))
             return {'probe': probe(self._snapshot, settings, client.axes, at)}
-        return {'text': self.feed.command(do, values)}
+        if len(self._awaited) >= _AWAITED:
+            raise BadSample(f'{do}: {_AWAITED} commands wait for an answer: try again in a moment')
+        said = self.feed.command(do, values)
+        return {'text': said} if isinstance(said, str) else said
+
+
+def _answer(client: Client, number: object, answer: dict[str, Any]) -> None:
+    client.answers.append(as_json({'kind': 'answer', 'number': _small(number), **answer}))
+    client.ready.set()
 
 
 def as_json(value: dict[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """The console's view of one moment, and the interface of live robot and recording."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -10,6 +11,9 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.stability import SIDES, UNKNOWN
 
+# What gives the answer to a command once a snapshot has brought it, None until then; to be called
+# after each snapshot. It raises BadSample if the command was refused or is not answered.
+Awaited = Callable[[], str | None]
 NOTHING = (math.nan,) * len(SIDES)
 NO_LOAD = Payload()
 # Text beside a payload's topic on which nothing came.
@@ -151,5 +155,8 @@ class Feed(Protocol):
     def extra(self) -> dict[str, Any]:
         """Return what this source adds to each frame, such as the position in a recording."""
 
-    def command(self, do: str, values: dict[str, Any]) -> str:
-        """Carry out an operator's command; return what was done. Raises BadSample if refused."""
+    def command(self, do: str, values: dict[str, Any]) -> str | Awaited:
+        """Carry out an operator's command; return what was done, or what will tell it.
+
+        Raises BadSample if refused.
+        """

@@ -13,7 +13,7 @@ from textual.widgets import Footer, Input, OptionList, Static
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.console.frame import Plain, frame_of
-from ugv_acceptance.console.snapshot import Feed
+from ugv_acceptance.console.snapshot import Awaited, Feed
 from ugv_acceptance.console.terminal_text import (
     cards_of,
     headline_of,
@@ -139,6 +139,7 @@ class Terminal(App[None]):
         self.who, self.plain = who, plain
         self.chosen: str | None = None
         self._parts: dict[str, Static] = {}
+        self._awaited: list[Awaited] = []
         self._figure = figure_of(feed.settings.robot)
         self._snapshot = feed.snapshot()
         self._source = str(feed.describe()['source'])
@@ -240,9 +241,14 @@ class Terminal(App[None]):
     def _command(self, do: str, values: dict[str, Any]) -> None:
         signed = {'by': self.who, 'note': self.note} if self._source == 'live' else {}
         try:
-            said, self.note = self.feed.command(do, values | signed), ''
+            said = self.feed.command(do, values | signed)
         except AcceptanceError as error:
             said = str(error)
+        else:
+            self.note = ''
+        if not isinstance(said, str):
+            self._awaited.append(said)
+            said = self.said
         self._listen()
         self._say(said)
 
@@ -254,6 +260,14 @@ class Terminal(App[None]):
         if self._asked():
             self.exit()
         self._snapshot = self.feed.snapshot()
+        for asked in tuple(self._awaited):
+            try:
+                said = asked()
+            except AcceptanceError as error:
+                said = str(error)
+            if said is not None:
+                self._awaited.remove(asked)
+                self._say(said)
 
     def _draw(self) -> None:
         frame = frame_of(self._snapshot, self.feed.settings, self._figure) | self.feed.extra()

@@ -31,8 +31,11 @@ DISCOVERY = 5.0
 # Seconds until a matched subscriber has matched us too, and until it has the last messages.
 SETTLING = 0.7
 CLOCK = '/clock'
-# The last part of the name of a monitor's word for gates of motion, and its type.
-_OK, _BOOL = 'ok', 'std_msgs/msg/Bool'
+# A monitor's words for gates of motion: the last part of the topic's name, and the type.
+_PERMISSIONS = {
+    ('ok', 'std_msgs/msg/Bool'),
+    ('check_result', 'diagnostic_msgs/msg/DiagnosticStatus'),
+}
 # Seconds between two messages on it.
 _CLOCK_STEP = 0.01
 
@@ -92,7 +95,8 @@ class Player:
         if self.play.restamp and name == CLOCK and CLOCK not in self.play.topics:
             self.skipped[name] = 'header stamps tell the time of replay (see --no-restamp)'
             return
-        if name.rpartition('/')[2] == _OK and type_ == _BOOL and name not in self.play.topics:
+        last = name.rpartition('/')[2]
+        if (last, type_) in _PERMISSIONS and name not in self.play.topics:
             self.skipped[name] = 'a gate of motion would take it for the live robot (see --topics)'
             return
         # Relative, so that a namespace and remaps work.

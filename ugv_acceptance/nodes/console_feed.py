@@ -28,6 +28,7 @@ from ugv_acceptance.console.snapshot import (
     NO_LOAD,
     NO_PAYLOAD,
     AlertRow,
+    Awaited,
     InputRow,
     Memory,
     Snapshot,
@@ -88,7 +89,7 @@ class ConsoleNode(Node):
             JointState, f'{MONITOR}/stability', self._beat, qos_profile_sensor_data, raw=True
         )
         self._executor = EventsExecutor()
-        self._operator = ConsoleOperator(self, self._executor, config, session, self.book)
+        self._operator = ConsoleOperator(self, config, session, self.book)
         self._executor.add_node(self)
 
     def describe(self) -> dict[str, Any]:
@@ -119,8 +120,8 @@ class ConsoleNode(Node):
             self._look_around()
         return self.memory.keep(self._look(now))
 
-    def command(self, do: str, values: dict[str, Any]) -> str:
-        """Ask the monitor for what an operator wants; return its answer. BadSample: refused."""
+    def command(self, do: str, values: dict[str, Any]) -> Awaited:
+        """Ask the monitor for what an operator wants; snapshots bring the answer."""
         return self._operator.command(do, values)
 
     def _beat(self, _: bytes) -> None:

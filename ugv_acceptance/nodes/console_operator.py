@@ -2,11 +2,11 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import InertiaStamped
-from rclpy.executors import Executor
 from rclpy.node import Node
 
 from ugv_acceptance import BadSample
@@ -14,7 +14,7 @@ from ugv_acceptance.config import Config
 from ugv_acceptance.console.alert_list import AlertBook
 from ugv_acceptance.console.hub import number_in
 from ugv_acceptance.console.monitor_values import load_of, same_load
-from ugv_acceptance.console.snapshot import AlertRow
+from ugv_acceptance.console.snapshot import AlertRow, Awaited
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.model.robot import Vector
 from ugv_acceptance.monitoring.session import Session
@@ -23,9 +23,9 @@ from ugv_acceptance.nodes.monitor.operator_desk import HAND, load_message
 from ugv_acceptance.nodes.monitor.subscriptions import qos_of
 from ugv_acceptance.nodes.operator_client import Answer, Command, OperatorClient
 
-# Seconds for the monitor to answer a command; a page stands still meanwhile, and says NO DATA after
-# 0.45 s of that.
-ANSWER_WITHIN = 0.35
+# Seconds for the monitor to answer a command: on a busy robot it may look for the sender's name for
+# one of them. Page and terminal go on meanwhile.
+ANSWER_WITHIN = 5.0
 # Seconds after which the verdict's payload is newer than one that was told.
 SETTLED = 1.5
 
@@ -33,21 +33,20 @@ SETTLED = 1.5
 class ConsoleOperator:
     """Sends the commands of page or terminal, with name and note, and returns the answers."""
 
-    def __init__(
-        self, node: Node, executor: Executor, config: Config, session: Session, book: AlertBook
-    ) -> None:
-        self._node, self._executor, self._topic = node, executor, config.topics.payload
+    def __init__(self, node: Node, config: Config, session: Session, book: AlertBook) -> None:
+        self._node, self._topic = node, config.topics.payload
         self._session, self._book = session, book
         self._client = OperatorClient(node)
         self._load: InertiaStamped | None = None
         self._load_out: Any = None
         self._declared = -math.inf
 
-    def command(self, do: str, values: dict[str, Any]) -> str:
-        """Ask the monitor for what an operator wants; return its answer, which takes a moment.
+    def command(self, do: str, values: dict[str, Any]) -> Awaited:
+        """Ask the monitor for what an operator wants; return what gives its answer in a moment.
 
         Alerts are named by `key` or `keys`, of which those are taken that offer the command; with
-        neither all are meant. Raises BadSample if it was refused or is not answered.
+        neither all are meant. Raises BadSample, as what is returned does if it was refused or is
+        not answered.
         """
         if do == 'payload':
             return self._declare(values)
@@ -82,29 +81,35 @@ class ConsoleOperator:
             raise BadSample(f'{do}: no alert of this card offers that now')
         return rows
 
-    def _ask(self, do: str, values: dict[str, Any], *each: Mapping[str, object]) -> str:
-        """Return the monitor's answers, to a command for each of these values; BadSample if no."""
+    def _ask(self, do: str, values: dict[str, Any], *each: Mapping[str, object]) -> Awaited:
+        """Send a command for each of these values; return what gives the monitor's answers."""
         if not self._client.heard:
             raise BadSample(f'{do}: no monitor hears it ({self._client.where()})')
         who, note = str(values.get('by') or 'console')[:40], str(values.get('note') or '')[:200]
-        answers: list[Answer] = [
-            self._client.ask(self._executor, Command(do, who, note, more), ANSWER_WITHIN)
-            for more in each or ({},)
-        ]
-        said = '; '.join(f'{"" if a.done else "refused: "}{a.text}' for a in answers)
-        if not any(answer.done for answer in answers):
-            raise BadSample(said)
-        return said
+        return partial(
+            _said,
+            [
+                self._client.send(Command(do, who, note, more), ANSWER_WITHIN)
+                for more in each or ({},)
+            ],
+        )
 
-    def _declare(self, values: dict[str, Any]) -> str:
+    def _declare(self, values: dict[str, Any]) -> Awaited:
         cog = values.get('cog_m')
         if not isinstance(cog, list) or len(cog) != 3:
             raise BadSample(f'cog_m: expected three numbers, got {cog!r:.80}')
         numbers = dict(zip('xyz', cog, strict=True))
         mass = number_in(values, 'mass_kg')
         x, y, z = (number_in(numbers, k) for k in 'xyz')
-        said = self._ask('payload', values, {'mass_kg': repr(mass), 'cog_m': f'{x!r},{y!r},{z!r}'})
-        self._carry(mass, (x, y, z))
+        told = {'mass_kg': repr(mass), 'cog_m': f'{x!r},{y!r},{z!r}'}
+        answer = self._ask('payload', values, told)
+
+        def said() -> str | None:
+            text = answer()
+            if text is not None:
+                self._carry(mass, (x, y, z))
+            return text
+
         return said
 
     def _carry(self, mass: float, cog: Vector) -> None:
@@ -133,3 +138,14 @@ class ConsoleOperator:
         evaluator.carry(now, told.mass, told.cog, '')
         if self._load is not None:
             self._load = load_message(self._load.header.frame_id, told.mass, told.cog)
+
+
+def _said(asked: Sequence[Callable[[], Answer | None]]) -> str | None:
+    """Return the answers in a sentence, None until all are there. BadSample: nothing was done."""
+    answers = [answer for one in asked if (answer := one()) is not None]
+    if len(answers) < len(asked):
+        return None
+    said = '; '.join(f'{"" if a.done else "refused: "}{a.text}' for a in answers)
+    if not any(answer.done for answer in answers):
+        raise BadSample(said)
+    return said

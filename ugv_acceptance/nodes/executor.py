@@ -11,7 +11,6 @@ import signal
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator, MutableMapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -133,13 +132,6 @@ def take_what_came(executor: Executor) -> None:
     # Where ROS was shut down nothing has its turn any more.
     while not last.done() and ok():
         executor.spin_once(timeout_sec=0.0)
-
-
-def spin_within(executor: Executor, over: Callable[[], bool], seconds: float) -> None:
-    """Run callbacks until `over`, which is asked after each, or for so long (s)."""
-    end_at = time.monotonic() + seconds
-    while not over() and (left := end_at - time.monotonic()) > 0.0 and ok():
-        executor.spin_once(timeout_sec=left)
 
 
 @contextmanager

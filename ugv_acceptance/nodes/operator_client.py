@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from ugv_acceptance import BadSample
-from ugv_acceptance.nodes.executor import Stop, ros, spin_within
+from ugv_acceptance.nodes.executor import Stop, ros
 from ugv_acceptance.nodes.monitor.operator_desk import DEPTH, DONE, load_message
 from ugv_acceptance.nodes.monitor.publishers import LATCHED, key_values
 
@@ -94,6 +94,33 @@ class OperatorClient:
         if waiting is not None:
             waiting.set_result(Answer(values.get('result') == DONE, message.message, values))
 
+    def send(self, command: Command, within: float) -> Callable[[], Answer | None]:
+        """Send a command; return what gives its answer, None until that has come.
+
+        It is to be called again and again while the node is spun, for it also sends the command
+        again. It raises BadSample where no answer has come `within` so many seconds.
+        """
+        number, answered, again = uuid4().hex, Future(), 0.0
+        message, end = command.message(number), time.monotonic() + within
+        self._waiting[number] = answered
+
+        def answer() -> Answer | None:
+            nonlocal again
+            now = time.monotonic()
+            if answered.done():
+                found: Answer = answered.result()
+                return found
+            if now >= end:
+                self._waiting.pop(number, None)
+                raise BadSample(f'{command.do}: the monitor does not answer ({self.where()})')
+            if now >= again:
+                again = now + AGAIN
+                self._out.publish(message)
+            return None
+
+        answer()
+        return answer
+
     def ask(
         self,
         executor: Executor,
@@ -105,18 +132,12 @@ class OperatorClient:
 
         Raises BadSample where no answer comes, or it is `stopped`.
         """
-        number, answered, end = uuid4().hex, Future(), time.monotonic() + within
-        message = command.message(number)
-        self._waiting[number] = answered
-        while not answered.done() and not stopped() and time.monotonic() < end:
-            self._out.publish(message)
-            left = max(end - time.monotonic(), 0.0)
-            spin_within(executor, lambda: answered.done() or stopped(), min(AGAIN, left))
-        self._waiting.pop(number, None)
-        if not answered.done():
-            raise BadSample(f'{command.do}: the monitor does not answer ({self.where()})')
-        answer: Answer = answered.result()
-        return answer
+        answer = self.send(command, within)
+        while (found := answer()) is None:
+            if stopped():
+                raise BadSample(f'{command.do}: stopped before the monitor answered')
+            executor.spin_once(timeout_sec=_LOOK)
+        return found
 
 
 def ask_once(command: Command, args: list[str], within: float) -> Answer:

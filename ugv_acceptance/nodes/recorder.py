@@ -10,7 +10,9 @@ from typing import Any
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.exceptions import InvalidTopicNameException
+from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from ugv_acceptance import BadConfig, BadSample
 from ugv_acceptance.bag.description import TYPE as STRING
@@ -28,6 +30,15 @@ from ugv_acceptance.nodes.recorded_topic import RecordedTopic, Wanted, one
 
 NAME, MONITOR = 'acceptance_recorder', 'acceptance_monitor'
 ARRAY, CLOCK = 'diagnostic_msgs/msg/DiagnosticArray', 'rosgraph_msgs/msg/Clock'
+# What the monitor says, and what is asked of it, beside its verdict.
+SAID = (
+    ('alerts', ARRAY),
+    ('ok', 'std_msgs/msg/Bool'),
+    ('operator', STATUS),
+    ('operator_answer', STATUS),
+    ('check', 'trajectory_msgs/msg/JointTrajectory'),
+    ('check_result', STATUS),
+)
 LATCHED, BEST_EFFORT = Qos(durability='transient_local'), Qos('best_effort')
 # Seconds between looks at the publishers where nothing is known to have changed, and else.
 LOOK, SOON = 1.0, 0.1
@@ -83,7 +94,8 @@ class RecorderNode(Node):
         self._declared = False
         wanted = {one.name: one for one in self._wanted(topics)}
         for name in extra:
-            full = self._full(name)
+            check_topic(name)
+            full = self.resolve_topic_name(name)
             wanted.setdefault(full, Wanted(full))
         self.topics = [
             RecordedTopic(self, one, recorder, self.clock, self._once, self._look_soon)
@@ -95,13 +107,6 @@ class RecorderNode(Node):
         self.create_timer(SOON, self._tick, clock=self.steady)
         self.create_timer(1.0, self._measure, clock=self.steady)
 
-    def _full(self, name: str) -> str:
-        try:
-            return self.resolve_topic_name(name)
-        except (InvalidTopicNameException, RuntimeError, ValueError) as error:
-            why = ' '.join(str(error).split()).partition(', at /')[0]
-            raise BadConfig(f'--topics {name}: expected the name of a topic: {why}') from None
-
     def _wanted(self, topics: Topics) -> Iterable[Wanted]:
         resolve = self.resolve_topic_name
         for key, topic in topics.used.items():
@@ -112,9 +117,8 @@ class RecorderNode(Node):
         yield Wanted(TF_STATIC, TF, LATCHED, key=_frames)
         monitor = self._monitor
         yield Wanted(f'{monitor}/verdict', STATUS, LATCHED, key=one, also=self._in_force.hear)
-        yield Wanted(f'{monitor}/alerts', ARRAY, needed=False)
-        yield Wanted(f'{monitor}/operator', STATUS, needed=False)
-        yield Wanted(f'{monitor}/operator_answer', STATUS, needed=False)
+        for name, type_ in SAID:
+            yield Wanted(f'{monitor}/{name}', type_, needed=False)
         yield Wanted('/diagnostics', ARRAY, needed=False)
         yield Wanted('/clock', CLOCK, BEST_EFFORT, needed=False)
 
@@ -163,6 +167,15 @@ class RecorderNode(Node):
         """Take no more messages."""
         for topic in self.topics:
             topic.close()
+
+
+def check_topic(name: str) -> None:
+    """Raise BadConfig unless this can be the name of a topic: to be asked before files are made."""
+    try:
+        validate_full_topic_name(expand_topic_name(name, NAME, '/'))
+    except (InvalidTopicNameException, RuntimeError, ValueError) as error:
+        why = ' '.join(str(error).split()).partition(', at /')[0]
+        raise BadConfig(f'--topics {name}: expected the name of a topic: {why}') from None
 
 
 def _state(topic: RecordedTopic) -> TopicState:
