@@ -427,7 +427,7 @@ def test_a_motion_begins_while_the_answer_holds(robot: Robot, ahead: int, result
     assert robot.result(motion(0.1, 0.0, stamp=robot.clock.at + ahead)) == result
 
 
-CHANGES = {
+CHANGES: dict[str, Callable[[Robot], object]] = {
     'monitor': inactive,
     'verdict': silent,
     'payload': lambda r: r.session.take_payload(
