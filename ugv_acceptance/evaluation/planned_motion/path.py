@@ -116,8 +116,9 @@ def path_of(knots: Knots) -> Path:
 
 def _degrees(knots: Knots) -> NDArray[np.intp]:
     """Return the degree of the polynomial from each knot to the next."""
-    rated = np.asarray(np.isfinite(knots.rate).all(axis=1))
-    full = rated & np.asarray(np.isfinite(knots.acceleration).all(axis=1))
+    rated: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(knots.rate), axis=1)
+    more: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(knots.acceleration), axis=1)
+    full = rated & more
     both, all_of = rated[:-1] & rated[1:], full[:-1] & full[1:]
     return np.where(all_of, 5, np.where(both, 3, 1)).astype(np.intp)
 
