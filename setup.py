@@ -148,9 +148,9 @@ setup(
     entry_points={
         'console_scripts': [
             'ugv-acceptance = ugv_acceptance.cli:main',
-            'acceptance_monitor = ugv_acceptance.nodes.monitor.node:main',
-            'bag_player = ugv_acceptance.nodes.bag_player:main',
-            'packbot_simulator = ugv_acceptance.nodes.packbot_simulator:main',
+            'acceptance_monitor = ugv_acceptance.cli.node_programs:acceptance_monitor',
+            'bag_player = ugv_acceptance.cli.node_programs:bag_player',
+            'packbot_simulator = ugv_acceptance.cli.node_programs:packbot_simulator',
         ],
     },
     zip_safe=True,

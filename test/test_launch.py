@@ -15,6 +15,8 @@ import pytest
 from console.servers import COMMAND, address_of, running
 from robot_recipe import launched
 
+from ugv_acceptance.cli.node_programs import MODULES
+
 LAUNCH_FILES = sorted((Path(__file__).resolve().parents[1] / 'launch').glob('*.launch.py'))
 NODES = {'Node', 'LifecycleNode'}
 
@@ -54,7 +56,7 @@ def test_what_a_launch_file_starts_is_installed(path: Path) -> None:
 def declared_parameters(executable: str) -> dict[str, type]:
     """Return the parameters a node declares by name, each with its default's type."""
     (script,) = entry_points(group='console_scripts', name=executable)
-    spec = find_spec(script.module)
+    spec = find_spec(MODULES.get(executable, script.module))
     assert spec is not None
     assert spec.origin is not None
     declared: dict[str, type] = {'use_sim_time': bool}
