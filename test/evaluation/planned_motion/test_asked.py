@@ -228,13 +228,22 @@ def test_the_worse_way_round_gives_the_margins() -> None:
     assert both.samples > ways[0].samples
 
 
-def test_a_first_point_that_is_told_in_another_turn_is_said() -> None:
-    """Due at once it can only be meant as the place where the joint stands: not checked."""
+def test_a_first_point_that_is_told_in_another_turn_is_a_jump() -> None:
+    """Due at once: a controller that counts whole turns would swing the arm round."""
     motion = way([0.5, 0.8], [0.0, 2.0], [0.0, 0.0])
     same, other = (check_motion(endless(), motion, level(0.5 + of)) for of in (0.0, math.tau))
-    assert same.verdict == other.verdict == PERMITTED
-    assert len(other.not_checked) == len(same.not_checked) + 1
-    assert 'whole turns of lift' in ' '.join(other.not_checked)
+    assert same.verdict == PERMITTED
+    assert other.verdict == REFUSED
+    assert '360 deg' in other.reasons[0]
+
+
+@pytest.mark.parametrize('far', [1e19, -1e30, 1e300])
+@pytest.mark.parametrize('seconds', [0.0, 8.0])
+def test_a_first_point_beyond_all_turns_is_not_permitted(far: float, seconds: float) -> None:
+    """A joint without end that is sent beyond what can be counted: an answer, and no fault."""
+    found = check_motion(endless(), way([far], [seconds], [0.0]), level(0.1))
+    assert found.verdict != PERMITTED
+    assert found.reasons
 
 
 def test_too_many_ways_round_are_not_known() -> None:

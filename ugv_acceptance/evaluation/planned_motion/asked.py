@@ -171,13 +171,12 @@ def knots_of(settings: Settings, trajectory: Trajectory, moved: Sequence[int]) -
 class Begin:
     """How a motion may begin: `ways`, the points with each way to the first; sentences on it.
 
-    `jumps` refuse it, `cautions` and `not_checked` are as those of CheckedMotion.
+    `jumps` refuse it, `cautions` are as those of CheckedMotion.
     """
 
     ways: tuple[Knots, ...]
     jumps: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
-    not_checked: tuple[str, ...] = ()
 
 
 def begin_of(
@@ -193,20 +192,21 @@ def begin_of(
     robot = settings.robot
     joints = [robot.joint(robot.joint_names[j]) for j in moved]
     at, first = np.array(start), knots.position[0]
-    turns = [_turns(joint, way) for joint, way in zip(joints, (first - at).tolist(), strict=True)]
-    names = _listed([joint.name for joint, of in zip(joints, turns, strict=True) if any(of)])
     if knots.time[0] > 0.0:
+        pairs = zip(joints, (first - at).tolist(), strict=True)
+        turns = [_turns(joint, way) for joint, way in pairs]
+        names = _listed([joint.name for joint, of in zip(joints, turns, strict=True) if any(of)])
         every = itertools.product(*turns)
         ways = tuple(
-            _with_start(knots, at + math.tau * np.array(of))
+            _with_start(knots, at + math.tau * np.array(of, np.float64))
             for of in itertools.islice(every, MOST_WAYS + 1)
         )
         return Begin(ways, cautions=(words.round_words(names),) if names else ())
-    short = first - at - math.tau * np.array([of[-1] for of in turns])
+    # Due at once there is no time for a whole turn either, which not every controller takes off.
+    way = first - at
     near = np.where(slides_of(settings, moved), NEAR_SLIDE, NEAR)
-    jumps = [k for k, far in enumerate(np.abs(short) > near) if far]
-    told = tuple(_jump(joints[k].name, joints[k].slides, short[k]) for k in jumps)
-    return Begin((knots,), told, not_checked=(words.whole_turn_words(names),) if names else ())
+    jumps = [k for k, far in enumerate(np.abs(way) > near) if far]
+    return Begin((knots,), tuple(_jump(joints[k].name, joints[k].slides, way[k]) for k in jumps))
 
 
 def _turns(joint: Joint, way: float) -> tuple[int, ...]:
@@ -249,7 +249,7 @@ def _with_start(knots: Knots, at: Floats) -> Knots:
 
 
 def _jump(name: str, slides: bool, way: float) -> str:  # noqa: FBT001 - of a joint
-    far = f'{abs(way):.3f} m' if slides else f'{math.degrees(abs(way)):.1f} deg'
+    far = f'{abs(way):.4g} m' if slides else f'{math.degrees(abs(way)):.4g} deg'
     return (
         f'{name} stands {far} from the first point, which is due at 0 s: it would jump; '
         'give the first point a time'

@@ -119,7 +119,6 @@ class MotionChecker:
             work = _Work(self, path, samples, moved, start, load)
             work.refusals += begin.jumps
             work.cautions += begin.cautions
-            work.not_checked += begin.not_checked
             answers.append(work.answer(conditions, len(trajectory.times)))
         return worst_of(answers)
 

@@ -50,14 +50,6 @@ def round_words(names: str) -> str:
     )
 
 
-def whole_turn_words(names: str) -> str:
-    """Return that the first point of some joints is told in another turn than they stand in."""
-    return (
-        f'whether the controller counts whole turns of {names}: the first point, due at 0 s, is '
-        'told in another turn than that in which it stands, and is taken to be the same place'
-    )
-
-
 def tilt_words(tilt: TiltLeft, limit: float, points: int) -> str:
     """Return that a tilt left is at its limit (rad) or past it."""
     told = tipping_words(tilt.side, tilt.angle)
