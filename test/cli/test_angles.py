@@ -22,9 +22,18 @@ SMALL = ('--steps', '11', '--out', 'OUT/map.csv')
 FEW = ('--samples', '5000')
 ANSWERED = ('--mass', 'urdf', '--limit', '*=50')
 PACKBOT = str(Path(__file__).resolve().parents[2] / 'urdf/packbot.urdf')
+MOTION = (str(Path(__file__).with_name('little_motion.yaml')), '--payload', '0')
+STANDS = 'shoulder_joint=2rad,flipper_joint=2rad'
 # Verb, what else it needs, option, and what is written with it; {} is an angle.
 ANGLES: list[tuple[str, tuple[str, ...], str, str]] = [
     ('model', (), '--posture', 'shoulder_joint={},elbow_joint=0'),
+    ('check', MOTION, '--posture', f'turret_joint={{}},{STANDS}'),
+    (
+        'check',
+        (*MOTION, '--posture', f'turret_joint=0,{STANDS}'),
+        '--tilt',
+        'roll=1deg,pitch={}',
+    ),
     ('model', (), '--tilt', 'roll={}'),
     ('model', (), '--tilt', 'roll=0,pitch={}'),
     ('map', ('rollover', *SMALL), '--x', 'shoulder_joint=0:{}'),

@@ -119,7 +119,7 @@ def test_the_monitor_can_be_watched(live: Live, bridge: Bridge) -> None:
         client.until(lambda: {n for n, _ in client.messages} == {1, 2}, driver.send)
     stability = next(data for number, data in client.messages if number == 2)
     assert list(deserialize_message(stability, JointState).name) == [
-        'front', 'left', 'rear', 'right'
+        'tilt_front', 'tilt_left', 'tilt_rear', 'tilt_right'
     ]  # fmt: skip
 
 

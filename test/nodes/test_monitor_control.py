@@ -345,7 +345,7 @@ def test_margins_are_published_for_every_message(live: Live) -> None:
     assert list(torque[-1].name) == list(session_of(monitor).settings.robot.joint_names)
     assert list(torque[-1].position) == list(FOLDED)
     assert list(torque[-1].effort) == list(margins.torque)
-    assert list(tip[-1].name) == ['front', 'left', 'rear', 'right']
+    assert list(tip[-1].name) == ['tilt_front', 'tilt_left', 'tilt_rear', 'tilt_right']
     assert list(tip[-1].position) == list(margins.stability.angle)
     assert list(tip[-1].effort) == list(margins.stability.moment)
 
