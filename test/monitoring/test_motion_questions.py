@@ -427,12 +427,16 @@ def test_a_motion_begins_while_the_answer_holds(robot: Robot, ahead: int, result
     assert robot.result(motion(0.1, 0.0, stamp=robot.clock.at + ahead)) == result
 
 
+def another_load(robot: Robot) -> None:
+    """Declare another load."""
+    assert robot.session is not None
+    robot.session.take_payload(inertia_cdr(robot.clock.at, 'gripper_link', 1.0, (0.0, 0.0, 0.0)))
+
+
 CHANGES: dict[str, Callable[[Robot], object]] = {
     'monitor': inactive,
     'verdict': silent,
-    'payload': lambda r: r.session.take_payload(
-        inertia_cdr(r.clock.at, 'gripper_link', 1.0, (0.0, 0.0, 0.0))
-    ),
+    'payload': another_load,
     'ground': settings_of(ground=Ground('uneven')),
     'limits': settings_of(limits=replace(FLAT.limits, torque_warn=0.5)),
     'attitude': lambda r: setattr(r, 'roll', 0.03),
