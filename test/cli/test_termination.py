@@ -144,8 +144,9 @@ TOLD_TO = {
     'demo': (('demo', '--rate', '0.2'), says('NO DATA'), BROKEN_OFF),
     'tell': (('tell', 'reset', '--within', '600'), on_the_net, BROKEN_OFF),
     'doctor': (('doctor', '--seconds', '600'), on_the_net, BROKEN_OFF),
-    # What was recorded until then is judged and filed: inconclusive.
-    'run': (('run', '--sim'), on_the_net, dict.fromkeys(SIGNALS, 3)),
+    # What was recorded until then is judged and filed: inconclusive (3). It has sockets a moment
+    # before that begins.
+    'run': (('run', '--sim'), on_the_net, None),
     'run fast': (('run', '--sim', '--fast'), loaded('mujoco'), None),
     'simulate': (('simulate', 'work', '-s', '9000', '-o', 'made'), records, BROKEN_OFF),
     'campaign': (('campaign', 'runs', '--workers', '2'), working, BROKEN_OFF),

@@ -12,6 +12,7 @@ from bag.bag_cases import STORE
 from cases.base import NAMES, base
 from cases.table import MADE, SHARED
 from cli.here import ugv
+from cli.test_outputs import process
 from made.run import EPOCH, NS, Form, messages_of, write
 
 from ugv_acceptance import BadBag
@@ -219,7 +220,7 @@ def test_of_a_long_recording_the_beginning_is_read(tmp_path: Path) -> None:
 
 def test_json_to_standard_output_holds_nothing_else() -> None:
     """`--json -` can be piped; the page goes to standard error."""
-    done = ugv('info', PASSING, '--json', '-')
+    done = process('info', PASSING, '--json', '-')
     assert json.loads(done.stdout)['can_be_judged'] is True
     assert 'Could be judged' in done.stderr
 

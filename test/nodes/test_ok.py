@@ -224,7 +224,8 @@ def test_the_lock_in_the_documentation_is_open_only_while_the_word_is_true(
 ) -> None:
     """The node of docs/ros_interface.md, run as it stands there: locked, open, locked."""
     text = (repository / 'docs' / 'ros_interface.md').read_text('utf-8')
-    (code,) = re.findall(r'```python\n(.*?)```', text, re.DOTALL)
+    found = re.findall(r'```python\n(.*?)```', text, re.DOTALL)
+    (code,) = (block for block in found if 'margins_lock' in block)
     locks, words, driver = Words(), words_of(live), live.driver()
     driver.create_subscription(Bool, 'margins_lock', locks.take, 1)
     environment = {k: v for k, v in os.environ.items() if k != '_ROS_WHEELS_BOOTSTRAP_COMPLETE'}

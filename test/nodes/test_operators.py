@@ -152,9 +152,9 @@ def test_a_stranger_is_refused(site: Guarded, do: str) -> None:
 def test_a_stranger_raises_an_alert(site: Guarded) -> None:
     """A CAUTION names the node."""
     site.answer(site.stranger, 'ground', kind='flat')
-    assert site.alert('FOREIGN_OPERATOR', 'raised').message == (
-        'raised: a command from /guarded/stranger was refused: the configuration names others as'
-        ' operators'
+    raised = {pair.key: pair.value for pair in site.alert('FOREIGN_OPERATOR', 'raised').values}
+    assert raised['happened'] == (
+        'a command from /guarded/stranger was refused: the configuration names others as operators'
     )
 
 
