@@ -337,7 +337,9 @@ def test_the_verb_says_what_it_recorded_and_what_to_do_next(live: Live, tmp_path
     driver, folder = live.driver(), tmp_path / 'run 1'
     process = start('--out', str(folder), '--every', '0.5')
     live.until(driver.connected)
-    wait(live, driver, 1.5)
+    # Its subscriptions follow the offers of a driver it has met: until then nothing is heard.
+    live.until(lambda: sum(f.stat().st_size for f in folder.glob('*.mcap')) > 20_000, driver.send)
+    wait(live, driver, 1.0)
     process.send_signal(signal.SIGINT)
     text, errors = process.communicate(timeout=60)
     assert process.returncode == 0, text + errors

@@ -113,7 +113,7 @@ def test_two_drivers_of_one_name_at_once_are_named(live: Live) -> None:
         with started('driver'):
             live.until(lambda: len(second(ears)) == len(INPUTS))
     for message in second(ears).values():
-        assert message.endswith('has 2 publishers: /driver, /driver')
+        assert 'has 2 publishers: /driver, /driver' in message
 
 
 @pytest.mark.parametrize('name', ['driver', 'stranger'])
