@@ -178,8 +178,16 @@ def simulated(folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize('options', [(), ('--rate', '3'), ('--rate', '0.5'), ('--loop',)])
-@pytest.mark.parametrize('which', ['recorded', 'simulated'])
+@pytest.mark.parametrize(
+    ('which', 'options'),
+    [
+        ('recorded', ()),
+        ('recorded', ('--rate', '3')),
+        ('recorded', ('--loop',)),
+        ('simulated', ('--rate', '0.5')),
+        ('simulated', ('--loop',)),
+    ],
+)
 def test_a_live_monitor_beside_a_replay_says_ok(
     live: Live, tmp_path: Path, repository: Path, options: tuple[str, ...], which: str
 ) -> None:
