@@ -274,6 +274,17 @@ def test_a_robot_that_just_came_to_rest_is_not_known_to_rest() -> None:
     assert robot.live(1.0).result(LITTLE) == 'permitted'
 
 
+@pytest.mark.parametrize('steps', [1, 2])
+def test_the_newest_message_tells_that_the_robot_begins_to_move(robot: Robot, steps: int) -> None:
+    """What is looked at is 50 ms apart, and the message after it."""
+    assert robot.live(steps * STEP / NS).result(LITTLE) == 'permitted'
+    robot.roll += 0.02
+    robot.live(STEP / NS)
+    said = robot.ask(motion(0.2, 0.0))
+    assert said.values['result'] == 'not_known'
+    assert 'attitude changed' in said.message
+
+
 def test_a_base_that_was_declared_level_has_no_attitude() -> None:
     """Without an IMU nobody knows how the robot leans: nothing is permitted."""
     level = replace(FLAT, imu=replace(FLAT.imu, attitude=LEVEL))

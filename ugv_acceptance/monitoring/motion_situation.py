@@ -142,7 +142,9 @@ def unrest(session: Session) -> Iterator[str]:
     if len(recent) < LEAST or recent[-1].time - recent[0].time < AT_REST:
         yield 'it is not known yet whether the robot stands still: ask again in a second'
         return
-    newest = recent[-1]
+    # They are 50 ms apart: what came since tells first that it begins to move.
+    newest = session.evaluator.margins or recent[-1]
+    recent = [*recent, newest]
     turned = max(float(angle_between(m.gravity, newest.gravity)) for m in recent)
     if turned > TURNED:
         yield f'the robot moves: its attitude changed by {excess_words(turned)} in a second'
