@@ -154,13 +154,25 @@ class Live:
         self.until(lambda: not any(map(node.count_publishers, topics)))
 
     def call(self, kind: Any, name: str, request: Any = None) -> Any:
-        """Call a service and return its answer."""
+        """Call a service and return its answer.
+
+        An answer is lost if the service has not met its new client yet: then it is asked again.
+        """
         node = self.add(rclpy.create_node(f'client_{len(self.nodes)}'))
         client = node.create_client(kind, name)
         self.until(client.service_is_ready)
-        answer = client.call_async(request or kind.Request())
-        self.until(answer.done)
-        return answer.result()
+        answers: list[Any] = []
+        again = 0.0
+
+        def answered() -> bool:
+            nonlocal again
+            if time.monotonic() >= again:
+                again = time.monotonic() + PATIENCE / 4
+                answers.append(client.call_async(request or kind.Request()))
+            return any(answer.done() for answer in answers)
+
+        self.until(answered)
+        return next(answer.result() for answer in answers if answer.done())
 
 
 def session_of(monitor: Monitor) -> Any:
