@@ -15,8 +15,8 @@ import pytest
 import rclpy
 from cli.here import ugv
 from diagnostic_msgs.msg import DiagnosticStatus
-from nodes.live_case import NAMES, Live, live_nodes, session_of
-from nodes.test_motion_desk import Site, motion
+from nodes.live_case import NAMES, Live, session_of
+from nodes.test_motion_desk import SPACE, Site, begun, motion
 from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
@@ -24,7 +24,6 @@ from ugv_acceptance.nodes.check_client import DEPTH, CheckClient, LiveAnswer, na
 from ugv_acceptance.nodes.monitor.publishers import key_values
 
 # With it the monitor and its driver keep apart from those of other tests.
-SPACE = '/asked'
 # `check` as it is, but for the seconds in which it expects a monitor.
 CODE = (
     'import ugv_acceptance.cli.check_live as live; live.WITHIN = {within}; '
@@ -63,13 +62,7 @@ def started(path: Path, *words: str, space: str, within: float) -> 'subprocess.P
 @pytest.fixture(scope='module')
 def site() -> Iterator[Site]:
     """Return a monitor that was told load and ground, and its robot at rest."""
-    with live_nodes() as live:
-        space = ('-r', f'__ns:={SPACE}')
-        monitor = live.monitor(arguments=space, delays__stale_after_s=2.0, delays__off_s=0.0)
-        made = Site(live, monitor, live.driver(namespace=SPACE))
-        made.until(lambda: session_of(monitor).evaluator.margins is not None)
-        made.until(made.out.get_subscription_count)
-        made.until(made.driver.hand.get_subscription_count)
+    with begun() as made:
         made.tell('payload', mass_kg='1')
         made.tell('ground', kind='flat')
         yield made

@@ -7,6 +7,7 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -130,9 +131,9 @@ class Site:
         self.driver.operate(do, 'Ada', **values)
 
 
-@pytest.fixture(scope='module')
-def running() -> Iterator[Site]:
-    """Return a monitor that has margins, and hears questions."""
+@contextmanager
+def begun() -> Iterator[Site]:
+    """Start a monitor, and wait until it has margins and hears questions and its operator."""
     with live_nodes() as live:
         # A busy machine stops this process for a second now and then: that is no silence here.
         space = ('-r', f'__ns:={SPACE}')
@@ -142,6 +143,13 @@ def running() -> Iterator[Site]:
         node = site.driver
         site.until(lambda: site.out.get_subscription_count() and node.hand.get_subscription_count())
         site.until(lambda: node.count_publishers(f'{SPACE}/acceptance_monitor/check_result'))
+        yield site
+
+
+@pytest.fixture(scope='module')
+def running() -> Iterator[Site]:
+    """Return a monitor that has margins, and hears questions."""
+    with begun() as site:
         yield site
 
 

@@ -158,7 +158,7 @@ def carry_out(asked: Asked, arguments: list[str]) -> str:
         drawn = console.is_terminal and not asked.plain
         shown = Panel(console, progress) if drawn else Lines(console, progress, asked.every)
         try:
-            with shown:
+            with shown.screen:
                 node = RecorderNode(recorder, asked.topics, asked.extra, shown.tell)
                 node.create_timer(1.0, _drawing(shown, node), clock=node.steady)
                 node.create_timer(PRUNE, partial(_prune, asked, shown.tell), clock=node.steady)

@@ -3,9 +3,9 @@
 import shlex
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import typer
@@ -78,22 +78,12 @@ class Progress:
 
 
 class Lines:
-    """Prints a line every few seconds, and every caution when it comes up."""
+    """Prints a line every few seconds, and every caution when it comes up; needs no `screen`."""
 
     def __init__(self, console: Console, progress: Progress, every: float) -> None:
         self._console, self._progress, self._every = console, progress, every
         self._due, self._cautions = every, set[str]()
-
-    def __enter__(self) -> 'Lines':  # noqa: PYI034 - Self is Python 3.11
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Print nothing more."""
+        self.screen: AbstractContextManager[object] = nullcontext()
 
     def tell(self, text: str) -> None:
         """Print what is odd."""
@@ -114,25 +104,12 @@ class Lines:
 
 
 class Panel:
-    """A table of topics that is drawn again every second, with what is odd below it."""
+    """A table of topics that is drawn again every second while `screen` is on."""
 
     def __init__(self, console: Console, progress: Progress) -> None:
-        self._live = Live(console=console, auto_refresh=False)
+        self.screen = Live(console=console, auto_refresh=False)
         self._progress = progress
         self._told: list[str] = []
-
-    def __enter__(self) -> 'Panel':  # noqa: PYI034 - Self is Python 3.11
-        self._live.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave what was drawn last."""
-        self._live.stop()
 
     def tell(self, text: str) -> None:
         """Keep what is odd in sight."""
@@ -147,7 +124,7 @@ class Panel:
             *(f'{CAUTION} {escape(text)}' for text in cautions),
             '[dim]Ctrl-C ends[/]',
         ]
-        self._live.update(Group(*rows), refresh=True)
+        self.screen.update(Group(*rows), refresh=True)
 
 
 def topics_table(heard: 'Sequence[TopicState]', *, over: bool = False) -> Table:

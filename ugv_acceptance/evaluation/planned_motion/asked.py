@@ -212,7 +212,7 @@ def begin_of(
 def _turns(joint: Joint, way: float) -> tuple[int, ...]:
     """Return by how many turns a joint may count as away from where it is told to stand.
 
-    `way` (rad, m) is how far its first point is. The last is that of the shorter way round.
+    `way` (rad, m) is how far its first point is.
     """
     if joint.kind != 'continuous':
         return (0,)
