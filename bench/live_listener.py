@@ -1,4 +1,7 @@
-"""One of the listeners compared by bench_live.py; prints CPU, latencies and counts as JSON."""
+"""One of the listeners compared by bench_live.py; prints CPU, latencies and counts as JSON.
+
+Arguments: which listener, and the checkout whose code it is to run.
+"""
 
 import json
 import struct
@@ -13,7 +16,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(sys.argv[2]).resolve()))
 from bench.naive_monitor import NaiveMonitor, best_effort
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.nodes.executor import end, ros, spin
@@ -21,21 +24,29 @@ from ugv_acceptance.nodes.monitor.node import Monitor
 
 STAMP = struct.Struct('<iI')
 DEPTH = 1000
-# Messages left out at the start: first calls compile and fill caches.
-WARM = 200
+# Seconds left out at the start: first calls compile, fill caches and raise the alerts.
+WARM = 2_000_000_000
 
 
 class Tally:
-    """Latencies (ns) of the messages, and the CPU time of this process since the warm-up."""
+    """Latencies (ns) of the messages, and since the warm-up their number and the CPU time.
+
+    `heard` are all messages handled; `cpu` is the process's time (s) at its end, `began` when the
+    first message was sent (ns).
+    """
 
     def __init__(self) -> None:
         self.latencies: list[int] = []
         self.cpu = 0.0
+        self.heard = self.began = 0
 
     def seen(self, stamp: int) -> None:
         """Record the latency of a handled message by its stamp (ns)."""
-        self.latencies.append(time.time_ns() - stamp)
-        if len(self.latencies) == WARM:
+        self.heard += 1
+        self.began = self.began or stamp
+        if self.cpu:
+            self.latencies.append(time.time_ns() - stamp)
+        elif stamp - self.began > WARM:
             self.cpu = time.process_time()
 
     def raw(self, data: bytes) -> None:
@@ -98,7 +109,7 @@ def main() -> None:
             spin(node, stop)
         cpu = time.process_time() - tally.cpu
         # The monitor's first messages cannot have margins: the other input has not come yet.
-        taken = len(tally.latencies)
+        taken = tally.heard
         if isinstance(node, Monitor) and node.session is not None:
             taken = sum(count.taken for count in node.session.counts.values())
         told = {'cpu': cpu, 'taken': taken, 'latencies': tally.latencies}
