@@ -147,11 +147,11 @@ def test_alerts_come_in_the_same_order_however_they_were_gathered() -> None:
 def test_every_rule_has_words_and_advice() -> None:
     """A sentence without holes for every code that can be raised."""
     told = settings()
-    for signal in RuleSet(told).signals():
+    for signal in RuleSet(told).signals:
         alert = Alert(signal.rule, T0, 0.3)
         assert '{' not in describe(alert, told)
         assert advice(signal.rule.code)
-    assert {s.rule.code for s in RuleSet(told).signals()} == set(RECORDED)
+    assert {s.rule.code for s in RuleSet(told).signals} == set(RECORDED)
 
 
 def test_a_robot_past_tipping_is_said_to_be() -> None:

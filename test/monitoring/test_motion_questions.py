@@ -338,7 +338,7 @@ def test_beside_any_alert_of_robot_or_input_nothing_is_permitted(robot: Robot) -
     session = robot.session
     assert session is not None
     assert not [*missing(session, 'operator'), *dangers(session)]
-    for signal in session.evaluator.watch.signals():
+    for signal in session.evaluator.watch.signals:
         rule = signal.rule
         signal.judge_by(replace(rule, on_delay=0, off_delay=0))
         signal.set(robot.clock.at, max(rule.on, -1e3) + 1.0)

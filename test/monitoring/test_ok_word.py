@@ -452,7 +452,7 @@ def test_a_fault_that_only_a_live_node_sees_makes_it_false(code: str) -> None:
 def test_every_caution_but_those_about_a_known_margin_makes_it_false() -> None:
     """Also one that is added to the rules later: who adds it has to say that all stays known."""
     robot, seen = ready(), set()
-    for signal in robot.session.evaluator.watch.signals():
+    for signal in robot.session.evaluator.watch.signals:
         if signal.rule.level != WARN:
             continue
         signal.judge_by(replace(signal.rule, on_delay=0, off_delay=0))

@@ -5,10 +5,8 @@ advises. Nothing here reads a clock, so the same seed and the same acts give the
 """
 
 import math
-from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, Future
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +18,7 @@ from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.least_margins import least_tilt
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import margins
-from ugv_acceptance.monitoring.advisory import Advisory
+from ugv_acceptance.monitoring.background import AtOnce
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, verdict_of
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.run.messages import EPOCH
@@ -53,25 +51,6 @@ class SimulatedClock:
     def now(self) -> int:
         """Return the time (ns since the epoch)."""
         return self.time
-
-
-class AtOnce(Executor):
-    """Does what it is given at once, so that advice comes at the same simulated time each time."""
-
-    def submit(
-        self,
-        fn: Callable[..., Any],
-        /,
-        *args: Any,  # noqa: ANN401 - as Executor has it
-        **kwargs: Any,  # noqa: ANN401
-    ) -> 'Future[Any]':
-        """Return the future of a call that is done."""
-        done: Future[Any] = Future()
-        try:
-            done.set_result(fn(*args, **kwargs))
-        except Exception as error:  # noqa: BLE001 - the future holds it, as that of a thread would
-            done.set_exception(error)
-        return done
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,13 +111,14 @@ class DrillRobot:
         self.verdict = verdict_of(self.session)
 
     def _session(self) -> Session:
-        session = Session(
-            self.config.settings, lambda _stamp, _margins: None, self._changed, _ignore, self.clock
+        return Session(
+            self.config.settings,
+            lambda _stamp, _margins: None,
+            self._changed,
+            _ignore,
+            self.clock,
+            pool=AtOnce(),
         )
-        session.advisory.close()
-        advised = session.evaluator, session.trends, _ignore
-        session.advisory = Advisory(*advised, pool=AtOnce())
-        return session
 
     @property
     def simulation(self) -> Simulation:

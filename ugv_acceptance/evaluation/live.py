@@ -255,7 +255,7 @@ class LiveEvaluator:
         self.mount.learn(settings)
         self._imu.adopt(self.mount.applied(settings))
         self.watch.trend.adopt(settings)
-        for signal, other in zip(self.watch.signals(), RuleSet(settings).signals(), strict=True):
+        for signal, other in zip(self.watch.signals, RuleSet(settings).signals, strict=True):
             signal.judge_by(other.rule)
         for fresh in self.fresh:
             fresh.judge_by(settings.delays)
@@ -271,8 +271,7 @@ class LiveEvaluator:
         if now > self._alive_until():
             self._lose(now)
         self.watch.predict()
-        for signal in self.watch.signals():
-            signal.advance(now)
+        self.watch.advance(now)
 
     @property
     def measured(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

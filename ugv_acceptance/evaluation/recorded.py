@@ -163,7 +163,7 @@ class RecordedEvaluator:
             if due is not None and now > due:
                 self._silent(signals.stale, due)
                 gaps.append((due, now))
-        for signal in self.watch.signals():
+        for signal in self.watch.signals:
             signal.advance(now)
 
     def batch(self, batch: Batch) -> MarginRows:

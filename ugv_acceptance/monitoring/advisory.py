@@ -1,11 +1,12 @@
 """Computes advice and predictions for the operator while messages are being processed.
 
-Advice takes some hundredths of a second, so that it is computed in a thread of its own.
+Advice takes some hundredths of a second, so that it is computed in a thread of its own, and again
+only when the robot has moved.
 """
 
 import math
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 
 from ugv_acceptance.evaluation.advice.search import COMPUTED, Advice, advise
@@ -15,13 +16,17 @@ from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.effort.facts import JointMeaning
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests, PayloadEstimate
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
-from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.background import Snapshot, one_thread, snapshot_of
 from ugv_acceptance.monitoring.trends import Ahead, Trends, end_words
 
-# Age (ns) at which computed advice is renewed.
+# Age (ns) from which computed advice is renewed, if a joint has moved by more than MOVED (rad, m)
+# since or gravity by more than TURNED (m/s2, a quarter of a degree): its angles are whole degrees.
 FRESH = 250_000_000
+MOVED, TURNED = 0.004, 0.04
 # Time to a limit (s) below which the operator is warned at once; time (ns) between such warnings.
 URGENT, AGAIN = 2.0, 1_000_000_000
 
@@ -44,10 +49,11 @@ class Advisory:
     rests: LiveRests = field(init=False)
     _made: int = 0
     _told: int = 0
-    pool: Executor = field(
-        default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix='advice')
-    )
+    pool: Executor = field(default_factory=one_thread)
     _asked: 'Future[tuple[Advice, ...]] | None' = None
+    _at: Snapshot | None = None
+    _by: Settings | None = None
+    _found: tuple[Advice, ...] = ()
     _judging: 'Future[Understanding] | None' = None
 
     def __post_init__(self) -> None:
@@ -58,9 +64,22 @@ class Advisory:
         margins, evaluator = self.evaluator.margins, self.evaluator
         if margins is None or not any(alert.rule.code in COMPUTED for alert in active):
             self.advice = ()
-        elif self._asked is None and now - self._made >= FRESH:
-            case = evaluator.settings, margins.q, margins.gravity, evaluator.payload
+        elif self._asked is not None:
+            return
+        elif self._holds(margins):
+            self.advice = self._found
+        elif now - self._made >= FRESH:
+            at = self._at = snapshot_of(margins, evaluator.payload)
+            settings = self._by = evaluator.settings
+            case = settings, at.q, at.gravity, at.payload
             self._asked, self._made = self.pool.submit(advise, *case), now
+
+    def _holds(self, margins: Margins) -> bool:
+        """Return whether the advice found last is that of the margins now, but for a little."""
+        evaluator, at = self.evaluator, self._at
+        if at is None or self._by is not evaluator.settings:
+            return False
+        return at.holds(margins, evaluator.payload, MOVED, TURNED)
 
     def arrived(self) -> bool:
         """Collect advice whose computation has finished; return whether its subjects changed."""
@@ -70,7 +89,8 @@ class Advisory:
         error = asked.exception()
         if error is not None:
             self.on_problem(f'advice: fault of the monitor: {error!r}')
-        self.advice = () if error is not None else asked.result()
+            self._at = None
+        self.advice = self._found = () if error is not None else asked.result()
         return [a.subject for a in self.advice] != [b.subject for b in before]
 
     def close(self) -> None:

@@ -1,22 +1,27 @@
 """Margins of a running robot that are kept by less than they are known: their uncertainty.
 
-The bound costs some milliseconds, so it is computed twice a second, and only anew when posture,
-attitude or load have changed.
+The bound costs some milliseconds, so it is computed by `pool` while messages go on, twice a second
+at most, and only anew when posture, attitude or load have changed.
 """
 
 import math
 from collections.abc import Iterator
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from ugv_acceptance.evaluation.criteria.criteria import RSS
-from ugv_acceptance.evaluation.criteria.uncertainty import Source, combined, effects_of
+from ugv_acceptance.evaluation.criteria.uncertainty import (
+    Effects,
+    Source,
+    combined,
+    effects_of,
+)
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.margin_words import degrees_words, excess_words, tipping_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.background import Snapshot, one_thread, snapshot_of
 from ugv_acceptance.type_aliases import Floats
 
 CODE = 'MARGIN_UNCERTAIN'
@@ -40,24 +45,32 @@ class Doubt:
 class Certainty:
     """Compares margins with the bounds that follow from the `sources` of uncertainty.
 
-    `due` (ns) is when the next look is to be taken.
+    `due` (ns) is when the next look is to be taken: soon while bounds are being computed. Margins
+    of which no bound is known yet are not in doubt, as those of a robot that just appeared.
     """
 
     settings: Settings
     sources: tuple[Source, ...]
+    pool: Executor = field(default_factory=one_thread)
     due: int = 0
     told: dict[str, Doubt] = field(default_factory=dict)
     _seen: dict[str, int] = field(default_factory=dict)
-    _at: tuple[tuple[float, ...], tuple[float, ...], Payload] | None = None
-    _bounds: tuple[Floats, Floats] = field(init=False)
+    _at: Snapshot | None = None
+    _asked: 'Future[Effects] | None' = None
+    _bounds: tuple[Floats, Floats] | None = None
 
     def look(self, now: int, margins: Margins | None, payload: Payload) -> None:
-        """Judge the margins at `now` (ns), None if unknown; `told` are then those in doubt."""
+        """Judge the margins at `now` (ns), None if unknown; `told` are then those in doubt.
+
+        Raises what computing the bounds raised.
+        """
         self.due = now + EVERY
         if margins is None or not self.sources:
             self.told, self._seen = {}, {}
             return
-        self._compute(margins, payload)
+        if not self._computed(margins, payload):
+            self.due = now
+            return
         seen, told = {}, {}
         for subject, left, bound, sentence in self._margins(margins):
             factor = CERTAIN if subject in self.told else 1.0
@@ -71,6 +84,8 @@ class Certainty:
     def _margins(self, margins: Margins) -> Iterator[tuple[str, float, float, str]]:
         """Yield every judged margin: subject, what is left to its limit, its bound, a sentence."""
         limits, robot = self.settings.limits, self.settings.robot
+        if self._bounds is None:
+            return
         torque, angle = self._bounds
         rows = zip(robot.joint_names, limits.torque, margins.torque, torque.tolist(), strict=True)
         for name, limit, tau, bound in rows:
@@ -86,21 +101,23 @@ class Certainty:
                 words = f'{tipping_words(side, float(tilt))} (DANGER from {least} on)'
                 yield side, left, bound, f'{words}, known to +/- {excess_words(bound)}'
 
-    def _compute(self, margins: Margins, payload: Payload) -> None:
-        """Compute the bounds of torques (j,) and angles (4,) again if the robot has moved."""
-        if self._at is not None and not self._moved(self._at, margins, payload):
-            return
-        self._at = margins.q, margins.gravity, payload
-        found = effects_of(self.settings, self.sources, *self._at)
+    def _computed(self, margins: Margins, payload: Payload) -> bool:
+        """Return whether the bounds of torques (j,) and angles (4,) are there for these margins.
+
+        If not, they are being computed: again where the robot has moved since the last time.
+        """
+        at = self._at
+        if self._asked is None:
+            if at is not None and at.holds(margins, payload, MOVED, TURNED):
+                return True
+            at = self._at = snapshot_of(margins, payload)
+            case = self.settings, self.sources, at.q, at.gravity, at.payload
+            self._asked = self.pool.submit(effects_of, *case)
+        if not self._asked.done():
+            return False
+        asked, self._asked, self._at = self._asked, None, None
+        found = asked.result()
+        self._at = at
         torque = found.torque + self.settings.limits.torque_error * found.limit
         self._bounds = combined(torque, RSS), combined(found.angle, RSS)
-
-    def _moved(
-        self,
-        at: tuple[tuple[float, ...], tuple[float, ...], Payload],
-        margins: Margins,
-        payload: Payload,
-    ) -> bool:
-        q, gravity, load = at
-        steps = np.abs(np.subtract(margins.q, q)), np.abs(np.subtract(margins.gravity, gravity))
-        return bool((steps[0] > MOVED).any() or (steps[1] > TURNED).any() or load != payload)
+        return True

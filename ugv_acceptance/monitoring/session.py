@@ -6,6 +6,7 @@ object is made; whatever they hold, the worst that can happen is that they count
 
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any
@@ -19,6 +20,7 @@ from ugv_acceptance.evaluation.permitted_limits import limits_hash
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker
+from ugv_acceptance.monitoring.background import one_thread
 from ugv_acceptance.monitoring.certainty import CODE, Certainty
 from ugv_acceptance.monitoring.faults import Faults
 from ugv_acceptance.monitoring.receipt_clock import Clock, ReceiptClock, StampShift
@@ -78,7 +80,8 @@ class Session:
     `on_margins(stamp, margins)` is called for every message that gave margins without doubt, with
     its own header stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for
     the log. `clock` dates what comes in, `stamps` converts header stamps to its time; `sources` are
-    of uncertainty: a margin that is kept by less than its bound is told. `take_joint_state`,
+    of uncertainty: a margin that is kept by less than its bound is told. `pool` computes what takes
+    longer than a message: a thread, unless simulated time has to wait for it. `take_joint_state`,
     `take_imu` and `take_payload` take a serialised message and never raise.
     """
 
@@ -89,6 +92,7 @@ class Session:
     clock: Clock = field(default_factory=ReceiptClock)
     stamps: StampShift = field(default_factory=StampShift)
     sources: tuple[Source, ...] = ()
+    pool: Executor = field(default_factory=one_thread)
     evaluator: LiveEvaluator = field(init=False)
     faults: Faults = field(init=False)
     alarm_tracker: AlarmTracker = field(init=False)
@@ -110,8 +114,8 @@ class Session:
         log = self.evaluator.watch.log
         self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
         self.trends = Trends(self.settings)
-        self.advisory = Advisory(self.evaluator, self.trends, self.on_problem)
-        self.certainty = Certainty(self.settings, self.sources)
+        self.advisory = Advisory(self.evaluator, self.trends, self.on_problem, pool=self.pool)
+        self.certainty = Certainty(self.settings, self.sources, self.pool)
         heard = {'joint_states': self.settings.hears_joints, 'imu': self.settings.hears_imu}
         self._counts = {name: InputCount() for name in INPUTS}
         self.counts = {n: count for n, count in self._counts.items() if heard.get(n, True)}

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ugv_acceptance.evaluation.alerts.prediction import time_to
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
@@ -123,22 +122,19 @@ def ahead_of(settings: Settings, time: Floats, tilt: Floats, torque: Floats) -> 
     `time` (n,) is in s, now being 0; `tilt` (n, 4) in rad, `torque` (n, j) in N m or N.
     """
     limits = np.array(settings.limits.torque)
-    left = limits - np.abs(torque)
-    least = (*[TILT_RATE] * len(SIDES), *(LOAD_RATE * limits).tolist())
+    slowest = [TILT_RATE] * len(SIDES) + (LOAD_RATE * limits).tolist()
     names = (*SIDES, *settings.robot.joint_names)
-    found = []
-    for name, values, slowest in zip(names, np.hstack((tilt, left)).T, least, strict=True):
-        value, rate = _line(time, values)
-        if -rate >= slowest:
-            seconds = float(time_to(0.0, -value, -value - rate, 1.0))
-            found.append(Ahead(name, rate, seconds))
+    values = np.hstack((tilt, limits - np.abs(torque)))
+    # The line fitted to each column; NaN where a value is not finite.
+    with np.errstate(invalid='ignore'):
+        away = time - time.mean()
+        rates = away @ values / (away @ away)
+        ends = values.mean(axis=0) - rates * time.mean()
+    found = [
+        Ahead(name, rate, 0.0 if value <= 0.0 else value / -rate)
+        for name, value, rate, least in zip(
+            names, ends.tolist(), rates.tolist(), slowest, strict=True
+        )
+        if -rate >= least
+    ]
     return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))
-
-
-def _line(time: 'np.ndarray', values: 'np.ndarray') -> tuple[float, float]:
-    """Return value at time 0 and slope of a fitted line; NaN if a value is not finite."""
-    if not np.isfinite(values).all():
-        return math.nan, math.nan
-    away = time - time.mean()
-    rate = float(away @ values / (away @ away))
-    return float(values.mean() - rate * time.mean()), rate

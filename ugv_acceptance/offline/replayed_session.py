@@ -82,7 +82,9 @@ class ReplayedSession(Session):
 
     def __post_init__(self) -> None:
         Session.__post_init__(self)
-        self.advisory = PastAdvisory(self.evaluator, self.trends, self.on_problem, told=self.told)
+        self.advisory = PastAdvisory(
+            self.evaluator, self.trends, self.on_problem, pool=self.pool, told=self.told
+        )
 
     @property
     def active(self) -> list[Alert]:

@@ -90,7 +90,7 @@ def test_what_is_active_comes_with_the_most_severe_first() -> None:
 def test_every_signal_is_listed_once() -> None:
     """There is one signal for each code, subject and level, and all write to the same log."""
     watch = RuleSet(settings())
-    rules = [(s.rule.code, s.rule.subject, s.rule.level) for s in watch.signals()]
+    rules = [(s.rule.code, s.rule.subject, s.rule.level) for s in watch.signals]
     assert len(set(rules)) == len(rules)
-    assert all(signal.log is watch.log for signal in watch.signals())
+    assert all(signal.log is watch.log for signal in watch.signals)
     assert {('SLIDE', 'robot', WARN), ('TORQUE_LIMIT', 'slide', ERROR)} <= set(rules)

@@ -1,8 +1,8 @@
 """Short-horizon prediction: time to a limit from the last half second of margins.
 
 Also finds weak motors and frozen encoders from the same history. One sample every 50 ms of receipt
-time (a *look*) is kept, so that other messages cost one comparison. Live and recorded looks are
-judged by the same array code; live ones wait until time passes (`judge`).
+time (a *look*) is kept, so that other messages cost one comparison. Live looks wait until time
+passes (`judge`) and are judged one at a time (prediction_live.py); those of a recording as columns.
 """
 
 from collections import deque
@@ -14,6 +14,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ugv_acceptance.evaluation.alerts.prediction_limits import (
+    CHANGED,
+    EVEN,
+    GROWN,
+    HIGH,
+    JUMP,
+    KEPT,
+    LAG,
+    LATER,
+    LEAPT,
+    LOAD_RATE,
+    LONGEST,
+    LOW,
+    MOST,
+    NOISE,
+    OVER,
+    SOON,
+    SPACING,
+    STUCK,
+    TILT_RATE,
+    WEAK,
+)
+from ugv_acceptance.evaluation.alerts.prediction_live import LivePrediction, Look
 from ugv_acceptance.evaluation.alerts.state_machine import Signal, feed
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
@@ -37,30 +60,6 @@ def time_to(limit: ArrayLike, now: ArrayLike, then: ArrayLike, seconds: float) -
 
 SignalOf = Callable[[str, str, tuple[float, float], float], Signal]
 
-# Time (ns) between two looks, and number of looks kept.
-SPACING, KEPT = 50_000_000, 10
-# Rates are taken over this many looks, if these span at most this time (ns).
-OVER, LONGEST = 4, 400_000_000
-# Time to a limit (s) at which the warning begins, and at which it ends.
-SOON, LATER = 1.0, 1.5
-# Slowest rates that count: tilt in rad/s, torque as a share of its limit per second.
-TILT_RATE, LOAD_RATE = 0.0175, 0.03
-# A weak motor: effort is constant to EVEN while the posture needs GROWN more (shares of the limit).
-# A frozen encoder: the position is bit-identical for STUCK looks while effort changes by CHANGED,
-# or stays within its noise (NOISE in rad or m over LAG looks) while effort changes by more, LEAPT.
-EVEN, GROWN, STUCK, CHANGED = 0.015, 0.07, 6, 0.15
-NOISE, LAG, LEAPT = 0.002, 4, 0.3
-# A motor is weak (1) or not (0).
-WEAK = 0.5
-# A constant effort may mean a weak motor between these shares of the limit.
-LOW, HIGH = 0.3, 0.97
-# A change counts as a jump, not as a rate, if one step makes more than this share of it.
-JUMP = 0.6
-# Up to this many looks, as live, are fed to the rules one at a time.
-FEW = 3
-# Looks that may wait for `judge`; the oldest are dropped if time never passes.
-MOST = 1024
-
 
 @dataclass(slots=True)
 class Prediction:
@@ -76,21 +75,24 @@ class Prediction:
     weak: list[Signal]
     frozen: list[Signal]
     due: int = 0
-    _waiting: deque[tuple[int, tuple[float, ...]]] = field(
-        default_factory=lambda: deque(maxlen=MOST)
-    )
+    _waiting: deque[Look] = field(default_factory=lambda: deque(maxlen=MOST))
+    _live: LivePrediction = field(init=False)
     _time: Times = field(default_factory=lambda: np.empty(0, np.int64))
     _looks: Floats = field(init=False)
     _since: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         n = len(self.torque)
+        self._live = LivePrediction(n)
         self._looks = np.empty((0, len(SIDES) + 3 * n))
         self._since = np.full((3, 2 * n), np.nan)
 
+    def _rules(self) -> tuple[list[Signal], ...]:
+        return self.tip, self.torque, self.effort, self.weak, self.frozen
+
     def signals(self) -> list[Signal]:
         """Return the signals of all rules, in a fixed order."""
-        return [*self.tip, *self.torque, *self.effort, *self.weak, *self.frozen]
+        return [signal for rule in self._rules() for signal in rule]
 
     def keep(
         self,
@@ -102,14 +104,17 @@ class Prediction:
     ) -> None:
         """Keep a live sample at `now` (ns) for the next `judge`; call it only from `due` on."""
         self.due = now - now % SPACING + SPACING
-        self._waiting.append((now, (*angle, *torque, *effort, *q)))
+        self._waiting.append(Look(now, tuple(angle), tuple(torque), tuple(effort), tuple(q)))
 
     def judge(self, limit: Sequence[float]) -> None:
         """Judge the live samples kept since the last call; `limit` (j,) are torque limits."""
-        if self._waiting:
-            time, rows = zip(*self._waiting, strict=True)
-            self._waiting.clear()
-            self._judge(np.array(time, np.int64), np.array(rows, np.float64), np.array(limit))
+        while self._waiting:
+            look = self._waiting.popleft()
+            for signals, values in zip(self._rules(), self._live.step(look, limit), strict=True):
+                for signal, value in zip(signals, values, strict=True):
+                    # A small value cannot change a quiet signal.
+                    if value >= signal.on or not signal.quiet:
+                        signal.step(look.time, value)
 
     def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
         """Judge the next part of a recording; `limit` (j,) are torque limits (N m; N)."""
@@ -125,23 +130,32 @@ class Prediction:
 
     def _judge(self, time: Times, looks: Floats, limit: Floats) -> None:
         """Feed the signals with new looks (n, 4 + 3 j): angle, torque, effort, position."""
+        values = self.values(time, looks, limit)
+        for signals, some in zip(self._rules(), values, strict=True):
+            for signal, column in zip(signals, some.T, strict=True):
+                feed(signal, time, column)
+
+    def values(self, time: Times, looks: Floats, limit: Floats) -> list[Floats]:
+        """Return what each rule says of new looks (n, 4 + 3 j), and keep them.
+
+        The rules are in order of the fields of prediction_live.Values; arrays (n, sides or joints).
+        """
         old, sides, n = len(self._time), len(SIDES), len(limit)
         time, looks = np.concatenate((self._time, time)), np.concatenate((self._looks, looks))
         angle, tau, effort, q = np.split(looks, [sides, sides + n, sides + 2 * n], axis=1)
         with np.errstate(invalid='ignore', over='ignore', divide='ignore'):
-            found = (
-                (self.tip, _ahead(time, angle, TILT_RATE)),
-                (self.torque, _ahead(time, limit - np.abs(tau), LOAD_RATE * limit)),
-                (self.effort, np.where(np.isfinite(limit), np.abs(effort), 0.0)),
-                (self.weak, _weak(time, tau, effort, limit) * _standing(angle)),
-                (self.frozen, self._frozen(old, tau, effort, q) / limit),
-            )
+            found = [
+                _ahead(time, angle, TILT_RATE),
+                _ahead(time, limit - np.abs(tau), LOAD_RATE * limit),
+                np.where(np.isfinite(limit), np.abs(effort), 0.0),
+                _weak(time, tau, effort, limit) * _standing(angle),
+                self._frozen(old, tau, effort, q) / limit,
+            ]
         untold = np.isnan(tau)  # the ground may carry the arm
-        for values in (found[1][1], found[3][1], found[4][1]) if untold.any() else ():
-            values[untold] = -np.inf
-        for signals, values in found:
-            _feed(signals, time[old:], values[old:])
+        for k in (1, 3, 4) if untold.any() else ():
+            found[k][untold] = -np.inf
         self._time, self._looks = time[-KEPT:], looks[-KEPT:]
+        return [some[old:] for some in found]
 
     def _frozen(self, old: int, tau: Floats, effort: Floats, q: Floats) -> Floats:
         """Return how much effort (n, j) in N m (N) changed while each joint's position did not.
@@ -187,19 +201,6 @@ def _moved(q: Floats) -> NDArray[np.bool_]:
         noisy[k] = ~(np.abs(q[k] - q[0]) <= NOISE)
     noisy[LAG:] = ~(np.abs(q[LAG:] - q[:-LAG]) <= NOISE)
     return moved
-
-
-def _feed(signals: list[Signal], time: Times, values: Floats) -> None:
-    """Feed each signal with its column of the values (n, m)."""
-    if len(time) > FEW:
-        for signal, column in zip(signals, values.T, strict=True):
-            feed(signal, time, column)
-        return
-    for now, row in zip(time.tolist(), values.tolist(), strict=True):
-        for signal, value in zip(signals, row, strict=True):
-            # A small value cannot change a quiet signal.
-            if value >= signal.on or not signal.quiet:
-                signal.step(now, value)
 
 
 def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 - float or (m,)

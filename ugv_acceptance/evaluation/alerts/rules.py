@@ -54,7 +54,7 @@ class RuleSet:
     """The signals of all alert rules of a robot; `log` receives every alert that is raised.
 
     One signal per rule, a pair (WARN, ERROR) if a rule has two levels. `torque` and `speed` are in
-    order of `robot.joint_names`, `tip` in order of SIDES.
+    order of `robot.joint_names`, `tip` in order of SIDES; `signals` are all, in a fixed order.
     """
 
     settings: Settings
@@ -77,6 +77,7 @@ class RuleSet:
     slide: Signal = field(init=False)
     trend: TippingWatch = field(init=False)
     relaxed: dict[str, Signal] = field(init=False)
+    signals: tuple[Signal, ...] = field(init=False)
     _told: Settings | None = None
 
     def __post_init__(self) -> None:
@@ -116,6 +117,7 @@ class RuleSet:
         self.slide = self._slide()
         self.trend = TippingWatch(self.settings, self._trend())
         self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
+        self.signals = self._all()
 
     def relax(self, now: int) -> None:
         """Raise a warning for each limit that is relaxed at `now` (ns), and end the others."""
@@ -264,7 +266,7 @@ class RuleSet:
     @property
     def active(self) -> list[Alert]:
         """Alerts that are active now, the most severe first."""
-        found = [signal.alert for signal in self.signals() if signal.alert is not None]
+        found = [signal.alert for signal in self.signals if signal.alert is not None]
         return sorted(found, key=lambda alert: -alert.rule.level)
 
     def lose(self, when: int) -> None:
@@ -275,8 +277,13 @@ class RuleSet:
             if not signal.quiet:
                 signal.clear(when)
 
-    def signals(self) -> list[Signal]:
-        """Return the signals of all rules, in a fixed order."""
+    def advance(self, now: int) -> None:
+        """Let time pass to `now` (ns) for the signals that are not quiet: no other can change."""
+        for signal in self.signals:
+            if not signal.quiet:
+                signal.advance(now)
+
+    def _all(self) -> tuple[Signal, ...]:
         pairs = [s for pair in (*self.torque, *self.tip) for s in pair]
         inputs = [s for i in (self.joints, self.imu) for s in (i.stale, i.invalid, i.clock, i.slow)]
         of = self.attitude
@@ -285,7 +292,7 @@ class RuleSet:
         ]  # fmt: skip
         faults = [self.support, self.ground, self.payload, self.missing, self.repeated, *attitude]
         faults.append(self.placing)
-        return [
+        return (
             *pairs,
             *self.speed,
             *self.jump_signals,
@@ -296,7 +303,7 @@ class RuleSet:
             *self.trend.signals,
             *self.prediction.signals(),
             *self.relaxed.values(),
-        ]
+        )
 
 
 def _reaching(signal: Signal, reach: int) -> Signal:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ugv_acceptance.evaluation.alerts.prediction import MOST, SPACING
+from ugv_acceptance.evaluation.alerts.prediction_limits import MOST, SPACING
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Signal, feed
 from ugv_acceptance.evaluation.ground import FLAT, KINDS
 from ugv_acceptance.evaluation.margin_table import MarginRows
