@@ -18,6 +18,7 @@ from ugv_acceptance.evaluation.criteria.uncertainty import Source, combined, eff
 from ugv_acceptance.evaluation.margin_words import excess_words, tipping_words
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
+from ugv_acceptance.monitoring.background import AtOnce
 from ugv_acceptance.monitoring.diagnostics import verdict_of
 from ugv_acceptance.monitoring.session import Session
 
@@ -38,7 +39,7 @@ class Robot:
     def __post_init__(self) -> None:
         self.session = Session(
             self.settings, lambda *_: None, lambda: None, lambda _: None, clock=self,
-            sources=self.sources,
+            sources=self.sources, pool=AtOnce(),
         )  # fmt: skip
 
     def now(self) -> int:

@@ -78,7 +78,8 @@ class Track:
             return None
         rows = slice(first, k + 1)
         seconds = (self.time[rows] - self.time[k]) / 1e9
-        soon = ahead_of(settings, seconds, self.angle[rows], self.torque[rows])
+        tilt, torque = (table[rows].T.tolist() for table in (self.angle, self.torque))
+        soon = ahead_of(settings, seconds.tolist(), tilt, torque)
         if not soon:
             return None
         return Countdown(soon[0].subject in SIDES, soon[0].subject, soon[0].seconds)

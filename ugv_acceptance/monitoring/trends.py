@@ -5,14 +5,13 @@ Every sample costs a few comparisons; rates are computed only when asked for.
 
 import math
 from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
+from operator import mul
 
 from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
-from ugv_acceptance.type_aliases import Floats
 
 # Rates come from samples of this spacing over this span (ns); at least this many are needed.
 SPACING, SPAN, LEAST = 50_000_000, 1_000_000_000, 8
@@ -110,31 +109,35 @@ class Trends:
         recent = self.recent(now)
         if len(recent) < LEAST:
             return ()
-        time = np.array([m.time - now for m in recent]) / 1e9
-        tilt = np.array([m.stability.angle for m in recent], dtype=np.float64)
-        torque = np.array([m.torque for m in recent], dtype=np.float64)
+        time = [(m.time - now) / 1e9 for m in recent]
+        tilt = zip(*(m.stability.angle for m in recent), strict=True)
+        torque = zip(*(m.torque for m in recent), strict=True)
         return ahead_of(self.settings, time, tilt, torque)
 
 
-def ahead_of(settings: Settings, time: Floats, tilt: Floats, torque: Floats) -> tuple[Ahead, ...]:
-    """Return the margins used up within SOON at their rates over the samples, the soonest first.
+def ahead_of(
+    settings: Settings,
+    time: Sequence[float],
+    tilt: Iterable[Sequence[float]],
+    torque: Iterable[Sequence[float]],
+) -> tuple[Ahead, ...]:
+    """Return the margins used up within SOON at their rates over n samples, the soonest first.
 
-    `time` (n,) is in s, now being 0; `tilt` (n, 4) in rad, `torque` (n, j) in N m or N.
+    `time` (n,) is in s, now being 0; `tilt` (4, n) in rad, `torque` (j, n) in N m or N.
     """
-    limits = np.array(settings.limits.torque)
-    slowest = [TILT_RATE] * len(SIDES) + (LOAD_RATE * limits).tolist()
-    names = (*SIDES, *settings.robot.joint_names)
-    values = np.hstack((tilt, limits - np.abs(torque)))
-    # The line fitted to each column; NaN where a value is not finite.
-    with np.errstate(invalid='ignore'):
-        away = time - time.mean()
-        rates = away @ values / (away @ away)
-        ends = values.mean(axis=0) - rates * time.mean()
-    found = [
-        Ahead(name, rate, 0.0 if value <= 0.0 else value / -rate)
-        for name, value, rate, least in zip(
-            names, ends.tolist(), rates.tolist(), slowest, strict=True
-        )
-        if -rate >= least
+    limits, middle = settings.limits.torque, sum(time) / len(time)
+    away = [t - middle for t in time]
+    spread = sum(map(mul, away, away))
+    loads = [
+        [limit - abs(tau) for tau in taus] for limit, taus in zip(limits, torque, strict=True)
     ]
+    slowest = (*[TILT_RATE] * len(SIDES), *[LOAD_RATE * limit for limit in limits])
+    names = (*SIDES, *settings.robot.joint_names)
+    found = []
+    for name, values, least in zip(names, (*tilt, *loads), slowest, strict=True):
+        # The slope of the line fitted to them; NaN where one is not finite.
+        rate = sum(map(mul, away, values)) / spread
+        if -rate >= least:
+            value = sum(values) / len(time) - rate * middle
+            found.append(Ahead(name, rate, 0.0 if value <= 0.0 else value / -rate))
     return tuple(sorted((a for a in found if a.seconds <= SOON), key=lambda a: a.seconds))
