@@ -20,8 +20,9 @@ from ugv_acceptance.bag.reader import choose_topics, open_bag
 from ugv_acceptance.bag.writer import BagWriter, Qos
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.certainty import CODE as MARGIN_UNCERTAIN
 

@@ -10,9 +10,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.recorded import RecordedEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.samples import (
     Batch,
     ImuColumns,

@@ -33,7 +33,8 @@ from hypothesis import strategies as st
 from ugv_acceptance.evaluation.alerts.messages import RECORDED, advice, describe
 from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, WARN, Alert, Rule
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Delays, Limits, Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES

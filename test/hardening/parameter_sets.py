@@ -6,7 +6,7 @@ from typing import Any
 from hardening.outcome import Outcome
 from nodes.live_case import live_nodes, parameter, ros_context, session_of
 
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 
 # Parameter -> the values it is put to, some of them impossible.
 VALUES = {

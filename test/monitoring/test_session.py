@@ -19,7 +19,7 @@ from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.messages import LIVE
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, OK, STALE, Alert, Rule
 from ugv_acceptance.evaluation.ground import CARRIED
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Untold
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.alarm_tracker import KEPT, AlarmTracker

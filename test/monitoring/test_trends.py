@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Limits, Settings
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import Stability
@@ -26,8 +26,9 @@ SECOND = 1_000_000_000
 def sample(time: int, front: float, shoulder: float = 10.0) -> Margins:
     """Return margins with this tilt left (rad) to the front and this torque (N m)."""
     nothing = (1.0,) * 4
-    stability = Stability((front, 1.0, 1.0, 1.0), nothing, nothing, 0.1, 0)
-    return Margins(time, time, STILL, LEVEL, (0.0, shoulder, 5.0, 0.0), stability)
+    angle, torque = (front, 1.0, 1.0, 1.0), (0.0, shoulder, 5.0, 0.0)
+    stability = Stability(angle, nothing, nothing, 0.1, 0)
+    return Margins(time, time, STILL, LEVEL, torque, angle, 0, stability)
 
 
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-60.0, 60.0)), min_size=1))
@@ -85,7 +86,7 @@ def seen(
     trends, nothing = Trends(told), (1.0,) * 4
     for k, (angle, torque) in enumerate(values):
         stability = Stability(angle, nothing, nothing, 0.1, 0)
-        trends.see(Margins(k * spacing, 0, (0.0, 0.0), LEVEL, torque, stability))
+        trends.see(Margins(k * spacing, 0, (0.0, 0.0), LEVEL, torque, angle, 0, stability))
     return trends
 
 

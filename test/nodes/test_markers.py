@@ -9,7 +9,8 @@ from visualization_msgs.msg import MarkerArray
 
 from ugv_acceptance.bag.encode_views import Shape
 from ugv_acceptance.config import load
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.model.robot import Joint, Link
 from ugv_acceptance.monitoring.drawing import (
     GREEN,

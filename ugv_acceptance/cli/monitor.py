@@ -130,9 +130,7 @@ def table_of(monitor: 'Monitor') -> Table:
     if settings.judges_tilt:
         table.add_row('ground', ground_words(settings.ground.kind), '', '')
     most = '<= ' if settings.ground.rough else ''
-    for side, angle in zip(
-        ('front', 'left', 'rear', 'right'), margins.stability.angle, strict=True
-    ):
+    for side, angle in zip(('front', 'left', 'rear', 'right'), margins.angle, strict=True):
         least = math.degrees(settings.limits.tip_error)
         table.add_row(
             f'tip to the {side} (deg)', '', f'{least:.1f}', f'{most}{math.degrees(angle):.1f}'

@@ -27,6 +27,7 @@ from ugv_acceptance.evaluation.inputs.joints import JointMerger
 from ugv_acceptance.evaluation.inputs.low_pass import NOWHERE
 from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
+from ugv_acceptance.evaluation.sample_margins import LEVEL, Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import standing_torque
@@ -37,30 +38,12 @@ from ugv_acceptance.model.stability import (
     NO_CONTACT,
     NOT_KNOWN,
     RAISED,
-    Stability,
     Stance,
-    stability_of,
     stances_of,
     standing,
+    tip_angles_of,
 )
 from ugv_acceptance.model.statics import torque_of
-
-
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """The margins of the newest joint positions and gravity at one message.
-
-    `time` is that of receipt, `stamp` that of the header (ns). `q` (j,) rad or m, `gravity` (3,)
-    m/s2 in `base_link`, `torque` (j,) static (N m; N), with the ground's reaction spread evenly on
-    joints that carry the robot, `stability` the tip-over margins.
-    """
-
-    time: int
-    stamp: int
-    q: tuple[float, ...]
-    gravity: Vector
-    torque: tuple[float, ...]
-    stability: Stability
 
 
 @dataclass(slots=True)
@@ -211,7 +194,7 @@ class LiveEvaluator:
             invalid.step(now, 1.0 if unusable else 0.0)
         self._gravity = gravity
         margins = self._evaluate(now, stamp)
-        angles: Any = margins.stability.angle if margins else None
+        angles = margins.angle if margins else None
         unknown = omega_covariance_0 == -1.0 or not self._imu.motion.gyro_trusted
         seen = UNWITNESSED if covariance_0 == -1.0 else WITNESSED
         rate = NO_RATE if unknown else seen
@@ -226,8 +209,7 @@ class LiveEvaluator:
         """
         if self.margins is None:
             return None
-        angles: Any = self.margins.stability.angle
-        return self.chassis.moving(self.margins.gravity, angles)
+        return self.chassis.moving(self.margins.gravity, self.margins.angle)
 
     def carry(self, now: int, mass: float, com: Sequence[float], frame: str) -> None:
         """Take a declared payload (kg, m), in force from the next joint state on.
@@ -297,7 +279,7 @@ class LiveEvaluator:
     @property
     def carried(self) -> bool:
         """Whether points below the tracks (flippers) carry a robot now that has tracks."""
-        raised = self.margins is not None and self.margins.stability.state == RAISED
+        raised = self.margins is not None and self.margins.state == RAISED
         return raised and has_tracks(self.settings.robot)
 
     @property
@@ -363,22 +345,24 @@ class LiveEvaluator:
         torque: Any = standing_torque(self._mechanics, posture, points, gravity, hanging)
         if touch == PERMITTED:
             torque = (math.nan,) * len(torque)
-        stability = NOT_KNOWN if self._level else stability_of(stance, gravity)
-        self._watch(now, torque, stability)
-        q = tuple(self.joints.q)
-        self.margins = Margins(now, stamp, q, gravity, torque, stability)
+        found: Any = LEVEL if self._level else tip_angles_of(stance, gravity)
+        angle, state = found
+        self._watch(now, torque, angle, state)
+        q, stands = tuple(self.joints.q), NOT_KNOWN if self._level else stance
+        self.margins = Margins(now, stamp, q, gravity, torque, angle, state, stands)
         self.evaluated += 1
         prediction = self.watch.prediction
         if now >= prediction.due:
-            prediction.keep(now, stability.angle, torque, self.joints.effort, q)
+            prediction.keep(now, angle, torque, self.joints.effort, q)
             pose = self.chassis.pose
             if pose is not None and not self._level:
-                self.watch.trend.keep(now, stability.angle, q, gravity, pose[1])
+                self.watch.trend.keep(now, angle, q, gravity, pose[1])
         return self.margins
 
-    def _watch(self, now: int, torque: tuple[float, ...], stability: Stability) -> None:
+    def _watch(
+        self, now: int, torque: tuple[float, ...], angles: tuple[float, ...], state: int
+    ) -> None:
         watch = self.watch
-        angles: Any = stability.angle
         for (warn, error), tau in zip(watch.torque, torque, strict=True):
             value = abs(tau)
             if value >= warn.on or not (warn.quiet and error.quiet):
@@ -394,6 +378,6 @@ class LiveEvaluator:
         if watch.slide.on < math.inf:
             friction = self.settings.limits.friction
             watch.slide.step(now, float(slides_first(self._gravity, min(angles), friction)))
-        fallen = stability.state >= NO_CONTACT
+        fallen = state >= NO_CONTACT
         if fallen or not watch.support.quiet:
             watch.support.step(now, 1.0 if fallen else 0.0)

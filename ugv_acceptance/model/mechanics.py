@@ -7,7 +7,7 @@ sample that only brings a new attitude costs three products a joint.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.model.dynamics import Load, Motion, joint_forces, motion_of
@@ -38,8 +38,7 @@ from ugv_acceptance.model.tree import (
 Triple = tuple[Number, Number, Number]
 
 
-@dataclass(frozen=True, slots=True)
-class Posture:
+class Posture(NamedTuple):
     """All that joint positions and payload determine, before gravity is known.
 
     Each number is a float (one sample) or an array (many). `torque_gradients[j]` is the derivative

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,8 +42,7 @@ WEIGHTLESS = 1.0
 _NONE = (math.nan,) * len(SIDES)
 
 
-@dataclass(frozen=True, slots=True)
-class Stance:
+class Stance(NamedTuple):
     """One way to stand in a posture, at any attitude: footing, centre of gravity and mass.
 
     One sample, or samples that share a footing's polygon and the sides of its edges. `sides` is the
@@ -75,8 +74,7 @@ class Stance:
         return self.footing.rocking if self.footing else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Stability:
+class Stability(NamedTuple):
     """Tip-over margins to each of SIDES: positive is stable, infinite on a side without an edge.
 
     `angle` (rad) is the force-angle, `moment` (N m) holds the robot down, `energy` (J) would lift
@@ -221,7 +219,7 @@ def take_stance(stance: Stance, rows: Rows) -> Stance:
         return stance
     terms, mass, rocking = pick((stance.terms, stance.mass, stance.rocking), rows)
     footing = stance.footing and replace(stance.footing, rocking=rocking)
-    return replace(stance, footing=footing, terms=terms, mass=mass)
+    return stance._replace(footing=footing, terms=terms, mass=mass)
 
 
 def many_standing(

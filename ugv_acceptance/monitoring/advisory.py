@@ -16,7 +16,8 @@ from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.effort.facts import JointMeaning
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests, PayloadEstimate
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
@@ -138,7 +139,7 @@ class Advisory:
     def tipped(self) -> bool:
         """Whether the robot has tipped over, by its newest margins."""
         margins = self.evaluator.margins
-        return margins is not None and has_tipped(margins.stability.angle)
+        return margins is not None and has_tipped(margins.angle)
 
     def do(self, alert: Alert) -> str:
         """Return what to do about an alert: the computed advice for its margin, else general.

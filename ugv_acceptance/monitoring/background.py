@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.model.robot import Payload, Vector
 
 

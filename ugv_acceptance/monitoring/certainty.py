@@ -16,8 +16,8 @@ from ugv_acceptance.evaluation.criteria.uncertainty import (
     combined,
     effects_of,
 )
-from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.margin_words import degrees_words, excess_words, tipping_words
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.stability import SIDES
@@ -94,7 +94,7 @@ class Certainty:
                 left = limits.torque_error * limit - abs(tau)
                 words = f'{name} has {left:.1f} {unit} left to its limit'
                 yield name, left, bound, f'{words}, known to +/- {bound:.1f} {unit}'
-        for side, tilt, bound in zip(SIDES, margins.stability.angle, angle.tolist(), strict=True):
+        for side, tilt, bound in zip(SIDES, margins.angle, angle.tolist(), strict=True):
             left = float(tilt) - limits.tip_error
             if math.isfinite(left):
                 least = degrees_words(limits.tip_error)

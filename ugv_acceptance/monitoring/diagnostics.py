@@ -15,9 +15,10 @@ from ugv_acceptance.evaluation.criteria.not_judged import kept_words, unknown_wo
 from ugv_acceptance.evaluation.inputs.joint_names import names_words
 from ugv_acceptance.evaluation.inputs.joint_words import held_words
 from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.margin_words import share_words
 from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
 from ugv_acceptance.monitoring.input_status import InputSources, input_status
@@ -132,7 +133,7 @@ def _now(alert: Alert, session: Session) -> Alert:
     if margins is not None and code == 'TORQUE_LIMIT' and subject in names:
         peak = abs(margins.torque[names.index(subject)])
     elif margins is not None and code == 'TIP_OVER' and subject in SIDES:
-        peak = -float(margins.stability.angle[SIDES.index(subject)])
+        peak = -float(margins.angle[SIDES.index(subject)])
     return alert if math.isnan(peak) else replace(alert, peak=peak)
 
 

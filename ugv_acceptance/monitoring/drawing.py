@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ugv_acceptance.bag.encode_views import Colour, Shape
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.expressions import (
     add,
@@ -214,7 +214,7 @@ def shapes_of(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple
 
 def _in_root(skeleton: Skeleton, margins: Margins, settings: Settings) -> tuple[Shape, ...]:
     """Return the shapes in the axes of the robot's root link."""
-    angles = [float(a) for a in margins.stability.angle]
+    angles = [float(a) for a in margins.angle]
     colour = _tip_colour(min(angles), settings)
     outline = (*skeleton.polygon, *skeleton.polygon[:1])
     under = () if skeleton.plumb is None else (skeleton.cog, skeleton.plumb)

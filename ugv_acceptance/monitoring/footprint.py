@@ -40,7 +40,7 @@ def footprint_of(evaluator: LiveEvaluator) -> Footprint | None:
         return None
     stance = evaluator.chassis.stance
     footing = stance.footing if stance is not None else None
-    stands = footing is not None and margins.stability.state < NO_CONTACT
+    stands = footing is not None and margins.state < NO_CONTACT
     corners = footing.polygon if footing is not None and stands else ()
     contacts: Any = posture.contacts
     center: Any = posture.cog

@@ -6,8 +6,9 @@ from ugv_acceptance.evaluation.alerts.state_machine import LEVELS, STALE
 from ugv_acceptance.evaluation.alerts.tipping_watch import NOT_KNOWN
 from ugv_acceptance.evaluation.ground import CARRIED, bound_words, ground_words
 from ugv_acceptance.evaluation.least_margins import least_tilt
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.margin_words import tipping_words
+from ugv_acceptance.evaluation.sample_margins import Margins
 
 # What the newest trend says where the ground is not flat.
 TRENDS = {NOT_KNOWN: 'not known yet', **dict(enumerate(LEVELS[:STALE]))}
@@ -15,7 +16,7 @@ TRENDS = {NOT_KNOWN: 'not known yet', **dict(enumerate(LEVELS[:STALE]))}
 
 def tilt_words(margins: Margins, evaluator: LiveEvaluator) -> str:
     """Return the tilt left in words; an upper bound where the ground is not flat."""
-    side, angle = least_tilt(margins.stability.angle)
+    side, angle = least_tilt(margins.angle)
     if not side:
         return 'no tilt margin'
     if evaluator.settings.ground.rough:

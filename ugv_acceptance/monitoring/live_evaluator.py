@@ -10,7 +10,7 @@ from ugv_acceptance.bag.recording import Sample
 from ugv_acceptance.config import Config, load
 from ugv_acceptance.evaluation.alerts.state_machine import LEVELS
 from ugv_acceptance.evaluation.live import LiveEvaluator as Evaluator
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.summary import AlertRecord, alert_record
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.receipt_clock import ReceiptClock
@@ -193,7 +193,7 @@ class LiveEvaluator:
             return None
         settings = self.config.settings
         names, limits = settings.robot.joint_names, settings.limits.torque
-        torque, angles = margins.torque, map(float, margins.stability.angle)
+        torque, angles = margins.torque, map(float, margins.angle)
         left = [limit - abs(tau) for limit, tau in zip(limits, torque, strict=True)]
         return LiveMargins(
             margins.time,

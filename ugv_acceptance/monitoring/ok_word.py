@@ -116,9 +116,9 @@ class OkWord:
             yield 'the payload is not known'
         if evaluator.joints.doubted:
             yield 'a joint is taken as held that may be elsewhere'
-        if margins.stability.state not in (STANDING, RAISED):
+        if margins.state not in (STANDING, RAISED):
             yield 'no tip-over margin'
-        angles: Any = margins.stability.angle
+        angles: Any = margins.angle
         if any(map(math.isnan, (*angles, *margins.torque))):
             yield 'tip-over or a torque is not judged'
         yield from self._old(now)

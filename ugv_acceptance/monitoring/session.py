@@ -15,8 +15,9 @@ from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_decoder
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.permitted_limits import limits_hash
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.alarm_tracker import AlarmTracker

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from operator import mul
 
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.stability import SIDES
 
@@ -66,7 +66,7 @@ class Trends:
 
     def see(self, margins: Margins) -> None:
         """Take the margins of one message."""
-        for k, angle in enumerate(margins.stability.angle):
+        for k, angle in enumerate(margins.angle):
             if angle < self.tilt[k][0]:
                 self.tilt[k] = (float(angle), margins.time)
         for j, (tau, limit) in enumerate(
@@ -110,7 +110,7 @@ class Trends:
         if len(recent) < LEAST:
             return ()
         time = [(m.time - now) / 1e9 for m in recent]
-        tilt = zip(*(m.stability.angle for m in recent), strict=True)
+        tilt = zip(*(m.angle for m in recent), strict=True)
         torque = zip(*(m.torque for m in recent), strict=True)
         return ahead_of(self.settings, time, tilt, torque)
 
@@ -128,9 +128,7 @@ def ahead_of(
     limits, middle = settings.limits.torque, sum(time) / len(time)
     away = [t - middle for t in time]
     spread = sum(map(mul, away, away))
-    loads = [
-        [limit - abs(tau) for tau in taus] for limit, taus in zip(limits, torque, strict=True)
-    ]
+    loads = [[limit - abs(tau) for tau in taus] for limit, taus in zip(limits, torque, strict=True)]
     slowest = (*[TILT_RATE] * len(SIDES), *[LOAD_RATE * limit for limit in limits])
     names = (*SIDES, *settings.robot.joint_names)
     found = []

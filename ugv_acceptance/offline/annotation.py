@@ -25,8 +25,8 @@ from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.alerts.tipping_watch import TippingWatch
 from ugv_acceptance.evaluation.ground import KINDS
-from ugv_acceptance.evaluation.live import Margins
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
 from ugv_acceptance.model.robot import Payload
@@ -271,5 +271,7 @@ def _margins(rows: MarginRows) -> Iterator[tuple[int, int, Margins | None]]:
             yield now, stamp, None
             continue
         q, gravity, torque, angle, moment, energy, zmp, state = line
-        stability = Stability(tuple(angle), tuple(moment), tuple(energy), zmp, state)
-        yield now, stamp, Margins(now, stamp, tuple(q), tuple(gravity), tuple(torque), stability)
+        angles = tuple(angle)
+        stability = Stability(angles, tuple(moment), tuple(energy), zmp, state)
+        given = now, stamp, tuple(q), tuple(gravity), tuple(torque), angles, state, stability
+        yield now, stamp, Margins(*given)

@@ -11,7 +11,7 @@ from ugv_acceptance.evaluation.advice.tipped import STAND_CLEAR
 from ugv_acceptance.evaluation.alerts.alarms import Change
 from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.evaluation.effort.understanding import understand
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.monitoring.advisory import Advisory
 from ugv_acceptance.monitoring.session import Session

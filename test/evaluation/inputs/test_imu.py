@@ -32,7 +32,8 @@ from scipy.signal import lfilter
 from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.inputs.imu import ImuTracker
 from ugv_acceptance.evaluation.inputs.low_pass import LowPass
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import ImuInput
 from ugv_acceptance.model.robot import Vector
 

@@ -25,7 +25,8 @@ from scipy.spatial.transform import Rotation
 
 from ugv_acceptance.evaluation.alerts.messages import describe
 from ugv_acceptance.evaluation.alerts.state_machine import STALE, Alert
-from ugv_acceptance.evaluation.live import LiveEvaluator, Margins
+from ugv_acceptance.evaluation.live import LiveEvaluator
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Settings
 from ugv_acceptance.model.robot import Joint, Link, Matrix, Vector
 

@@ -173,8 +173,7 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
         terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]
         near = footings_of(mechanics, posture.contacts, moved=True)
         rocking = [f.rocking for f in near if f.polygon == footing.polygon] or [footing.rocking]
-        moved = replace(
-            stance,
+        moved = stance._replace(
             footing=replace(footing, rocking=rocking[0]),
             terms=tuple(map(float, terms)),
             mass=posture.mass,

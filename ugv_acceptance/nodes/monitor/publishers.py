@@ -16,7 +16,7 @@ from visualization_msgs.msg import MarkerArray
 
 from ugv_acceptance.bag.encode import JointStateBytes
 from ugv_acceptance.bag.encode_views import markers_cdr, point_cdr, polygon_cdr
-from ugv_acceptance.evaluation.live import Margins
+from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.diagnostics import Status
 from ugv_acceptance.monitoring.drawing import (
