@@ -29,7 +29,7 @@ from ugv_acceptance.evaluation.inputs.payload import payload_fault, payload_from
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
 from ugv_acceptance.evaluation.sample_margins import LEVEL, Margins
 from ugv_acceptance.evaluation.settings import Settings
-from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_of
+from ugv_acceptance.model.mechanics import Mechanics, Posture, mechanics_of, posture_at
 from ugv_acceptance.model.reactions import standing_torque
 from ugv_acceptance.model.robot import Payload, Vector
 from ugv_acceptance.model.shortened_tracks import has_tracks
@@ -41,7 +41,7 @@ from ugv_acceptance.model.stability import (
     Stance,
     stances_of,
     standing,
-    tip_angles_of,
+    tip_angles_at,
 )
 from ugv_acceptance.model.statics import torque_of
 
@@ -71,7 +71,16 @@ class LiveEvaluator:
     ground: GroundContact = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     posture: Posture | None = None
+    _q: tuple[float, ...] = ()
     _stances: tuple[Stance, ...] = ()
+    _judged: tuple[Posture | None, Vector, tuple[float, ...], tuple[float, ...], int] = (
+        None,
+        NOWHERE,
+        (),
+        (),
+        0,
+    )
+    _loud: bool = True
     _gravity: Vector = NOWHERE
     _began: int | None = None
     _known_until: int | None = None
@@ -151,14 +160,18 @@ class LiveEvaluator:
 
     def _stand(self) -> None:
         """Take the newest joint positions, which are known, with the newest payload."""
-        load = self.payload
+        load, q = self.payload, tuple(self.joints.q)
         if not self.load_known:
             self.posture, self._stances = None, ()
             return
-        self.posture = posture_of(self._mechanics, self.joints.q, load.mass, load.cog)
+        pose = self.chassis.pose
+        if self.posture is not None and pose is not None and load is pose[1] and q == self._q:
+            return  # nothing moved
+        self._q = q
+        self.posture = posture_at(self._mechanics, q, load.mass, load.cog)
         self._stances = stances_of(self._mechanics, self.posture)
-        self.chassis.pose = tuple(self.joints.q), load
-        self.ground.stands(self.joints.q, load.cog)
+        self.chassis.pose = q, load
+        self.ground.stands(q, load.cog)
 
     def imu(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -233,12 +246,10 @@ class LiveEvaluator:
         carried = settings.robot.payload
         if carried not in (self.settings.robot.payload, self.payload):
             self.payload, self.load_known = carried, True
-        self.settings = self.watch.settings = self.ground.settings = settings
+        self.settings = self.ground.settings = settings
         self.mount.learn(settings)
         self._imu.adopt(self.mount.applied(settings))
-        self.watch.trend.adopt(settings)
-        for signal, other in zip(self.watch.signals, RuleSet(settings).signals, strict=True):
-            signal.judge_by(other.rule)
+        self.watch.adopt(settings)
         for fresh in self.fresh:
             fresh.judge_by(settings.delays)
 
@@ -341,14 +352,13 @@ class LiveEvaluator:
         if posture is None or stance is None or unknown:
             return None
         self._known_until = until
-        hanging, points = torque_of(posture, gravity), stance.points
-        torque: Any = standing_torque(self._mechanics, posture, points, gravity, hanging)
+        if posture is not self._judged[0] or gravity != self._judged[1]:
+            self._judged = posture, gravity, *self._judge(posture, stance)
+        _, _, torque, angle, state = self._judged
         if touch == PERMITTED:
             torque = (math.nan,) * len(torque)
-        found: Any = LEVEL if self._level else tip_angles_of(stance, gravity)
-        angle, state = found
         self._watch(now, torque, angle, state)
-        q, stands = tuple(self.joints.q), NOT_KNOWN if self._level else stance
+        q, stands = self._q, NOT_KNOWN if self._level else stance
         self.margins = Margins(now, stamp, q, gravity, torque, angle, state, stands)
         self.evaluated += 1
         prediction = self.watch.prediction
@@ -359,22 +369,23 @@ class LiveEvaluator:
                 self.watch.trend.keep(now, angle, q, gravity, pose[1])
         return self.margins
 
+    def _judge(
+        self, posture: Posture, stance: Stance
+    ) -> tuple[tuple[float, ...], tuple[float, ...], int]:
+        """Return static torques, tip angles and state under the newest gravity."""
+        gravity, points = self._gravity, stance.points
+        hanging = torque_of(posture, gravity)
+        torque: Any = standing_torque(self._mechanics, posture, points, gravity, hanging)
+        return torque, *(LEVEL if self._level else tip_angles_at(stance, gravity))
+
     def _watch(
         self, now: int, torque: tuple[float, ...], angles: tuple[float, ...], state: int
     ) -> None:
-        watch = self.watch
-        for (warn, error), tau in zip(watch.torque, torque, strict=True):
-            value = abs(tau)
-            if value >= warn.on or not (warn.quiet and error.quiet):
-                value = -math.inf if math.isnan(value) else value  # not known is not too much
-                warn.step(now, value)
-                error.step(now, value)
-        if not self.settings.judges_tilt:
+        watch, tips = self.watch, self.settings.judges_tilt
+        if self._loud or not watch.is_small(torque, angles):
+            self._loud = watch.step(now, torque, angles if tips else ())
+        if not tips:
             return
-        for (warn, error), angle in zip(watch.tip, angles, strict=True):
-            if -angle >= warn.on or not (warn.quiet and error.quiet):
-                warn.step(now, -angle)
-                error.step(now, -angle)
         if watch.slide.on < math.inf:
             friction = self.settings.limits.friction
             watch.slide.step(now, float(slides_first(self._gravity, min(angles), friction)))

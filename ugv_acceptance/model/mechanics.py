@@ -240,6 +240,13 @@ def posture_of(mechanics: Mechanics, q: Sequence[Number], mass: Number, cog: Tri
     return Posture(*mechanics.posture.run(*q, mass, *cog))
 
 
+def posture_at(
+    mechanics: Mechanics, q: Sequence[float], mass: float, cog: tuple[float, float, float]
+) -> Posture:
+    """Return `posture_of` of numbers, without asking whether there are arrays among them."""
+    return Posture(*mechanics.posture.one(*q, mass, *cog))
+
+
 def posture_once(
     robot: Robot, q: Sequence[float], mass: float, cog: tuple[float, float, float]
 ) -> Posture:

@@ -9,7 +9,7 @@ accelerometer in place of gravity it is minus the specific force.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.edges import SIDES, Edges, corners_of, edges_of, side_of
 from ugv_acceptance.model.expressions import Number
+from ugv_acceptance.model.feet import feet_of
 from ugv_acceptance.model.mechanics import (
     Mechanics,
     Posture,
@@ -118,7 +119,20 @@ def stances_of(mechanics: Mechanics, posture: Posture) -> tuple[Stance, ...]:
     footings = footings_of(mechanics, contacts)
     if not footings:
         return (Stance(None, (), (), posture.mass, _nowhere(contacts), None),)
+    if footings is feet_of(mechanics).alone:
+        footing, sides, _, _, state, edges = _on_tracks(mechanics)
+        return (Stance(footing, sides, posture.cog, posture.mass, state, edges),)
     return tuple([_stance(mechanics, posture, footing) for footing in footings])
+
+
+@lru_cache(maxsize=64)
+def _on_tracks(mechanics: Mechanics) -> Stance:
+    """Return how a robot stands whose level tracks alone carry it; but for what moves."""
+    (footing,) = feet_of(mechanics).alone
+    corners = corners_of(mechanics, footing.polygon)
+    assert corners.sides is not None  # noqa: S101 - for the type checker: tracks do not move
+    edges = edges_of(mechanics, corners, corners.sides)
+    return Stance(footing, corners.sides, (), math.nan, _state_on(footing), edges)
 
 
 def _stance(mechanics: Mechanics, posture: Posture, footing: Footing) -> Stance:
@@ -286,6 +300,16 @@ def tip_angles_of(stance: Stance, gravity: Triple) -> tuple[tuple[Number, ...], 
     if not isinstance(state, int) and (state >= FREE_FALL).any():
         angle = _without(state >= FREE_FALL, angle)
     return angle, state
+
+
+def tip_angles_at(stance: Stance, gravity: tuple[float, float, float]) -> tuple[Any, int]:
+    """Return `tip_angles_of` of numbers, without asking whether there are arrays among them."""
+    state: Any = _state(stance.state, gravity)
+    edges: Any = stance.edges
+    if edges is None or state >= FREE_FALL:
+        return _NONE, state
+    rocking = (stance.rocking,) if edges.rocks else ()
+    return edges.angles.one(*stance.terms, stance.mass, *gravity, *rocking), state
 
 
 def _without(none: NDArray[np.bool_], values: Sequence[Number]) -> tuple[Number, ...]:

@@ -7,7 +7,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from operator import mul
+from operator import gt, lt, mul
 
 from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
@@ -59,25 +59,42 @@ class Trends:
     load: list[tuple[float, int]] = field(init=False)
     _recent: deque[Margins] = field(default_factory=lambda: deque(maxlen=SPAN // SPACING + 1))
     _due: int = 0
+    # The least tilts and the largest torques so far, under the limits of these settings.
+    _least: list[float] = field(init=False)
+    _most: list[float] = field(default_factory=list)
+    _of: Settings | None = None
 
     def __post_init__(self) -> None:
         self.tilt = [(math.inf, 0)] * len(SIDES)
+        self._least = [math.inf] * len(SIDES)
         self.load = [(math.inf, 0)] * len(self.settings.robot.joint_names)
 
     def see(self, margins: Margins) -> None:
         """Take the margins of one message."""
-        for k, angle in enumerate(margins.angle):
-            if angle < self.tilt[k][0]:
-                self.tilt[k] = (float(angle), margins.time)
-        for j, (tau, limit) in enumerate(
-            zip(margins.torque, self.settings.limits.torque, strict=True)
-        ):
-            left = limit - abs(tau)
-            if left < self.load[j][0]:
-                self.load[j] = (left, margins.time)
+        if any(map(lt, margins.angle, self._least)):
+            for k, angle in enumerate(margins.angle):
+                if angle < self.tilt[k][0]:
+                    self.tilt[k] = (float(angle), margins.time)
+            self._least = [left for left, _ in self.tilt]
+        if self.settings is not self._of or any(map(gt, map(abs, margins.torque), self._most)):
+            self._see_loads(margins)
         if margins.time >= self._due:
             self._due = margins.time + SPACING
             self._recent.append(margins)
+
+    def _see_loads(self, margins: Margins) -> None:
+        """Take torques of which one is the largest yet, or the limits are new."""
+        limits = self.settings.limits.torque
+        for j, (tau, limit) in enumerate(zip(margins.torque, limits, strict=True)):
+            left = limit - abs(tau)
+            if left < self.load[j][0]:
+                self.load[j] = (left, margins.time)
+        before = self._most if self.settings is self._of else [-math.inf] * len(limits)
+        self._most = [
+            most if tau != tau else max(most, abs(tau))  # noqa: PLR0124 - NaN
+            for most, tau in zip(before, margins.torque, strict=True)
+        ]
+        self._of = self.settings
 
     def recent(self, now: int) -> list[Margins]:
         """Return margins of the last second before `now` (ns), 50 ms or more apart."""

@@ -1,7 +1,10 @@
 """The rules of alerts: which value is watched against which limit, live and recorded alike."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from operator import neg
 
 from ugv_acceptance.evaluation.alerts.prediction import Prediction, foresight_of
 from ugv_acceptance.evaluation.alerts.state_machine import ERROR, STALE, WARN, Alert, Rule, Signal
@@ -79,6 +82,7 @@ class RuleSet:
     relaxed: dict[str, Signal] = field(init=False)
     signals: tuple[Signal, ...] = field(init=False)
     _told: Settings | None = None
+    _first: tuple[tuple[float, ...], float] = field(init=False)
 
     def __post_init__(self) -> None:
         limits, names = self.settings.limits, self.settings.robot.joint_names
@@ -118,6 +122,43 @@ class RuleSet:
         self.trend = TippingWatch(self.settings, self._trend())
         self.relaxed = {name: self._relaxed(name) for name in names_of(self.settings)}
         self.signals = self._all()
+        self._first = self._first_limits()
+
+    def adopt(self, settings: Settings) -> None:
+        """Judge by other settings from now on; an active alert keeps the rule it was raised by."""
+        self.settings = settings
+        self.trend.adopt(settings)
+        for signal, other in zip(self.signals, RuleSet(settings).signals, strict=True):
+            signal.judge_by(other.rule)
+        self._first = self._first_limits()
+
+    def _first_limits(self) -> tuple[tuple[float, ...], float]:
+        """Return the torques (N m; N) and the tip angle (rad) at which the first alerts begin."""
+        return tuple([warn.on for warn, _ in self.torque]), -min(warn.on for warn, _ in self.tip)
+
+    def is_small(self, torque: Sequence[float], angle: Sequence[float]) -> bool:
+        """Return whether torques (j,) and tip angles (4,) are far from any limit, or not known."""
+        most, least = self._first
+        for tau, limit in zip(torque, most, strict=True):
+            if tau >= limit or tau <= -limit:
+                return False
+        return not min(angle) <= least
+
+    def step(self, now: int, torque: Sequence[float], angle: Sequence[float]) -> bool:
+        """Take static torques (j,) and tip angles (4,; none: not judged) of a message at `now`.
+
+        Return whether any of their signals is not quiet now.
+        """
+        # A torque that is not known is not too much; a tilt that is not known changes nothing.
+        loads = [-math.inf if tau != tau else abs(tau) for tau in torque]  # noqa: PLR0124 - NaN
+        loud = False
+        for signals, values in ((self.torque, loads), (self.tip, map(neg, angle))):
+            for (warn, error), value in zip(signals, values, strict=False):
+                if value >= warn.on or not (warn.quiet and error.quiet):
+                    warn.step(now, value)
+                    error.step(now, value)
+                    loud = loud or not (warn.quiet and error.quiet)
+        return loud
 
     def relax(self, now: int) -> None:
         """Raise a warning for each limit that is relaxed at `now` (ns), and end the others."""

@@ -47,6 +47,8 @@ class ParameterDesk:
         self.settings: Settings | None = None
         self.tunables: tuple[TunableParameter, ...] = ()
         self.only_operators = False
+        # Settings and payload for which the payload's parameters were last compared.
+        self._told: tuple[object, object] = (None, None)
         declare_all(node)
         node.add_on_set_parameters_callback(self._judge)
         node.add_post_set_parameters_callback(self._take)
@@ -76,7 +78,14 @@ class ParameterDesk:
 
     def tell_load(self) -> None:
         """Set the payload's parameters to the payload in use after a message has changed it."""
-        if self.settings is None or self._in_force(self.settings) == self.settings:
+        session = self._session()
+        if self.settings is None or session is None:
+            return
+        at = self.settings, session.evaluator.payload
+        if at[0] is self._told[0] and at[1] is self._told[1]:
+            return
+        self._told = at
+        if self._in_force(self.settings) == self.settings:
             return
         self.settings = self._in_force(self.settings)
         told = [
