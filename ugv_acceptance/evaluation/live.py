@@ -71,6 +71,7 @@ class LiveEvaluator:
     ground: GroundContact = field(init=False)
     fresh: tuple[InputTimeout, InputTimeout] = field(init=False)
     posture: Posture | None = None
+    _oldest: int = field(init=False)
     _q: tuple[float, ...] = ()
     _stances: tuple[Stance, ...] = ()
     _judged: tuple[Posture | None, Vector, tuple[float, ...], tuple[float, ...], int] = (
@@ -91,6 +92,7 @@ class LiveEvaluator:
         self.payload = self.settings.robot.payload
         self._mechanics = mechanics_of(self.settings.robot)
         self.joints = JointMerger(self.settings, self.watch.jump_signals)
+        self._oldest = min(self.joints.seen, default=FOREVER)
         self.mount = ImuMount(self.settings, *self.watch.mounting)
         placed = self.mount.applied(self.settings)
         self._imu = ImuTracker(placed, self.watch.attitude)
@@ -139,7 +141,8 @@ class LiveEvaluator:
             if unusable and not watch.joints.invalid.raw:
                 watch.joints.invalid.detail = words.why_unusable(joints)
             watch.joints.invalid.step(now, 1.0 if unusable else 0.0)
-        limit, oldest = self.fresh[0].limit, min(joints.seen)
+        limit = self.fresh[0].limit
+        self._oldest = oldest = min(joints.seen)
         # A joint that was never told has STARTUP to come: another node may tell it, more slowly.
         late = oldest != NEVER or now - joints.began > STARTUP
         old = (late and now - oldest > limit) or joints.doubted
@@ -327,10 +330,10 @@ class LiveEvaluator:
     def _alive_until(self) -> int:
         """Return the time (ns) until which the newest messages count; NEVER if one is missing."""
         joints, imu = self.fresh
-        seen = min(self.joints.seen, default=FOREVER)
-        if seen == NEVER or imu.last is None or self.joints.repeating:
+        if self._oldest == NEVER or imu.last is None or self.joints.repeating:
             return NEVER
-        return min(seen + joints.limit, imu.last + imu.limit)
+        one, other = self._oldest + joints.limit, imu.last + imu.limit
+        return min(other, one)
 
     def _lose(self, now: int) -> None:
         """Take that margins are unknown at `now` (ns): since they were stale, or from now on."""

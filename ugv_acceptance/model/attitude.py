@@ -5,9 +5,9 @@
 NaN.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from ugv_acceptance.model.expressions import (
     Scalar,
@@ -90,6 +90,23 @@ def up_from_acceleration(x: Values, y: Values, z: Values, mounting: Matrix) -> t
     """Return `up` (unit, `base_link`) from a specific force in sensor axes: +g upwards at rest."""
     ux, uy, uz = _acceleration_kernel(mounting).run(x, y, z)
     return ux, uy, uz
+
+
+class UpKernels(NamedTuple):
+    """What `up_from_orientation`, `up_from_acceleration` and `angle_between` compute, of numbers.
+
+    For one mounting of the IMU, without a look into a table for each message.
+    """
+
+    orientation: Callable[..., tuple[float, float, float]]
+    acceleration: Callable[..., tuple[float, float, float]]
+    between: Callable[..., tuple[float]]
+
+
+def up_kernels(mounting: Matrix) -> UpKernels:
+    """Return the kernels of one mounting (rotation matrix from sensor axes to `base_link`)."""
+    found: list[Any] = [_orientation_kernel(mounting), _acceleration_kernel(mounting)]
+    return UpKernels(*(kernel.one for kernel in (*found, _angle_kernel())))
 
 
 def rotation_of(x: float, y: float, z: float, w: float) -> Matrix:

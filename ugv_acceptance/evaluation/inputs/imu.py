@@ -24,9 +24,11 @@ from ugv_acceptance.evaluation.inputs.low_pass import BELIEVABLE, NOWHERE, LowPa
 from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.attitude import (
+    UpKernels,
     angle_between,
     up_from_acceleration,
     up_from_orientation,
+    up_kernels,
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
 from ugv_acceptance.model.robot import Vector
@@ -93,12 +95,14 @@ class ImuTracker:
     motion: MotionChecks = field(init=False)
     seen: ImuSeen = field(default_factory=ImuSeen)
     _rest: RestChecks = field(init=False)
+    _up: UpKernels = field(init=False)
     _frame: str | None = None
     _foreign: float = 0.0
     _busy: bool = False
 
     def __post_init__(self) -> None:
         self.low_pass = LowPass(self.settings.imu.low_pass)
+        self._up = up_kernels(self.settings.imu.mounting)
         self.motion = MotionChecks(self.settings, self.faults.motion)
         of = self.faults
         self._rest = RestChecks(of.strange, of.disagreement, self.settings.robot.gravity)
@@ -117,6 +121,7 @@ class ImuTracker:
         """Judge by other settings from now on."""
         self.settings = settings
         self.motion.adopt(settings)
+        self._up = up_kernels(settings.imu.mounting)
 
     def step(  # noqa: PLR0913, PLR0917 - the fields of the message
         self,
@@ -135,21 +140,22 @@ class ImuTracker:
         numbers against each other needs no joints.
         """
         smooth = self.low_pass.step(stamp, acceleration)
-        size, imu, g = _norm(smooth), self.settings.imu, self.settings.robot.gravity
+        ax, ay, az = smooth
+        wx, wy, wz = omega
+        size, spin = math.sqrt(ax * ax + ay * ay + az * az), math.sqrt(wx * wx + wy * wy + wz * wz)
+        imu, g, up = self.settings.imu, self.settings.robot.gravity, self._up
         if frame != self._frame:
-            if self._frame is not None:
-                self.motion.frame(now)
-            self._frame, self._foreign = frame, _foreign(frame, imu.frame)
+            self._take_frame(now, frame)
         x, y, z, w = orientation
-        spin, off = _norm(omega), abs(size - g)
+        off = abs(size - g)
         still = spin <= imu.rest_rate
         rotation = covariance_0 != -1.0 and bool(_is_rotation(x, y, z, w))
         told = rotation and not (imu.attitude == 'auto' and x == y == z == 0.0)
         shown, apart = off <= GRAVITY_SLACK * g, math.nan
-        by_orientation = up_from_orientation(x, y, z, w, imu.mounting) if rotation else NOWHERE
-        by_acceleration = up_from_acceleration(*smooth, imu.mounting) if shown else NOWHERE
+        by_orientation = up.orientation(x, y, z, w) if rotation else NOWHERE
+        by_acceleration = up.acceleration(*smooth) if shown else NOWHERE
         if rotation and shown and still and off <= imu.rest_acceleration:
-            apart = angle_between(by_orientation, by_acceleration)
+            (apart,) = up.between(*by_orientation, *by_acceleration)
         self.taken[0 if told else 1 if covariance_0 == -1.0 else 2] += 1
         empty = 0.0 if told or covariance_0 == -1.0 else _empty(rotation, apart, imu)
         strange = off / g if still else math.nan
@@ -157,24 +163,28 @@ class ImuTracker:
         doubted = apart if told else math.nan
         of, rest, motion = self.faults, self._rest, self.motion
         # Small values cannot change quiet signals: most calls are saved.
-        seen = self._busy or self._foreign or empty >= 0.5 or rest.pending
-        seen = seen or strange >= of.strange.on or doubted >= of.disagreement.on
-        lost = seen and self._judge(now, empty, strange, doubted)
-        if raw is None:
-            motion.step(now, stamp, orientation, omega, acceleration, told)
-        else:
-            motion.step(now, stamp, *raw, told)
+        seen = strange >= of.strange.on or doubted >= of.disagreement.on or empty >= 0.5
+        waits = self._busy or self._foreign or rest.pending
+        lost = (seen or waits) and self._judge(now, empty, strange, doubted)
+        motion.step(now, stamp, *(raw or (orientation, omega, acceleration)), told)
         if imu.specific_force:
             known = believable and size >= FALL * g
             down = _force(smooth, omega, imu) if known else NOWHERE
         elif not believable and imu.attitude == 'auto':
             known, down = False, NOWHERE
         else:
-            up = by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
-            known, down = up[0] == up[0], (-g * up[0], -g * up[1], -g * up[2])
+            ux, uy, uz = (
+                by_orientation if told and imu.attitude != 'accelerometer' else by_acceleration
+            )
+            known, down = ux == ux, (-g * ux, -g * uy, -g * uz)  # noqa: PLR0124 - not NaN
         if not (known and of.nothing.quiet):
             of.nothing.step(now, off / g if believable and not known else 0.0)
         return NOWHERE if lost or motion.lost else down, not believable
+
+    def _take_frame(self, now: int, frame: str) -> None:
+        if self._frame is not None:
+            self.motion.frame(now)
+        self._frame, self._foreign = frame, _foreign(frame, self.settings.imu.frame)
 
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
         """Feed the fault signals with a message; return whether a fault makes gravity unknown."""
@@ -356,11 +366,6 @@ def _empty_rows(rotation: Mask, apart: Floats, imu: ImuInput) -> Floats:
         return np.zeros(len(apart))
     denied = np.where(np.isnan(apart), np.nan, apart >= imu.agreement)
     return np.where(rotation, denied, 1.0)
-
-
-def _norm(v: Sequence[float]) -> float:
-    x, y, z = v
-    return math.sqrt(x * x + y * y + z * z)
 
 
 def _lines(tables: Sequence[Floats]) -> Floats:
