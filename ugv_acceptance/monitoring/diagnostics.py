@@ -17,7 +17,7 @@ from ugv_acceptance.evaluation.inputs.joint_words import held_words
 from ugv_acceptance.evaluation.least_margins import least_tilt, tilt_not_checked, with_most_used
 from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.margin_words import share_words
-from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed, relaxed_words
+from ugv_acceptance.evaluation.permitted_limits import UNSAFE, relaxed_words
 from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
@@ -83,7 +83,7 @@ def _worst(
     """Return the verdict while alerts are active: that of the most severe one."""
     alarm_tracker, advisory = session.alarm_tracker, session.advisory
     first = max(active, key=lambda a: (*_severity(a), not alarm_tracker.acknowledged(a)))
-    words = relaxed_words(session.settings)
+    words = relaxed_words(session.settings) if session.relaxed else ''
     if words and first.rule.code != 'LIMITS_RELAXED':  # else it says so itself
         left = f'{left}; {words}'
     more = f' (and {len(active) - 1} more)' if len(active) > 1 else ''
@@ -108,9 +108,8 @@ def _more(left: str, sentence: str) -> list[str]:
 def _limits(session: Session) -> dict[str, object]:
     """Return the hash of the limits in force, what is wider than permitted, and if the hand may."""
     values: dict[str, object] = {'limits_hash': session.limits_hash}
-    found = relaxed(session.settings)
-    if found:
-        names = ', '.join(breach.name for breach in found)
+    if session.relaxed:
+        names = ', '.join(breach.name for breach in session.relaxed)
         values |= {'limits_relaxed': names, UNSAFE: session.settings.unsafe}
     if session.settings.hand_may_touch:
         values['hand_may_touch'] = True

@@ -16,7 +16,7 @@ from ugv_acceptance.bag.cdr import imu_decoder, joint_state_decoder, payload_dec
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.criteria.uncertainty import Source
 from ugv_acceptance.evaluation.live import LiveEvaluator
-from ugv_acceptance.evaluation.permitted_limits import limits_hash
+from ugv_acceptance.evaluation.permitted_limits import Breach, limits_hash, relaxed
 from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.advisory import Advisory
@@ -82,8 +82,9 @@ class Session:
     its own header stamp (ns); `on_change()` when alerts or level changed; `on_problem(text)` for
     the log. `clock` dates what comes in, `stamps` converts header stamps to its time; `sources` are
     of uncertainty: a margin that is kept by less than its bound is told. `pool` computes what takes
-    longer than a message: a thread, unless simulated time has to wait for it. `take_joint_state`,
-    `take_imu` and `take_payload` take a serialised message and never raise.
+    longer than a message: a thread, unless simulated time has to wait for it. `relaxed` are the
+    limits in force that are wider than permitted. `take_joint_state`, `take_imu` and `take_payload`
+    take a serialised message and never raise.
     """
 
     settings: Settings
@@ -107,11 +108,12 @@ class Session:
     certainty: Certainty = field(init=False)
     rates: dict[str, float] = field(default_factory=dict)
     limits_hash: str = field(init=False)
+    relaxed: tuple[Breach, ...] = field(init=False)
     _known: bool = False
 
     def __post_init__(self) -> None:
         self.evaluator = LiveEvaluator(self.settings)
-        self.limits_hash = limits_hash(self.settings)
+        self._tell_limits()
         log = self.evaluator.watch.log
         self.faults, self.alarm_tracker = Faults(log), AlarmTracker(log)
         self.trends = Trends(self.settings)
@@ -181,9 +183,13 @@ class Session:
     def adopt(self, settings: Settings) -> None:
         """Judge by other limits and delays from now on; learnt periods and active alerts stay."""
         self.settings = self.trends.settings = self.certainty.settings = settings
-        self.limits_hash = limits_hash(settings)
+        self._tell_limits()
         self.evaluator.adopt(settings)
         self.tick()
+
+    def _tell_limits(self) -> None:
+        self.limits_hash = limits_hash(self.settings)
+        self.relaxed = tuple(relaxed(self.settings))
 
     def _look(self) -> None:
         known = self.evaluator.margins is not None

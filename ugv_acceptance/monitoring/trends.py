@@ -63,6 +63,9 @@ class Trends:
     _least: list[float] = field(init=False)
     _most: list[float] = field(default_factory=list)
     _of: Settings | None = None
+    # What was asked for last: at which time, by which newest margins and settings; the answer.
+    _asked: tuple[int, Margins | None, Settings | None] = (0, None, None)
+    _ahead: tuple[Ahead, ...] = ()
 
     def __post_init__(self) -> None:
         self.tilt = [(math.inf, 0)] * len(SIDES)
@@ -123,6 +126,12 @@ class Trends:
 
         Empty if there are too few samples in the last second before `now` (ns).
         """
+        asked = now, self._recent[-1] if self._recent else None, self.settings
+        if self._asked != asked:
+            self._asked, self._ahead = asked, self._ahead_at(now)
+        return self._ahead
+
+    def _ahead_at(self, now: int) -> tuple[Ahead, ...]:
         recent = self.recent(now)
         if len(recent) < LEAST:
             return ()

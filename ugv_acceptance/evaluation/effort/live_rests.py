@@ -21,7 +21,8 @@ from ugv_acceptance.evaluation.effort.understanding import Understanding
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Floats
 
-# So many rests are remembered. Samples of one rest before its efforts are judged, and again.
+# So many rests are remembered. Samples of one rest before its efforts are judged, and again: after
+# AGAIN, twice, four times as many ..., as the means of a longer rest change less and less.
 KEPT, FIRST, AGAIN = 40, 3, 10
 # A static torque that changes by this share of the largest in one posture is another load declared.
 DECLARED = 0.03
@@ -105,7 +106,8 @@ class LiveRests:
             self._rests = [*self._rests[1 - KEPT :], rest]
         else:
             rest.take(now, (e, t, p, g))
-        return rest.count == FIRST or rest.count % AGAIN == 0
+        tens, odd = divmod(rest.count, AGAIN)
+        return rest.count == FIRST or (not odd and not tens & (tens - 1))
 
     def _goes_on(self, rest: _Rest, sample: tuple[Floats, Floats, Floats, Floats]) -> bool:
         effort, torque, q, gravity = sample
