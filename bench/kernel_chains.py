@@ -11,6 +11,7 @@ in one run.
 import math
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -117,7 +118,7 @@ def print_chains() -> None:
         q = [0.02 * (-1) ** k for k in range(n)]
         values = (*q, robot.payload.mass, *robot.payload.cog)
         lines = kernel.source.count(' = ')
-        ours = microseconds(lambda kernel=kernel, values=values: kernel.one(*values))
+        ours = microseconds(partial(kernel.one, *values))
         message = microseconds(live_call(robot, q))
         theirs = microseconds(pinocchio_call(robot, q))
         slopes = [

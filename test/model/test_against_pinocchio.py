@@ -126,7 +126,7 @@ def test_what_a_contact_point_far_out_puts_on_the_joints_is_pinocchio_s(joints: 
         found = np.zeros(joints)
         for (joint, point), load in zip(mechanics.carried, posture.loads, strict=True):
             if point == number:
-                found[joint] = np.dot(load, gravity)
+                found[joint] = np.asarray(load) @ gravity
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(empty).max())
 
 

@@ -14,8 +14,8 @@ from typing import Any
 # steps of up to two seconds.
 RECENT_NS = 2_000_000_000
 _SECOND_NS = 1_000_000_000
-# What the file systems of fsspec call it. Where a store tags, its time is kept in whole seconds:
-# some list it finer than they tell it of a single object.
+# What the file systems of fsspec call it. Of a store with tags the time is kept in whole seconds
+# and the tag without quotes: some list the one finer, or the other barer, than for one object.
 _TAGS = ('ETag', 'etag', 'md5Hash')
 _CHANGED = ('LastModified', 'last_modified', 'mtime')
 _IDENTITY = ('ino', 'created')
@@ -47,7 +47,7 @@ def listed_mark(info: Mapping[str, Any], now_ns: int) -> str:
         return ''
     tag = next((info[name] for name in _TAGS if info.get(name)), None)
     if tag is not None:
-        return _mark(size, (changed // _SECOND_NS * _SECOND_NS,), str(tag), now_ns)
+        return _mark(size, (changed // _SECOND_NS * _SECOND_NS,), str(tag).strip('"'), now_ns)
     identity = ' '.join(str(info[name]) for name in _IDENTITY if name in info)
     return _mark(size, (changed,), identity, now_ns)
 
