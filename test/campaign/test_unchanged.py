@@ -285,7 +285,7 @@ def test_damaged_lines_of_the_memory_are_ignored_and_said(runs: Path, tmp_path: 
         _, effort = judged(runs, out)
         assert (effort.unchanged, effort.odd) == (
             1,
-            f'{memory}: 1 damaged lines; those runs are read again',
+            f'{memory}: damaged lines: 1; those runs are read again',
         )
         assert judged(runs, out)[1].unchanged == 2
 

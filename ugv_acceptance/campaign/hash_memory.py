@@ -72,7 +72,7 @@ def read_memory(folder: Path) -> HashMemory:
     memory.runs = dict(one for one in read if one is not None)
     damaged = read.count(None)
     if damaged:
-        memory.said = f'{memory.path}: {damaged} damaged lines; those runs are read again'
+        memory.said = f'{memory.path}: damaged lines: {damaged}; those runs are read again'
     # Lines that are damaged, cut off, or were replaced by a later one.
     if len(read) > len(memory.runs) or not text.endswith('\n'):
         text = ''.join(_line(name, one) for name, one in memory.runs.items())
