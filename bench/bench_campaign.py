@@ -4,7 +4,8 @@ FOLDER holds recordings, such as make_fleet.py writes; without it one-minute bag
 a real robot are written: joint states at 200 Hz, IMU at 400 Hz, zstd. The campaign runs in a fresh
 folder each time, one worker on one core alone. Wall times tell something on a quiet machine only,
 CPU times on any; starting the workers takes about a second. Says what 100,000 one-hour bags would
-cost, from the time a recorded hour takes.
+cost, from the time a recorded hour takes. With `--resume RUNS` it measures instead what resuming a
+campaign costs, beside listing its recordings alone: campaign_resume.py.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from bench.campaign_resume import print_resume
 from ugv_acceptance.campaign.carry_out import Place, carry_out
 from ugv_acceptance.campaign.pool import cores
 from ugv_acceptance.campaign.sources import find_sources
@@ -74,7 +76,11 @@ def main() -> None:
     parser.add_argument('--workers', type=int, default=cores())
     parser.add_argument('--bags', type=int, default=8, help='how many to make')
     parser.add_argument('--seconds', type=float, default=60.0, help='how long each')
+    parser.add_argument('--resume', type=int, metavar='RUNS', help='measure resuming so many')
     arguments = parser.parse_args()
+    if arguments.resume:
+        print_resume(arguments.resume, min(arguments.seconds, 5.0))
+        return
     with tempfile.TemporaryDirectory(prefix='bags-') as made:
         folder = arguments.folder or Path(made)
         if arguments.folder is None:

@@ -4,6 +4,7 @@ Ours gives torques and the tilt left to every edge, or also the edges' moments, 
 the loops give torques and the centre of mass alone. CPU seconds, best of rounds; ratios count.
 
     python -m bench.bench_kernels [postures]
+    python -m bench.bench_kernels --chains      # how the live cost grows with an arm's joints
 """
 
 import math
@@ -16,6 +17,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from bench.kernel_chains import print_chains
 from ugv_acceptance.config import load
 from ugv_acceptance.model.blocks import in_blocks
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
@@ -142,4 +144,7 @@ def main(count: int = 1_000_000) -> None:
 
 
 if __name__ == '__main__':
-    main(*(int(a) for a in sys.argv[1:]))
+    if sys.argv[1:] == ['--chains']:
+        print_chains()
+    else:
+        main(*(int(a) for a in sys.argv[1:]))

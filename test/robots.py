@@ -81,16 +81,17 @@ def tracked(tolerance: float = 0.005) -> Robot:
     )
 
 
-def random_robot(rng: np.random.Generator, feet: int, *, moving: int = 0) -> Robot:
+def random_robot(rng: np.random.Generator, feet: int, *, moving: int = 0, arm: int = 0) -> Robot:
     """Return a random tree of up to four joints that stands on the plane z = 0 with `feet` points.
 
     One point more hangs above the ground; `moving` further points, anywhere, are on random links.
+    With `arm` it is a chain of that many joints instead.
     """
     links = [Link('base_link', float(rng.uniform(5.0, 30.0)), _point(rng, 0.2, 0.1, 0.5))]
     joints = []
-    for k in range(int(rng.integers(1, 5))):
+    for k in range(arm or int(rng.integers(1, 5))):
         kind = 'prismatic' if rng.random() < 0.2 else 'revolute'
-        parent = links[int(rng.integers(len(links)))].name
+        parent = links[-1 if arm else int(rng.integers(len(links)))].name
         turn = _matrix(Rotation.random(random_state=int(rng.integers(2**31))))
         axis = rng.normal(size=3)
         x, y, z = (axis / np.linalg.norm(axis)).tolist()

@@ -8,42 +8,17 @@ from pathlib import Path
 
 import pytest
 from campaign.fleet import brief, campaign, said
+from campaign.s3_server import BUCKET, s3_server
 
 from ugv_acceptance.campaign.sources import Source, find_sources
 from ugv_acceptance.campaign.work import judge_source
-
-BUCKET = 'acceptance'
 
 
 @pytest.fixture(scope='module')
 def s3(fleet: Path) -> Iterator[str]:
     """The URL of the fleet in a bucket of moto's S3 server."""
-    server_module = pytest.importorskip('moto.server', reason='moto is not installed')
-    s3fs = pytest.importorskip('s3fs', reason='extra cluster is not installed')
-    server = server_module.ThreadedMotoServer(ip_address='127.0.0.1', port=0, verbose=False)
-    server.start()
-    patch = pytest.MonkeyPatch()
-    try:
-        host, port = server.get_host_and_port()
-        for name, value in (
-            ('FSSPEC_S3_ENDPOINT_URL', f'http://{host}:{port}'),
-            ('FSSPEC_S3_KEY', 'nobody'),
-            ('FSSPEC_S3_SECRET', 'secret'),
-            ('NO_PROXY', '127.0.0.1'),
-            ('AWS_EC2_METADATA_DISABLED', 'true'),
-        ):
-            patch.setenv(name, value)
-        system = s3fs.S3FileSystem(
-            key='nobody',
-            secret='secret',  # noqa: S106 - of a server for this test
-            endpoint_url=f'http://{host}:{port}',
-        )
-        system.mkdir(BUCKET)
-        system.put(f'{fleet}/', f'{BUCKET}/fleet', recursive=True)
-        yield f's3://{BUCKET}/fleet'
-    finally:
-        patch.undo()
-        server.stop()
+    with s3_server() as bucket:
+        yield bucket.put(fleet, 'fleet')
 
 
 def test_a_campaign_on_s3_is_that_of_the_folder(s3: str, fleet: Path, tmp_path: Path) -> None:

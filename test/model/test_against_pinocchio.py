@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from robots import random_robot
 
-from ugv_acceptance.model.mechanics import mechanics_of
+from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Link, Robot
 from ugv_acceptance.model.statics import centre_of_gravity, inverse_dynamics, static_torque
 from ugv_acceptance.model.tipping import inertia_of
@@ -97,6 +97,37 @@ def test_static_torque_is_rnea_at_rest(seed: int) -> None:
     theirs = np.array([twin.rnea(a, still, still, g) for a, g in zip(q, gravity, strict=True)])
     ours = static_torque(robot, q, gravity)
     assert np.abs(ours - theirs).max() <= 1e-9 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize('joints', [5, 9, 20])
+def test_a_long_arm_is_held_as_pinocchio_says(joints: int) -> None:
+    """Many joints in a chain, turning and sliding about any axes: torques agree to 1e-12."""
+    rng = np.random.default_rng(joints)
+    robot = random_robot(rng, 4, arm=joints)
+    twin, still = Twin(robot), np.zeros(joints)
+    q, gravity = rng.uniform(-3.0, 3.0, (10, joints)), 9.81 * rng.normal(size=(10, 3))
+    theirs = np.array([twin.rnea(a, still, still, g) for a, g in zip(q, gravity, strict=True)])
+    assert np.abs(static_torque(robot, q, gravity) - theirs).max() <= 1e-12 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize('joints', [5, 9, 20])
+def test_what_a_contact_point_far_out_puts_on_the_joints_is_pinocchio_s(joints: int) -> None:
+    """A kg at a contact point changes the torques by its levers, on every joint before it."""
+    rng = np.random.default_rng(joints)
+    robot = random_robot(rng, 4, moving=3, arm=joints)
+    q, gravity, still = rng.uniform(-3.0, 3.0, joints), 9.81 * rng.normal(size=3), np.zeros(joints)
+    empty = Twin(robot).rnea(q, still, still, gravity)
+    mechanics = mechanics_of(robot)
+    posture = posture_of(mechanics, q.tolist(), robot.payload.mass, robot.payload.cog)
+    for number, contact in enumerate(robot.contacts):
+        twin = Twin(robot)
+        twin.attach(Link(contact.link, 1.0, contact.position))
+        expected = twin.rnea(q, still, still, gravity) - empty
+        found = np.zeros(joints)
+        for (joint, point), load in zip(mechanics.carried, posture.loads, strict=True):
+            if point == number:
+                found[joint] = np.asarray(load) @ gravity
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(empty).max())
 
 
 @pytest.mark.parametrize('seed', SEEDS)

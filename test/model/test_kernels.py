@@ -2,12 +2,16 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from robots import random_robot
 
 from ugv_acceptance.model.expressions import Scalar, cos, sin, sqrt
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
+from ugv_acceptance.model.mechanics import mechanics_of
+from ugv_acceptance.model.robot import Contact
 
 
 def names(kernel: Kernel) -> int:
@@ -61,3 +65,16 @@ def test_sine_and_cosine_of_arrays_are_as_good_as_numpy_s() -> None:
     s, c = compile_kernel(lambda x: [sin(x), cos(x)], ['x']).many(x)
     np.testing.assert_allclose(s, np.sin(x), rtol=0, atol=1e-15)
     np.testing.assert_allclose(c, np.cos(x), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize('kernel', ['posture', 'holding', 'forces'])
+def test_the_work_grows_with_the_number_of_joints_not_with_its_square(kernel: str) -> None:
+    """Each further joint of an arm costs the same, contact points at its tip included."""
+    operations = []
+    for joints in (10, 20, 30, 40):
+        robot = random_robot(np.random.default_rng(1), 4, arm=joints)
+        tip = Contact('tip', robot.joints[-1].child, (0.1, 0.2, 0.3))
+        whole = replace(robot, contacts=(*robot.contacts, tip))
+        operations.append(getattr(mechanics_of(whole), kernel).source.count(' = '))
+    first, *more = np.diff(operations)
+    assert max(more) <= 1.2 * first

@@ -10,6 +10,7 @@ from ugv_acceptance.bag.atomic_files import naming, write_text
 from ugv_acceptance.campaign.cluster import WAIT_S
 from ugv_acceptance.campaign.failure_log import Entry
 from ugv_acceptance.campaign.failures import Failure, with_log
+from ugv_acceptance.campaign.hash_memory import HashMemory, read_memory
 from ugv_acceptance.campaign.pool import judge_all
 from ugv_acceptance.campaign.run_table import (
     NOT_JUDGED,
@@ -20,7 +21,7 @@ from ugv_acceptance.campaign.run_table import (
     unjudged_row,
 )
 from ugv_acceptance.campaign.sources import Source
-from ugv_acceptance.campaign.work import Brief, Done, judge_source
+from ugv_acceptance.campaign.work import Brief, Done, judge_source, key_of
 from ugv_acceptance.type_aliases import Json
 
 RUNS = 'runs'
@@ -74,11 +75,19 @@ class Place:
 
 @dataclass(slots=True)
 class Effort:
-    """The cost of a campaign: runs judged anew, bytes of their recordings, CPU time (s)."""
+    """The cost of a campaign: runs judged anew, bytes of their recordings, CPU time (s).
+
+    `unchanged` is how many runs were not read, since none of their files looked changed; `since` is
+    when the first of these was last read (UTC, ISO 8601). `odd` is a sentence where the memory of
+    hashes could not be used as it is, else ''.
+    """
 
     judged: int = 0
     size: int = 0
     cpu: float = 0.0
+    unchanged: int = 0
+    since: str = ''
+    odd: str = ''
 
 
 def carry_out(
@@ -86,23 +95,51 @@ def carry_out(
     brief: Brief,
     place: Place,
     progress: Callable[[Done], None] = lambda _: None,
+    *,
+    rehash: bool = False,
 ) -> tuple[list[Row], Effort]:
     """Judge every source, keep its result in the folder, and return the runs in order.
 
-    A run with a result in the folder is not judged again; a run that could not be judged is tried
-    again. `progress` is called with every run as it is ready.
+    A run with a result in the folder is not judged again; it is not even read if its files look as
+    they did when it was, unless `rehash`. A run that could not be judged is tried again. `progress`
+    is called with every run as it is ready.
     """
     prepare_folder(place.folder)
     brief = replace(brief, known=known_keys(place.folder))
-    rows, effort = [], Effort()
-    for done in judge_all(sources, brief, place.workers, place.scheduler, place.wait_s):
+    memory = read_memory(place.folder)
+    effort = Effort(odd=memory.said)
+    unread = {} if rehash else _unchanged(sources, brief, memory, place.folder, effort)
+    for source in unread:
+        progress(Done(source))
+    rows, rest = list(unread.values()), [s for s in sources if s not in unread]
+    judged = judge_all(rest, brief, place.workers, place.scheduler, place.wait_s) if rest else ()
+    for done in judged:
         rows.append(_row(done, brief, place.folder))
+        if done.sha256:
+            memory.add(done.source, done.sha256)
         effort.cpu += done.cpu
         if done.row is not None:
             effort.judged += 1
             effort.size += done.size
         progress(done)
     return in_order(rows), effort
+
+
+def _unchanged(
+    sources: Sequence[Source], brief: Brief, memory: HashMemory, folder: Path, effort: Effort
+) -> dict[Source, Row]:
+    """Return the rows of the runs whose result is known without reading them, and count them."""
+    found = {}
+    for source in sources:
+        remembered = memory.of(source)
+        if remembered is None or (key := key_of(remembered.sha256, brief)) not in brief.known:
+            continue
+        row = _stored_row(source.name, key, folder)
+        if row is not None:
+            found[source] = row
+            effort.since = min(effort.since or remembered.hashed, remembered.hashed)
+    effort.unchanged = len(found)
+    return found
 
 
 def _row(done: Done, brief: Brief, folder: Path) -> Row:
@@ -114,12 +151,19 @@ def _row(done: Done, brief: Brief, folder: Path) -> Row:
     if done.row is not None:
         keep_result(folder, done.key, done.text)
         return done.row
+    row = _stored_row(name, done.key, folder)
+    if row is not None:
+        return row
+    again = judge_source(done.source, replace(brief, known=frozenset()))
+    return _row(again, brief, folder)
+
+
+def _stored_row(name: str, key: str, folder: Path) -> Row | None:
+    """Return the row of a stored result; None if it is damaged, which counts as missing."""
     try:
-        return row_of(name, done.key, read_result(folder, done.key))
+        return row_of(name, key, read_result(folder, key))
     except (AcceptanceError, LookupError, TypeError, ValueError, AttributeError):
-        # A stored result that is damaged counts as missing.
-        again = judge_source(done.source, replace(brief, known=frozenset()))
-        return _row(again, brief, folder)
+        return None
 
 
 def all_failures(rows: Sequence[Row], entries: Sequence[Entry]) -> list[Failure]:

@@ -7,15 +7,17 @@ are. URLs are those fsspec knows (file, s3, gs, sftp, http, ...): it is imported
 import os
 import posixpath
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag, pip_install
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.metadata import SUFFIXES, numbered
+from ugv_acceptance.campaign.marks import listed_mark, local_mark
 from ugv_acceptance.campaign.not_judged import words
 
 
@@ -23,12 +25,19 @@ from ugv_acceptance.campaign.not_judged import words
 class Source:
     """One recording: its name (path or URL as found), its files, and whether fsspec fetches them.
 
-    The files of a rosbag2 folder include metadata.yaml.
+    The files of a rosbag2 folder include metadata.yaml. `marks` tell, for each file, whether it
+    changes (`marks.py`), '' where nothing tells that; () if nobody looked.
     """
 
     name: str
     files: tuple[str, ...]
     remote: bool = False
+    marks: tuple[str, ...] = field(default=(), compare=False)
+
+    @property
+    def marked(self) -> bool:
+        """Whether every file has a mark."""
+        return len(self.marks) == len(self.files) and all(self.marks)
 
 
 def is_url(place: str) -> bool:
@@ -43,14 +52,48 @@ def find_sources(places: Iterable[str]) -> list[Source]:
     """
     found: set[Source] = set()
     for place in places:
-        files = _remote_files(place) if is_url(place) else _local_files(place)
-        sources = sorted_out(files, remote=is_url(place))
-        if not sources:
+        now_ns = time.time_ns()
+        if is_url(place):
+            marks = _remote_files(place, now_ns)
+            sources = sorted_out(list(marks), remote=True)
+            marked = [replace(s, marks=tuple(marks[file] for file in s.files)) for s in sources]
+        else:
+            marked = [
+                replace(source, marks=_local_marks(source, now_ns))
+                for source in sorted_out(_local_files(place))
+            ]
+        if not marked:
             raise AcceptanceError(
                 f'{place}: expected recordings ({", ".join(SUFFIXES)}), found none'
             )
-        found.update(sources)
+        found.update(marked)
     return sorted(found)
+
+
+def is_unchanged(source: Source) -> bool:
+    """Return whether every file still is as it was when the source was found; False if unknown."""
+    if not source.marked:
+        return False
+    now_ns = time.time_ns()
+    if not source.remote:
+        return _local_marks(source, now_ns) == source.marks
+    try:
+        return all(
+            _looked_up(url, now_ns) == mark
+            for url, mark in zip(source.files, source.marks, strict=True)
+        )
+    except Exception:  # noqa: BLE001 - every protocol has its own errors
+        return False
+
+
+def _local_marks(source: Source, now_ns: int) -> tuple[str, ...]:
+    return tuple(local_mark(file, now_ns) for file in source.files)
+
+
+def _looked_up(url: str, now_ns: int) -> str:
+    system, path = _opened(url)
+    system.invalidate_cache(path)
+    return listed_mark(system.info(path), now_ns)
 
 
 def sorted_out(files: Sequence[str], *, remote: bool = False) -> list[Source]:
@@ -80,13 +123,20 @@ def _local_files(place: str) -> list[str]:
     ]
 
 
-def _remote_files(url: str) -> list[str]:
+def _remote_files(url: str, now_ns: int) -> dict[str, str]:
+    """Return the mark of every file below a URL, from its listing alone: no request a file."""
     system, path = _opened(url)
     try:
-        listed = [path] if system.isfile(path) else system.find(path)
+        system.invalidate_cache()  # what this process listed before may have changed
+        listed = (
+            {path: system.info(path)} if system.isfile(path) else system.find(path, detail=True)
+        )
     except Exception as error:  # noqa: BLE001 - every protocol has its own errors
         raise AcceptanceError(f'{url}: cannot be listed ({words(error)})') from None
-    return [str(system.unstrip_protocol(file)) for file in listed]
+    return {
+        str(system.unstrip_protocol(file)): listed_mark(info, now_ns)
+        for file, info in listed.items()
+    }
 
 
 def _opened(url: str) -> tuple[Any, str]:

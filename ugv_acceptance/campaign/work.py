@@ -1,6 +1,7 @@
 """Judges one run: in this process, in another, or on a cluster."""
 
 import hashlib
+import posixpath
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from ugv_acceptance.bag.reader import Bag, open_bag
 from ugv_acceptance.bag.recording import Recording
 from ugv_acceptance.campaign.not_judged import is_of_the_machine
 from ugv_acceptance.campaign.run_table import Row, row_of
-from ugv_acceptance.campaign.sources import Source, local_paths
+from ugv_acceptance.campaign.sources import Source, is_unchanged, local_paths
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
 from ugv_acceptance.offline.evaluate import evaluate
@@ -35,7 +36,8 @@ class Done:
 
     `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
     that it is unreadable (`missing`: a file of it is not there), `lost` that it was not judged for
-    a reason that is not its own. `cpu` is the CPU time (s) of its process that it took.
+    a reason that is not its own. `cpu` is the CPU time (s) of its process that it took. `sha256` is
+    the hash of its recording, '' where its files may have changed since they were listed.
     """
 
     source: Source
@@ -47,20 +49,23 @@ class Done:
     cpu: float = 0.0
     lost: str = ''
     missing: bool = False
+    sha256: str = ''
 
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A result, its key and the size (bytes) of its recording; None: the result is known."""
+    """A result, its key, hash and size (bytes) of its recording; None: the result is known."""
 
     key: str
+    sha256: str
     size: int
     result: Json | None
 
 
-def key_of(bag_sha256: str, config_sha256: str, criteria_sha256: str) -> str:
+def key_of(bag_sha256: str, brief: Brief) -> str:
     """Return the key of a result: a hash of recording, configuration, criteria and software."""
-    parts = (bag_sha256, config_sha256, criteria_sha256, __version__, str(RESULT_VERSION))
+    criteria = brief.criteria.sha256 if brief.criteria else 'limits'
+    parts = (bag_sha256, brief.config.sha256, criteria, __version__, str(RESULT_VERSION))
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 
 
@@ -78,18 +83,23 @@ def _tried(source: Source, brief: Brief) -> Done:
     try:
         with local_paths(source) as paths:
             try:
-                found = _judged(open_bag(paths), brief)
+                bag = open_bag(paths)
+                found = _judged(bag, brief)
             except Exception as error:  # noqa: BLE001 - one broken bag never ends a campaign
                 return _failed(source, paths, error)
+            # metadata.yaml may name a file that was not listed as a recording.
+            looked_at = {posixpath.basename(file) for file in source.files}
+            seen = looked_at.issuperset(path.name for path in bag.paths) and is_unchanged(source)
+            sha256 = found.sha256 if seen else ''
             if found.result is None:
-                return Done(source, found.key, found.size)
+                return Done(source, found.key, found.size, sha256=sha256)
             result = _renamed(found.result, source, paths)
     except BadBag as error:
         return Done(source, error=str(error))
     except (AcceptanceError, OSError) as error:  # not fetched, no room for a copy
         return Done(source, lost=str(error))
     row = row_of(source.name, found.key, result)
-    return Done(source, found.key, found.size, row, json_text(result))
+    return Done(source, found.key, found.size, row, json_text(result), sha256=sha256)
 
 
 def _failed(source: Source, paths: Path | list[Path], error: Exception) -> Done:
@@ -107,16 +117,16 @@ def _failed(source: Source, paths: Path | list[Path], error: Exception) -> Done:
 
 def _judged(bag: Bag, brief: Brief) -> _Found:
     config, criteria = brief.config, brief.criteria
-    said = criteria.sha256 if criteria else None
-    key = key_of(bag.sha256(), config.sha256, said or 'limits')
+    sha256 = bag.sha256()
+    key = key_of(sha256, brief)
     size = sum(path.stat().st_size for path in bag.paths)
     if key in brief.known:
-        return _Found(key, size, None)
+        return _Found(key, sha256, size, None)
     # One thread: the other cores have runs of their own.
     found = evaluate(Recording(bag), config=config, criteria=criteria, options=Options(readers=1))
     result = found.result
     result['start_ns'] = bag.start_ns
-    return _Found(key, size, result)
+    return _Found(key, sha256, size, result)
 
 
 def _renamed(said: Any, source: Source, paths: Path | list[Path]) -> Any:  # noqa: ANN401 - JSON

@@ -155,7 +155,8 @@ def _is_campaign(path: Path) -> bool:
         found = _json(path / 'campaign.json')
         return isinstance(found, dict) and {'version', 'mtbf_h', 'each_run'} <= set(found)
     runs = path / 'runs'
-    return {p.name for p in path.iterdir() if p.suffix != '.part'} == {'runs'} and all(
+    held = {p.name for p in path.iterdir() if p.suffix != '.part'} - {'hashes.jsonl'}
+    return held == {'runs'} and all(
         _HEX.fullmatch(p.name) or p.suffix == '.part' for p in runs.glob('*')
     )
 
@@ -205,7 +206,9 @@ PICTURE = Kind(
 )
 MAP = Kind('maps', ('.svg', '.png', '.csv', '.npz'), _is_map, 'and is not a map', by_ending=True)
 
-CAMPAIGN = FolderKind('campaign', ('campaign.json', 'campaign.html', 'runs/*.json'), _is_campaign)
+CAMPAIGN = FolderKind(
+    'campaign', ('campaign.json', 'campaign.html', 'hashes.jsonl', 'runs/*.json'), _is_campaign
+)
 PAPER = FolderKind('paper', ('paper.json', 'paper.html', '*.svg'), _is_paper)
 RECORDING = FolderKind('recording', (), lambda _: False, may_fill=False)
 # `run` checks its folder by itself: it may be one to continue.
