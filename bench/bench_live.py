@@ -1,6 +1,6 @@
 """Live path: CPU a message, latency from publishing to the margin, loss; beside three others.
 
-    nice python -m bench.bench_live [--seconds 7] [--rounds 3] [--before CHECKOUT]
+    nice python -m bench.bench_live [--seconds 7] [--rounds 3] [--moving] [--before CHECKOUT]
 
 Every round starts each listener anew with the same load: an empty raw subscriber on the events
 executor (the floor), an empty decoded one, our monitor (margins of every message, its topics at
@@ -27,7 +27,7 @@ BEFORE = 'before'
 
 
 def once(
-    mode: str, rates: tuple[int, int], seconds: float, before: Path | None
+    mode: str, rates: tuple[int, int], seconds: float, before: Path | None, load: str
 ) -> dict[str, float]:
     """Return figures of one listener under one load."""
     drop = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
@@ -41,12 +41,12 @@ def once(
 
     tree = before if mode == BEFORE and before else HERE.parent
     listener = start('live_listener.py', 'monitor' if mode == BEFORE else mode, tree)
-    load = start('live_load.py', *rates, seconds)
-    sent = sum(told(load))
+    sender = start('live_load.py', *rates, seconds, load)
+    sent = sum(told(sender))
     listener.send_signal(signal.SIGINT)
     heard = told(listener)
     listener.wait()
-    load.wait()
+    sender.wait()
     return figures(heard, sent)
 
 
@@ -96,16 +96,22 @@ def main() -> None:
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--modes', nargs='*', default=MODES)
     parser.add_argument('--rates', nargs='*', default=RATES, help='Hz of joints + Hz of the IMU')
+    parser.add_argument(
+        '--moving', action='store_true', help='joints that swing, an IMU with noise'
+    )
     parser.add_argument('--before', type=Path, help='checkout of an earlier version')
     options = parser.parse_args()
+    load = 'moving' if options.moving else 'still'
     modes = [*options.modes, *([BEFORE] if options.before else [])]
     for words in options.rates:
         joints, imu = map(int, words.split('+'))
         rows: dict[str, list[dict[str, float]]] = {mode: [] for mode in modes}
         for _ in range(options.rounds):
             for mode, found in rows.items():
-                found.append(once(mode, (joints, imu), options.seconds, options.before))
-        print(f'\n{joints} Hz joints + {imu} Hz IMU, {options.rounds} x {options.seconds:g} s')
+                found.append(once(mode, (joints, imu), options.seconds, options.before, load))
+        print(
+            f'\n{joints} Hz joints + {imu} Hz IMU, {load}, {options.rounds} x {options.seconds:g} s'
+        )
         show(medians(rows), (joints, imu))
 
 

@@ -67,7 +67,8 @@ class Feet:
 
     `moves` says whether a contact is on a moving link.
     `alone` is the footing on the tracks, if they are level: the only one while all others are too
-    high to matter, wherever they are. `reach` (m) is the least distance that counts for that.
+    high to matter, wherever they are. `reach` (m) is the least distance that counts for that; a
+    point `sure` (m) above where it starts to count is too high anywhere it can be.
     """
 
     tracks: Cycle
@@ -79,6 +80,7 @@ class Feet:
     moves: bool
     alone: tuple[Footing, ...] = ()
     reach: float = 0.0
+    sure: float = math.inf
 
 
 @lru_cache(maxsize=64)
@@ -109,7 +111,9 @@ def feet_of(mechanics: Mechanics) -> Feet:
     i, j, k, *_ = polygon
     raised = plane < robot.ground - tolerance
     alone = Footing(tracks, (i, j, k), polygon, 0.0, raised)
-    return replace(found, alone=(alone,), reach=NEAR * 2.0 * _furthest(mechanics))
+    # No point is further from an edge than both can be from the base's origin.
+    span = 2.0 * _furthest(mechanics)
+    return replace(found, alone=(alone,), reach=NEAR * span, sure=1.001 * HIGH * span)
 
 
 def _furthest(mechanics: Mechanics) -> float:

@@ -90,7 +90,10 @@ def footings_of(
     if (
         feet.alone
         and not moved
-        and min([height_over(points[k], feet, z, max) for k, z in feet.others]) > 0.0
+        and (
+            min([points[k][2] - z for k, z in feet.others]) > feet.sure
+            or min([height_over(points[k], feet, z, max) for k, z in feet.others]) > 0.0
+        )
     ):
         return feet.alone
     return _footings(tuple(map(tuple, points)), feet)

@@ -25,9 +25,9 @@ from ugv_acceptance.monitoring.background import Snapshot, one_thread, snapshot_
 from ugv_acceptance.monitoring.trends import Ahead, Trends, end_words
 
 # Age (ns) from which computed advice is renewed, if a joint has moved by more than MOVED (rad, m)
-# since or gravity by more than TURNED (m/s2, a quarter of a degree): its angles are whole degrees.
+# since or gravity by more than TURNED (m/s2), half a degree each: its angles are whole degrees.
 FRESH = 250_000_000
-MOVED, TURNED = 0.004, 0.04
+MOVED, TURNED = 0.0087, 0.085
 # Time to a limit (s) below which the operator is warned at once; time (ns) between such warnings.
 URGENT, AGAIN = 2.0, 1_000_000_000
 

@@ -41,6 +41,11 @@ LIFT, NONE = math.radians(1.0), math.radians(0.5)
 # natural frequency is above 2 / s2 on any robot whose centre of gravity is less than 4 m from the
 # edge.
 SPIN, SPIN_LESS = 2.0 * 2.0 * 0.4, 2.0 * 2.0 * (1.0 - math.cos(CALM))
+# And only where it may take MATTERS of any tip angle: by model/tipping.py its square is then above
+# 4 wn^2 (sin^2(angle / 2) - sin^2((angle - MATTERS) / 2)), which is 4 wn^2 sin(angle - MATTERS / 2)
+# sin(MATTERS / 2) from an angle of MATTERS on, and never less than TURN; STEEP is far from flat.
+TURN, TURNS = 16.0 * math.sin(MATTERS / 4.0) ** 2, 8.0 * math.sin(MATTERS / 2.0)
+STEEP = 0.5
 # So it is where the push may leave less than LOW: it is above 0.8 g (angle - LOW), which is below
 # g sin(angle - LOW) up to 1.1 rad. (Gravity's z is negative.)
 HARD, HARD_UP_TO = -0.8, 1.1
@@ -201,7 +206,7 @@ class ChassisMotion:
         square, up, off = found
         if stance.state:  # not flat on its tracks
             square += up
-        spins = square > SPIN * least * abs(least) - SPIN_LESS
+        spins = square > SPIN * least * abs(least) - SPIN_LESS and square > _turn(least)
         if off > HARD * gravity[2] * min(least - LOW, HARD_UP_TO):
             self.episodes.hard_at = felt.elapsed
         if spins or felt.elapsed - self.episodes.hard_at < BACK:
@@ -284,6 +289,11 @@ class ChassisMotion:
         for signal in chain.from_iterable(self.signals.all()):
             if not signal.quiet:
                 signal.clear(now)
+
+
+def _turn(least: float) -> float:
+    """Return the squared rate (rad2/s2) up to which no margin loses MATTERS of its tip angle."""
+    return TURN if least < MATTERS else TURNS * math.sin(min(least, STEEP) - MATTERS / 2.0)
 
 
 def witnessed(rate: Sequence[Any], gravity: Sequence[Any], before: Sequence[Any]) -> Any:  # noqa: ANN401 - bool or array
