@@ -2,14 +2,18 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
+from ugv_acceptance.evaluation.chassis.motion import MATTERS, run_tipping, stance_kernel, turn_bound
 from ugv_acceptance.model.edges import corners_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
 from ugv_acceptance.model.robot import Contact, Joint, Link, Robot
-from ugv_acceptance.model.stability import SIDES, stances_of
+from ugv_acceptance.model.stability import SIDES, stances_of, tip_angles_of
 from ugv_acceptance.model.tipping import inertia_of, tipping_of
 
 MASS, HEIGHT, HALF, WIDE, INERTIA = 20.0, 0.3, 0.25, 0.2, (1.0, 1.5, 2.0)
@@ -106,3 +110,40 @@ def test_the_frequency_is_that_of_the_pendulum() -> None:
     reach2 = HALF**2 + HEIGHT**2
     wanted = MASS * G * math.sqrt(reach2) / (INERTIA[1] + MASS * reach2)
     assert margins()[3][FRONT] == pytest.approx(wanted, rel=1e-12)
+
+
+@given(
+    st.floats(-0.6, 0.6),
+    st.floats(-0.5, 0.5),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 2.0 * math.pi),
+)
+def test_a_rate_up_to_the_bound_takes_no_degree(
+    pitch: float, roll: float, share: float, heading: float
+) -> None:
+    """Where the closer look is left out, no margin is a degree less than the tip angle."""
+    mechanics = mechanics_of(box())
+    gravity = (
+        G * math.sin(pitch),
+        -G * math.sin(roll) * math.cos(pitch),
+        -G * math.cos(roll) * math.cos(pitch),
+    )
+    (stance,) = stances_of(mechanics, posture_of(mechanics, (0.0,), 0.0, (0.0, 0.0, 0.0)))
+    angles: Any = tip_angles_of(stance, gravity)[0]
+    assume(min(angles) > 0.0)
+    rate = share * math.sqrt(turn_bound(min(angles)))
+    omega = (rate * math.cos(heading), rate * math.sin(heading), 0.0)
+    margin, *_ = run_tipping(
+        stance_kernel(mechanics, stance, IMU),
+        stance,
+        inertia_of(mechanics).one(0.0, 0.0, 0.0, 0.0, 0.0),
+        (*gravity, *(-g for g in gravity), *omega, 0.0, 0.0, 0.0),
+    )
+    assert max(a - m for a, m in zip(angles, margin, strict=True)) <= MATTERS
+
+
+def test_a_rate_well_above_the_bound_takes_a_degree() -> None:
+    """The bound is not so careful that it is useless: ten times the rate is looked at."""
+    rate = 10.0 * math.sqrt(turn_bound(0.3))
+    margin, *_ = margins(pitch=math.atan2(HALF, HEIGHT) - 0.3, omega=(0.0, rate, 0.0))
+    assert margin[FRONT] < 0.3 - MATTERS

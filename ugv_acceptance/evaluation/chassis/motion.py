@@ -206,7 +206,7 @@ class ChassisMotion:
         square, up, off = found
         if stance.state:  # not flat on its tracks
             square += up
-        spins = square > SPIN * least * abs(least) - SPIN_LESS and square > _turn(least)
+        spins = square > SPIN * least * abs(least) - SPIN_LESS and square > turn_bound(least)
         if off > HARD * gravity[2] * min(least - LOW, HARD_UP_TO):
             self.episodes.hard_at = felt.elapsed
         if spins or felt.elapsed - self.episodes.hard_at < BACK:
@@ -291,7 +291,7 @@ class ChassisMotion:
                 signal.clear(now)
 
 
-def _turn(least: float) -> float:
+def turn_bound(least: float) -> float:
     """Return the squared rate (rad2/s2) up to which no margin loses MATTERS of its tip angle."""
     return TURN if least < MATTERS else TURNS * math.sin(min(least, STEEP) - MATTERS / 2.0)
 
