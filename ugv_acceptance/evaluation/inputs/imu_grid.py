@@ -98,6 +98,14 @@ class ImuGrid:
             return found
         return list(map(sub, self.line(end), self.line(end - rows)))
 
+    def windows(self, ends: Sequence[int], rows: int) -> list[list[float]]:
+        """Return `over` of many windows of so many rows."""
+        if isinstance(self.rows, np.ndarray):
+            at = np.asarray(ends, np.intp) - self.first
+            found: list[list[float]] = (self.rows[at] - self.rows[at - rows]).tolist()
+            return found
+        return [self.over(end, rows) for end in ends]
+
     def line(self, row: int) -> Row:
         """Return the row of that number."""
         found = self.rows[row - self.first]
