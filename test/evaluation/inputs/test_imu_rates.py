@@ -1,6 +1,7 @@
 """Gyro against orientation: windows judged side by side are judged as each alone."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -139,3 +140,12 @@ def test_too_few_comparisons_say_nothing() -> None:
     assert unsaid
     assert not any(rate.excited for rate in unsaid)
     assert any(rate.gyro > 0.0 for rate in found)
+
+
+@pytest.mark.parametrize(
+    ('gyro', 'kind'), [('degrees', 1.0), ('tiny', 2.0), ('turned', 3.0), ('mirrored', 4.0)]
+)
+def test_a_late_orientation_does_not_hide_the_gyros_fault(gyro: str, kind: float) -> None:
+    """Units and axes of a gyro are found although the orientation comes most of a second late."""
+    found = {rate.gyro for rate in rates_of(made(4, gyro, 8, 0.0), range(60, ROWS + 1, 7))}
+    assert kind in found
