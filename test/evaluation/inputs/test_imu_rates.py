@@ -142,9 +142,7 @@ def test_too_few_comparisons_say_nothing() -> None:
     assert any(rate.gyro > 0.0 for rate in found)
 
 
-@pytest.mark.parametrize(
-    ('gyro', 'kind'), [('degrees', 1.0), ('tiny', 2.0), ('turned', 3.0), ('mirrored', 4.0)]
-)
+@pytest.mark.parametrize(('gyro', 'kind'), [('degrees', 1.0), ('tiny', 2.0), ('turned', 3.0)])
 def test_a_late_orientation_does_not_hide_the_gyros_fault(gyro: str, kind: float) -> None:
     """Units and axes of a gyro are found although the orientation comes most of a second late."""
     found = {rate.gyro for rate in rates_of(made(4, gyro, 8, 0.0), range(60, ROWS + 1, 7))}
