@@ -295,6 +295,24 @@ def test_many_postures_have_the_footings_of_each_alone(seed: int) -> None:
         assert_same(some, footings_of(mechanics, one.contacts))  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize('seed', range(3))
+def test_postures_that_repeat_have_the_footings_of_each_alone(seed: int) -> None:
+    """Feet that stand still, come back, or share one coordinate of two postures, to the bit."""
+    rng = np.random.default_rng(seed)
+    robot = tracked() if seed == 0 else random_robot(rng, 4, moving=2)
+    few = rng.uniform(-3.0, 3.0, (40, len(robot.joint_names)))
+    few = np.concatenate((few, -few[:20]))
+    of = np.sort(rng.integers(0, len(few), 400)) if seed < 2 else rng.integers(0, len(few), 400)
+    mechanics, load = mechanics_of(robot), robot.payload
+    posture = posture_of(mechanics, list(few[of].T), load.mass, load.cog)
+    found = by_row(many_footings(mechanics, posture.contacts, len(of)), len(of))
+    alone = {}
+    for k in set(of.tolist()):
+        one = posture_of(mechanics, list(few[[k, k]].T), load.mass, load.cog)
+        alone[k] = by_row(many_footings(mechanics, one.contacts, 2), 2)[0]
+    assert found == [alone[k] for k in of.tolist()]
+
+
 def test_contact_points_and_cog_follow_the_joints() -> None:
     """They are where 4 x 4 matrices put them."""
     rng = np.random.default_rng(5)
