@@ -313,6 +313,17 @@ def test_postures_that_repeat_have_the_footings_of_each_alone(seed: int) -> None
     assert found == [alone[k] for k in of.tolist()]
 
 
+def test_postures_that_share_one_coordinate_are_others() -> None:
+    """A point straight above or below where it was: it carries in some of the rows only."""
+    low = np.tile([-0.1, 0.2, -0.1, -0.1], 5)
+    contacts = [*plane(np.array(SQUARE)), (np.full(20, 0.5), 0.0, low)]
+    robot = standing_on([*plane(np.array(SQUARE)), (0.5, 0.0, 0.0)])
+    found = by_row(many_footings(mechanics_of(robot), contacts, 20), 20)
+    ways = {height: {repr(one) for one in np.array(found, object)[low == height]} for height in low}
+    assert all(len(of) == 1 for of in ways.values())
+    assert ways[-0.1] != ways[0.2]
+
+
 def test_contact_points_and_cog_follow_the_joints() -> None:
     """They are where 4 x 4 matrices put them."""
     rng = np.random.default_rng(5)
