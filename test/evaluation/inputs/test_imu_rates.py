@@ -24,6 +24,7 @@ from ugv_acceptance.evaluation.inputs.imu_rates import (
     FEWEST,
     LATE,
     WINDOW,
+    _Pairs,
     rates_of,
     rates_over,
 )
@@ -147,3 +148,14 @@ def test_a_late_orientation_does_not_hide_the_gyros_fault(gyro: str, kind: float
     """Units and axes of a gyro are found although the orientation comes most of a second late."""
     found = {rate.gyro for rate in rates_of(made(4, gyro, 8, 0.0), range(60, ROWS + 1, 7))}
     assert kind in found
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 3]), st.floats(0.0, 3.0))
+def test_nothing_explains_more_than_the_bound_says(seed: int, rank: int, noise: float) -> None:
+    """The best rotation of axes, mirrored or not, explains at most what needs no search for it."""
+    rng = np.random.default_rng(seed)
+    turned = rng.normal(size=(20, 26, rank)) @ rng.normal(size=(20, rank, 3))
+    own = turned @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + noise * rng.normal(size=turned.shape)
+    pairs = _Pairs(turned, own, own)
+    turns, mirrors = pairs.explained
+    assert (np.maximum(turns, mirrors) <= pairs.most_explained * (1.0 + 1e-12)).all()

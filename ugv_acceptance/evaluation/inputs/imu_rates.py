@@ -42,6 +42,8 @@ LEAST_RATE = 40.0
 AGREES, ALIKE = 0.7, (0.5, 2.0)
 # A smaller cosine contradicts; a rotation of axes must explain it by at least this cosine.
 DIFFERS, EXPLAINED, EXPLAINED_UNIT = 0.5, 0.85, 0.8
+# Less than this share of a bound is below it, whatever is rounded.
+CERTAIN = 1.0 - 1e-9
 # Degrees for radians, a factor of 57.3; a ratio beyond these says that one of the two stands still.
 DEGREES, STUCK, IDLE = (35.0, 90.0), 5.0, 0.2
 
@@ -182,11 +184,35 @@ class _Pairs:
     @property
     def explained(self) -> tuple[Floats, Floats]:
         """Cosine after the best rotation of the axes, and after the best that may mirror."""
-        u, sizes, v = np.linalg.svd(np.matmul(self.turned.transpose(0, 2, 1), self.own))
-        whole = np.sqrt(_dots(self.turned, self.turned) * self._own + 1e-18)
+        u, sizes, v = np.linalg.svd(self._product)
+        whole = self._whole
         hand = np.where(np.linalg.det(u @ v) > 0.0, 1.0, -1.0)
         turns = (sizes[:, 0] + sizes[:, 1] + hand * sizes[:, 2]) / whole
         return turns, sizes.sum(axis=1) / whole
+
+    @property
+    def most_explained(self) -> Floats:
+        """No less than both of `explained`, without singular values.
+
+        The square of the sum of three numbers is the sum of their squares, and twice that of their
+        products: at most the square root of three times the sum of the products' squares, which is
+        that of the squares of all cofactors.
+        """
+        rows = self._product
+        cofactors = np.cross(rows, rows[:, [1, 2, 0]])
+        square = _dots(rows, rows) + 2.0 * np.sqrt(3.0 * _dots(cofactors, cofactors))
+        most: Floats = np.sqrt(square) / self._whole
+        return most
+
+    @property
+    def _product(self) -> Floats:
+        found: Floats = np.matmul(self.turned.transpose(0, 2, 1), self.own)
+        return found
+
+    @property
+    def _whole(self) -> Floats:
+        whole: Floats = np.sqrt(_dots(self.turned, self.turned) * self._own + 1e-18)
+        return whole
 
     @property
     def _own(self) -> Floats:
@@ -253,6 +279,8 @@ def _gyro_kinds(
     alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & (cosine < DIFFERS)
     kind = np.zeros(len(ratio))
     at = np.flatnonzero(wanted & (large | tiny | alike))
+    most = np.max([of.of(at).most_explained for of in pairs[::2]], axis=0)
+    at = at[most > CERTAIN * min(EXPLAINED, EXPLAINED_UNIT)]
     if not len(at):
         return kind
     turns, mirrors = np.max([of.of(at).explained for of in pairs[::2]], axis=0)
@@ -264,7 +292,7 @@ def _gyro_kinds(
 
 def _dots(a: Floats, b: Floats) -> Floats:
     """Return the sum of products of rotations (m, n, 3), of each window (m,)."""
-    found: Floats = (a * b).reshape(len(a), -1).sum(axis=1)
+    found: Floats = (a * b).reshape(len(a), a.shape[1] * a.shape[2]).sum(axis=1)
     return found
 
 
