@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, feed
 from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.imu_cell import A, Q, W
+from ugv_acceptance.evaluation.inputs.imu_grid import samples
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
 from ugv_acceptance.evaluation.inputs.imu_rest import RestChecks
 from ugv_acceptance.evaluation.inputs.imu_seen import ImuSeen, rested_messages
@@ -205,9 +207,13 @@ class ImuTracker:
         omega = _lines([s.angular_velocity for s in columns])[:, order]
         acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
         frame = self.settings.imu.frame
-        lengths = [len(s.log_time) for s in columns]
-        foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
-        self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
+        if len({s.frame_id for s in columns}) == 1:
+            foreign = np.full(len(time), _foreign(columns[0].frame_id, frame))
+            self._take_frames(time, np.array([columns[0].frame_id]))
+        else:
+            lengths = [len(s.log_time) for s in columns]
+            foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
+            self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
         self.seen.take(columns)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
@@ -215,7 +221,7 @@ class ImuTracker:
             return self._rows(time, stamp, told_by, (smooth, raw), foreign)
 
     def _take_frames(self, time: Times, names: NDArray[np.str_]) -> None:
-        """Take the frame that each message names, in order of receipt."""
+        """Take the frame that each message names, in order of receipt; the last for all after."""
         changed = np.flatnonzero(names[1:] != names[:-1]) + 1
         for k in [0, *changed.tolist()]:
             if names[k] != self._frame:
@@ -270,14 +276,14 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw,)
-        samples = np.column_stack((*felt, told))
-        trusted = self._judge_motion(time, stamp, samples, gravity)
+        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw[:, Q], raw[:, W], raw[:, A])
+        table = samples(*felt, told)
+        trusted = self._judge_motion(time, stamp, table, gravity)
         self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable, trusted)
 
     def _judge_motion(self, time: Times, stamp: Times, x: Floats, gravity: Floats) -> Mask:
-        """Give samples (n, 11) to the checks in motion; set gravity to NaN while one says so.
+        """Give samples (n, WIDTH) to the checks in motion; set gravity to NaN while one says so.
 
         Return where the gyro is trusted (n,).
         """

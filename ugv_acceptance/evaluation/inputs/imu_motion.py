@@ -31,7 +31,7 @@ from ugv_acceptance.evaluation.inputs.imu_cell import (
 )
 from ugv_acceptance.evaluation.inputs.imu_frozen import FrozenCheck
 from ugv_acceptance.evaluation.inputs.imu_gravity import WINDOWS, gravity_over
-from ugv_acceptance.evaluation.inputs.imu_grid import GRID, HOP, LONGEST, ImuGrid, samples
+from ugv_acceptance.evaluation.inputs.imu_grid import GRID, HOP, LONGEST, ImuGrid
 from ugv_acceptance.evaluation.inputs.imu_placing import WINDOW as PLACING
 from ugv_acceptance.evaluation.inputs.imu_placing import Mounting, unit_over
 from ugv_acceptance.evaluation.inputs.imu_rates import WINDOW as TURNING
@@ -219,7 +219,7 @@ class MotionChecks:
     def columns(self, time: Times, stamp: Times, x: Floats) -> None:
         """Take many messages in order of receipt, as `step` one at a time.
 
-        `x` (n, OK + 1) holds orientation, rate, acceleration and `told`.
+        `x` (n, WIDTH) are samples of imu_grid.py; their time is filled in here.
         """
         if self.tally is None:
             self.tally = Tally()
@@ -241,11 +241,10 @@ class MotionChecks:
     def _part(self, time: Times, passed: Times, x: Floats) -> None:
         """Take samples of one grid: judge all hops that end with one of them, keep the rest."""
         tau = self._tau + np.cumsum(passed)
-        table = samples(x)
-        table[:, TAU] = tau
+        x[:, TAU] = tau
         self._tau = int(tau[-1])
         grid, at = self._grid, tau // GRID
-        self._kept = np.concatenate((self._kept, table))
+        self._kept = np.concatenate((self._kept, x))
         if at[-1] == grid.row:
             return
         last = grid.row
