@@ -252,7 +252,9 @@ class ImuTracker:
         told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
         self._count(told, given)
         by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
-        oriented = np.where(rotation, by_orientation, np.nan)
+        oriented = np.array(by_orientation)
+        if not rotation.all():
+            oriented[:, ~rotation] = np.nan
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
@@ -265,7 +267,7 @@ class ImuTracker:
             gravity = np.where(believable & ~(size < FALL * g), force, np.nan)
         else:
             use = told & (imu.attitude != 'accelerometer')
-            gravity = -g * np.where(use, oriented, leaning)
+            gravity = -g * (oriented if use.all() else np.where(use, oriented, leaning))
             if imu.attitude == 'auto' and not believable.all():
                 gravity[:, ~believable] = np.nan
         unknown = believable & np.isnan(gravity[0])
