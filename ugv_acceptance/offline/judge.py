@@ -45,8 +45,8 @@ from ugv_acceptance.type_aliases import Json
 # Version of the result's layout; it changes when programs that read results must change.
 RESULT_VERSION = 2
 
-# Messages evaluated at a time: fewer cost more calls, more cost memory.
-STRETCH = 32768
+# Messages evaluated at a time, so that the arrays of a kernel stay in the processor's cache.
+STRETCH = 16384
 
 
 Taker = Callable[[MarginRows], None]
