@@ -149,8 +149,8 @@ def processes(bag: Path, rounds: int) -> None:
     least = min(found['import numpy'])
     print(f'{bag.name}, best of {rounds}')
     print(f'{"process":20} {"CPU s":>8} {"x numpy":>8}')
-    for name, cpu in found.items():
-        print(f'{name:20} {min(cpu):8.3f} {min(cpu) / least:8.1f}')
+    for name, some in found.items():
+        print(f'{name:20} {min(some):8.3f} {min(some) / least:8.1f}')
 
 
 def _cpu(command: Sequence[str], env: dict[str, str]) -> float:
