@@ -3,6 +3,9 @@
 Makes (or takes) recordings of 6 joints at 200 Hz and an IMU at 400 Hz, then measures each stage
 in a process of its own: unpacking alone (the floor), columns, margins and alerts, the whole of
 `evaluate`. One run prints all ratios. `python -m bench.bench_evaluate --minutes 10 60`
+
+`--start` measures whole processes instead: `ugv-acceptance evaluate` of a short recording beside a
+Python that does nothing, one that imports NumPy, and one that imports SciPy's special functions.
 """
 
 import argparse
@@ -13,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bench.bench_reading import floor, make
@@ -124,16 +127,54 @@ def table(folder: Path, rounds: int) -> None:
         )
 
 
+def processes(bag: Path, rounds: int) -> None:
+    """Print the CPU of whole processes, in turn, with compiled modules at hand."""
+    verb = 'from ugv_acceptance.cli import main; main()'
+    commands = {
+        'pass': ('pass',),
+        'import numpy': ('import numpy',),
+        'import scipy.special': ('import scipy.special',),
+        '--version': (verb, '--version'),
+        'evaluate': (verb, 'evaluate', str(bag)),
+    }
+    found: dict[str, list[float]] = {name: [] for name in commands}
+    with tempfile.TemporaryDirectory() as cache:
+        env = {**os.environ, 'OPENBLAS_NUM_THREADS': '1', 'PYTHONPYCACHEPREFIX': cache}
+        env.pop('PYTHONDONTWRITEBYTECODE', None)
+        for turn in range(rounds + 1):
+            for name, words in commands.items():
+                cpu = _cpu((sys.executable, '-c', *words), env)
+                if turn:  # the first one compiles
+                    found[name].append(cpu)
+    least = min(found['import numpy'])
+    print(f'{bag.name}, best of {rounds}')
+    print(f'{"process":20} {"CPU s":>8} {"x numpy":>8}')
+    for name, some in found.items():
+        print(f'{name:20} {min(some):8.3f} {min(some) / least:8.1f}')
+
+
+def _cpu(command: Sequence[str], env: dict[str, str]) -> float:
+    """Return the CPU (s) of a process."""
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, env=env) as child:
+        _, _, usage = os.wait4(child.pid, 0)
+        child.returncode = 0
+    return usage.ru_utime + usage.ru_stime
+
+
 def main() -> None:
     """Make the recordings asked for and print a table of each."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--minutes', type=float, nargs='*', default=[10.0])
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--bag', type=Path, help='a recording made before')
+    parser.add_argument('--start', action='store_true', help='measure whole processes')
     parser.add_argument('--stage', choices=STAGES, help='run one stage on --bag')
     arguments = parser.parse_args()
     if arguments.stage:
         measure(arguments.stage, arguments.bag)
+    elif arguments.start:
+        short = Path(__file__).parents[1] / 'bags' / 'packbot_pass'
+        processes(arguments.bag or short, arguments.rounds)
     elif arguments.bag:
         table(arguments.bag, arguments.rounds)
     else:

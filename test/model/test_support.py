@@ -295,6 +295,35 @@ def test_many_postures_have_the_footings_of_each_alone(seed: int) -> None:
         assert_same(some, footings_of(mechanics, one.contacts))  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize('seed', range(3))
+def test_postures_that_repeat_have_the_footings_of_each_alone(seed: int) -> None:
+    """Feet that stand still, come back, or share one coordinate of two postures, to the bit."""
+    rng = np.random.default_rng(seed)
+    robot = tracked() if seed == 0 else random_robot(rng, 4, moving=2)
+    few = rng.uniform(-3.0, 3.0, (40, len(robot.joint_names)))
+    few = np.concatenate((few, -few[:20]))
+    of = np.sort(rng.integers(0, len(few), 400)) if seed < 2 else rng.integers(0, len(few), 400)
+    mechanics, load = mechanics_of(robot), robot.payload
+    posture = posture_of(mechanics, list(few[of].T), load.mass, load.cog)
+    found = by_row(many_footings(mechanics, posture.contacts, len(of)), len(of))
+    alone = {}
+    for k in set(of.tolist()):
+        one = posture_of(mechanics, list(few[[k, k]].T), load.mass, load.cog)
+        alone[k] = by_row(many_footings(mechanics, one.contacts, 2), 2)[0]
+    assert found == [alone[k] for k in of.tolist()]
+
+
+def test_postures_that_share_one_coordinate_are_others() -> None:
+    """A point straight above or below where it was: it carries in some of the rows only."""
+    low = np.tile([-0.1, 0.2, -0.1, -0.1], 5)
+    contacts = [*plane(np.array(SQUARE)), (np.full(20, 0.5), 0.0, low)]
+    robot = standing_on([*plane(np.array(SQUARE)), (0.5, 0.0, 0.0)])
+    found = by_row(many_footings(mechanics_of(robot), contacts, 20), 20)
+    ways = {height: {repr(one) for one in np.array(found, object)[low == height]} for height in low}
+    assert all(len(of) == 1 for of in ways.values())
+    assert ways[-0.1] != ways[0.2]
+
+
 def test_contact_points_and_cog_follow_the_joints() -> None:
     """They are where 4 x 4 matrices put them."""
     rng = np.random.default_rng(5)

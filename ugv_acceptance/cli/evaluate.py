@@ -21,6 +21,7 @@ from ugv_acceptance.type_aliases import Json
 if TYPE_CHECKING:
     from ugv_acceptance.cli.evidence import Papers
     from ugv_acceptance.config import Config
+    from ugv_acceptance.offline.training import TrainingRecord
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 BAD_INPUT = 2
@@ -101,9 +102,8 @@ def evaluate(
     from ugv_acceptance.config import description_topic, load
     from ugv_acceptance.config.files import find
     from ugv_acceptance.config.identity import file_of, identity_from
-    from ugv_acceptance.drill.record import training_record
 
-    under, drilled = ground_from(ground), tuple(training_record(path) for path in drill or ())
+    under, drilled = ground_from(ground), _drills(drill or ())
     papers = Papers(
         report, pdf, csv_file, parquet, criteria, init_criteria, annotate, under, drilled
     )
@@ -125,6 +125,15 @@ def evaluate(
         print_results(results, result_console(json_file, csv_file, junit), verbose=verbose)
     wrote(json_file, junit)
     raise typer.Exit(worst(codes))
+
+
+def _drills(paths: list[Path] | tuple[Path, ...]) -> 'tuple[TrainingRecord, ...]':
+    """Return the records of drills."""
+    if not paths:
+        return ()
+    from ugv_acceptance.drill.record import training_record
+
+    return tuple(training_record(path) for path in paths)
 
 
 def _judged(

@@ -166,8 +166,14 @@ def names_in_messages(path: Path | str) -> tuple[str, ...] | None:
 def _read_file(path: Path | str | None) -> tuple[Path, bytes, Document, File]:
     at = find(DEFAULT if path is None else Path(path))
     content = read(at, 'configuration')
+    return at, content, *_parsed(at, content)
+
+
+@lru_cache(maxsize=4)
+def _parsed(at: Path, content: bytes) -> tuple[Document, File]:
+    """Return a YAML file as it was parsed: who asks for its topics then asks for all of it."""
     document = read_document(text(content, at), str(at))
-    return at, content, document, checked(document, File)
+    return document, checked(document, File)
 
 
 def _urdf_of(

@@ -28,8 +28,9 @@ from ugv_acceptance.evaluation.inputs.payload import (
     payload_from,
 )
 from ugv_acceptance.evaluation.inputs.timeouts import FOREVER, STARTUP, InputTimeout, clock_words
-from ugv_acceptance.evaluation.lost_margins import Lost, lost_in, with_lost
+from ugv_acceptance.evaluation.lost_margins import lost_in
 from ugv_acceptance.evaluation.margin_table import MarginRows, Pairs
+from ugv_acceptance.evaluation.margin_watch import watch_margins
 from ugv_acceptance.evaluation.rough_ground import ground_rows
 from ugv_acceptance.evaluation.row_ends import newest_row, preceded, without_joints
 from ugv_acceptance.evaluation.samples import Batch, PayloadColumns
@@ -39,9 +40,7 @@ from ugv_acceptance.model.mechanics import Mechanics, mechanics_of, posture_of
 from ugv_acceptance.model.reactions import carry
 from ugv_acceptance.model.robot import Payload
 from ugv_acceptance.model.row_selection import ALL, Rows, inner, pick
-from ugv_acceptance.model.sliding import slides_first
 from ugv_acceptance.model.stability import (
-    NO_CONTACT,
     UNKNOWN,
     Stance,
     many_stances,
@@ -195,7 +194,7 @@ class RecordedEvaluator:
         rows = self._margins(newest, load)
         rows = replace(rows, ground=ground_rows(self.settings, self._began, rows, load))
         lost, self._known_until = lost_in(rows, self._known_until)
-        self._watch_pairs(rows, lost)
+        watch_margins(self.settings, self.watch, rows, lost)
         chassis = self._chassis.take(felt, rows, load, (lost.place, lost.time))
         rows = replace(rows, chassis=chassis)
         self._carry = _Newest(
@@ -356,36 +355,6 @@ class RecordedEvaluator:
             return *angle, state
         found = stability_of(stance, gravity)
         return *found.angle, *found.moment, *found.energy, found.zmp, found.state
-
-    def _watch_pairs(self, rows: MarginRows, lost: Lost) -> None:
-        all_known = rows.known.all()
-        time = rows.time if all_known else rows.time[rows.known]
-        time = with_lost(time, lost, lost.time)
-        values_of = (*rows.torque.T, *rows.angle.T)
-        signals = (*self.watch.torque, *self.watch.tip)
-        for k, (values, (warn, error)) in enumerate(zip(values_of, signals, strict=True)):
-            if warn.on == np.inf:
-                continue
-            some = values if all_known else values[rows.known]
-            worse = np.abs(some) if k < len(self.watch.torque) else -some
-            if rows.touches.any():
-                worse = np.where(np.isnan(worse), -np.inf, worse)
-            worse = with_lost(worse, lost)
-            feed(warn, time, worse)
-            feed(error, time, worse)
-        if self.settings.judges_tilt:
-            self._watch_stand(rows, time, lost)
-        self.watch.predict_rows(rows)
-
-    def _watch_stand(self, rows: MarginRows, time: Times, lost: Lost) -> None:
-        """Judge how the robot stands, in the rows with margins; `time` has `lost` among them."""
-        state = rows.state[rows.known]
-        feed(self.watch.support, time, with_lost(np.where(state >= NO_CONTACT, 1.0, 0.0), lost))
-        if self.watch.slide.on < np.inf:
-            gravity, least = rows.gravity[rows.known], rows.angle[rows.known].min(axis=1)
-            friction = self.settings.limits.friction
-            slope = slides_first(tuple(gravity.T), least, friction)
-            feed(self.watch.slide, time, with_lost(slope, lost))
 
 
 def _product(torque_gradient: Any, rows: NDArray[np.intp], gravity: Any) -> Floats:  # noqa: ANN401

@@ -248,11 +248,16 @@ def posture_at(
 
 
 def posture_once(
-    robot: Robot, q: Sequence[float], mass: float, cog: tuple[float, float, float]
+    robot: Robot,
+    q: Sequence[float],
+    mass: float,
+    cog: tuple[float, float, float],
+    tree: Tree | None = None,
 ) -> Posture:
     """Return the posture of a robot that is used only once, such as one with a changed mass.
 
-    Runs the same formula with floats, because compiling takes longer than one run.
+    Runs the same formula with floats, because compiling takes longer than one run. `tree` is that
+    of the robot, where it is known: to look a robot up takes long.
     """
-    formula = posture_formula(robot, tree_of(robot))
+    formula = posture_formula(robot, tree or tree_of(robot))
     return Posture(*formula(*q, mass, *cog))

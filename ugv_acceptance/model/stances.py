@@ -196,27 +196,31 @@ def many_standing(
     if len(stances) == 1 and stances[0][0] is ALL:
         yield ALL, take_stance(stances[0][1], j)
         return
-    ways = np.zeros(count, np.intp)
-    for rows, _ in stances:
+    ways, only = np.zeros(count, np.intp), np.full(count, -1)
+    for number, (rows, _) in reversed(list(enumerate(stances))):
         ways[rows] += 1
-    alone = (ways == 1)[j]
-    least, choice = np.full(len(j), -np.inf), np.full(len(j), -1)
-    place, places = np.empty(count, np.intp), []
-    for number, (rows, stance) in enumerate(stances):
-        place.fill(-1)
-        place[rows] = np.arange(count)[: len(place[rows])]
-        at = place[j]
-        places.append(at)
-        choice[(at >= 0) & (choice < 0)] = number
-        some = np.flatnonzero((at >= 0) & ~alone)
+        only[rows] = number
+    choice, place = only[j], np.empty(count, np.intp)
+    several = np.flatnonzero((ways > 1)[j])
+    least = np.full(len(several), -np.inf)
+    for number, (rows, stance) in enumerate(stances if len(several) else ()):
+        at = _places(place, rows)[j[several]]
+        some = np.flatnonzero(at >= 0)
         if not len(some):
             continue
         taken = take_stance(stance, at[some])
-        angles = angles_on(taken, pick(gravity, some))
+        angles = angles_on(taken, pick(gravity, several[some]))
         found = np.broadcast_to(reduce(np.minimum, angles), len(some))
         better = found > least[some]
-        least[some[better]], choice[some[better]] = found[better], number
-    for number, (_, stance) in enumerate(stances):
-        rows = np.flatnonzero(choice == number)
-        if len(rows):
-            yield rows, take_stance(stance, places[number][rows])
+        least[some[better]], choice[several[some[better]]] = found[better], number
+    for number, (rows, stance) in enumerate(stances):
+        mine = np.flatnonzero(choice == number)
+        if len(mine):
+            yield mine, take_stance(stance, _places(place, rows)[j[mine]])
+
+
+def _places(place: NDArray[np.intp], rows: Rows) -> NDArray[np.intp]:
+    """Set at which place each number stands among `rows` in `place`, -1 for others; return it."""
+    place.fill(-1)
+    place[rows] = np.arange(len(place))[: len(place[rows])]
+    return place

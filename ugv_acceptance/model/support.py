@@ -11,6 +11,7 @@ A polygon is a cycle of contact numbers, counter-clockwise as seen from above.
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache, reduce
 from itertools import chain, combinations
 from typing import Any
@@ -227,9 +228,36 @@ def many_footings(
             return [(ALL, feet.alone[0])]
         if len(low) < count:
             high = np.delete(np.arange(count), low)
-            some = _many(feet, pick(points, low), len(low))
+            some = _of_each(feet, pick(points, low), len(low))
             return [(high, feet.alone[0]), *((low[rows], footing) for rows, footing in some)]
-    return _many(feet, points, count)
+    return _of_each(feet, points, count)
+
+
+# Rows of which at least so many are like others are looked at once each.
+_ALIKE = 0.1
+
+
+def _of_each(feet: Feet, points: Sequence[Any], count: int) -> list[tuple[Rows, Footing]]:
+    """Return the footings of all rows; those in which no point lies elsewhere are looked at once.
+
+    Feet stand still most of the time while the arm moves.
+    """
+    moving = [x for x in chain.from_iterable(points) if isinstance(x, np.ndarray)]
+    _, first, which = np.unique(moving[0], return_index=True, return_inverse=True)
+    alike = len(first) <= (1.0 - _ALIKE) * count
+    if not alike or not all(np.array_equal(x, x[first][which]) for x in moving[1:]):
+        return _many(feet, points, count)
+    found: list[tuple[Rows, Footing]] = []
+    for rows, footing in _many(feet, pick(points, first), len(first)):
+        if isinstance(rows, slice):
+            found.append((ALL, replace(footing, rocking=pick(footing.rocking, which))))
+            continue
+        place = np.full(len(first), -1)
+        place[rows] = np.arange(len(rows))
+        at = place[which]
+        some = np.flatnonzero(at >= 0)
+        found.append((some, replace(footing, rocking=pick(footing.rocking, at[some]))))
+    return found
 
 
 def _many(feet: Feet, points: Sequence[Any], count: int) -> list[tuple[Rows, Footing]]:

@@ -14,7 +14,6 @@ import numpy as np
 from ugv_acceptance import BadConfig, __version__
 from ugv_acceptance.bag.recording import Paths, Recording, open_recording
 from ugv_acceptance.config import Config
-from ugv_acceptance.config.criteria import load_criteria
 from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.criteria.assumptions import unknown_load
 from ugv_acceptance.evaluation.criteria.criteria import (
@@ -188,6 +187,9 @@ def _declared(ground: Ground) -> Json:
 def _criteria(criteria: CriteriaSet | Path | str | None, settings: Settings) -> CriteriaSet | None:
     if criteria is None or isinstance(criteria, CriteriaSet):
         return criteria
+    # Most runs are judged by the limits of the configuration.
+    from ugv_acceptance.config.criteria import load_criteria  # noqa: PLC0415
+
     return load_criteria(Path(criteria), settings)
 
 

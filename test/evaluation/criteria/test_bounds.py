@@ -17,14 +17,18 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Demand,
     Value,
 )
-from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, Moment, ValueMeasure
+from ugv_acceptance.evaluation.criteria.measurement import (
+    CriteriaMeasurement,
+    Moment,
+    ValueMeasure,
+    moment_json,
+)
 from ugv_acceptance.evaluation.criteria.uncertainty import (
     _OF,
     Bounds,
     Effects,
     Source,
     margin_bounds,
-    moment_json,
 )
 from ugv_acceptance.evaluation.inputs.payload import PayloadLog
 from ugv_acceptance.model.robot import Payload

@@ -1,5 +1,6 @@
 """Measured saturation and residuals: how long they must last, and what they are worth."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -26,6 +27,7 @@ from ugv_acceptance.evaluation.effort.facts import (
 )
 from ugv_acceptance.evaluation.effort.lasting import Lasting, Spell
 from ugv_acceptance.evaluation.effort.measured import MeasuredLimits
+from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Limits
 
 TOLD = settings(limits=Limits((50.0, 30.0)))
@@ -133,3 +135,54 @@ def test_spells_are_the_same_however_a_recording_is_cut(bad: list[bool], cuts: l
                 expected.append(Spell(first * S, k * S, k - 1.0))
             first = None
     assert parted.spells() == expected
+
+
+# Efforts and torques at, just below and far beyond limits and margins, or not known.
+NUMBERS = st.sampled_from(
+    [0.0, 9.99, 10.01, -20.0, 25.0, 29.97, 30.0, -49.9, 49.95, 50.0, 70.0, math.nan, math.inf]
+)
+PAIRS = st.tuples(NUMBERS, NUMBERS)
+ROW = st.tuples(PAIRS, PAIRS, st.booleans(), st.sampled_from([1.0, 0.0, -0.1]))
+
+
+def part(some: list[Any], first: int) -> MarginRows:
+    """Return rows of a tenth of a second from effort, torque, known, least tilt left."""
+    efforts, torques, known, tilt = zip(*some, strict=True)
+    times = [0.1 * (first + k) for k in range(len(some))]
+    ends = [0.1 * (first + k + 1) for k in range(len(some))]
+    told = rows(times, torque=torques, until=ends, known=known)
+    joints = replace(told.pairs.joints, effort=np.array(efforts)[::-1])
+    angle = np.column_stack((np.ones((len(some), 3)), tilt))
+    return replace(told, angle=angle, pairs=replace(told.pairs, joints=joints))
+
+
+@pytest.mark.parametrize('limits', [(50.0, 30.0), (50.0, math.inf)])
+@given(some=st.lists(ROW, min_size=1, max_size=40), cuts=st.lists(st.integers(1, 39), max_size=4))
+def test_joints_with_nothing_to_tell_are_left_out_and_nothing_else(
+    limits: tuple[float, float], some: list[Any], cuts: list[int]
+) -> None:
+    """Part by part the same spells and sizes as of every row and joint, one after the other."""
+    found, limit = MeasuredLimits(settings(limits=Limits(limits))), np.array(limits)
+    edges = sorted({0, *(cut for cut in cuts if cut < len(some)), len(some)})
+    parts = [part(some[a:b], a) for a, b in pairwise(edges)]
+    over = [Lasting(found._over[0].least) for _ in limit]
+    apart = {sign: [Lasting(found._apart[sign][0].least) for _ in limit] for sign in (1.0, -1.0)}
+    most = np.zeros(2)
+    for told in parts:
+        found.add(told)
+        effort, torque = told.effort, told.torque
+        with np.errstate(invalid='ignore'):
+            size, left = np.abs(effort), limit - np.abs(torque)
+            judged = (told.known & ~(told.angle.min(axis=1) <= 0.0))[:, None]
+            judged = judged & (left > 0.0) & np.isfinite(left)
+            for j in range(2):
+                over[j].add(told.time, told.until, size[:, j] >= 0.999 * limit[j], size[:, j])
+                for sign, lasting in apart.items():
+                    off = np.abs(sign * effort - torque)
+                    bad = ((off > left) & judged)[:, j]
+                    lasting[j].add(told.time, told.until, bad, off[:, j])
+            twice = np.fmin(size[1:], size[:-1])
+        most = np.fmax(most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
+    assert found._over == over
+    assert found._apart == apart
+    assert found.most.tolist() == most.tolist()

@@ -47,8 +47,8 @@ def filled(x: Floats) -> tuple[ImuGrid, ImuGrid]:
 def table_of(hz: float, seconds: float, q: Floats, w: Floats, a: Floats) -> Floats:
     """Return samples at a constant rate."""
     n = int(hz * seconds)
-    ones = np.ones((n, 1))
-    x = samples(np.hstack([np.broadcast_to(v, (n, len(v))) for v in (q, w, a)] + [ones]))
+    q, w, a = (np.broadcast_to(v, (n, len(v))) for v in (q, w, a))
+    x = samples(q, w, a, np.ones(n, np.bool_))
     x[:, TAU] = np.round(np.arange(n) * 1e9 / hz)
     return x
 
@@ -85,12 +85,11 @@ def test_cell_by_cell_is_the_same_as_all_at_once(
     }[form]()  # fmt: skip
     rng = np.random.default_rng(seed)
     n = len(run.q)
-    a, w, told = run.a.copy(), run.w.copy(), np.ones((n, 1))
-    told[rng.random(n) < broken] = 0.0
+    a, w, told = run.a.copy(), run.w.copy(), rng.random(n) >= broken
     a[rng.random(n) < broken / 4] = np.nan
     w[rng.random(n) < broken / 4, 1] = 1e12
     a[rng.random(n) < 0.01] *= 5.0
-    x = samples(np.hstack((run.q, w, a, told)))
+    x = samples(run.q, w, a, told)
     x[:, TAU] = run.time - run.time[0]
     one, many = filled(x)
     assert one.row == many.row
@@ -105,7 +104,7 @@ def test_messages_in_bursts_weigh_as_much_as_even_ones() -> None:
     run = good_run(3, 20.0)
     means = []
     for form in (run, bursty(run)):
-        x = samples(np.hstack((form.q, form.w, form.a, np.ones((len(form.q), 1)))))
+        x = samples(form.q, form.w, form.a, np.ones(len(form.q), np.bool_))
         x[:, TAU] = form.time - form.time[0]
         grid, _ = filled(x)
         d = grid.over(100, 20)

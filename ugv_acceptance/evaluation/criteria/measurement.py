@@ -1,5 +1,6 @@
 """Measures what criteria need while a recording is read: worst values, time in violation."""
 
+import math
 from dataclasses import dataclass, field
 from heapq import nsmallest
 
@@ -15,13 +16,13 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     Value,
     Window,
 )
-from ugv_acceptance.evaluation.criteria.quantities import SIGNALS, columns_of, subjects_of
+from ugv_acceptance.evaluation.criteria.quantities import SIGNALS, columns_of, shown, subjects_of
 from ugv_acceptance.evaluation.inputs.payload import PayloadLog
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.spans import Spans
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.type_aliases import Floats, Times
+from ugv_acceptance.type_aliases import Floats, Json, Times
 
 # Number of worst rows, from different parts of the recording, whose uncertainty is computed.
 CANDIDATES = 4
@@ -37,6 +38,22 @@ class Moment:
     q: tuple[float, ...]
     gravity: tuple[float, float, float]
     payload: Payload
+
+
+def moment_json(moment: Moment, settings: Settings) -> Json:
+    """Return posture, attitude and payload of a moment for JSON, in degrees, metres and kg."""
+    gx, gy, gz = moment.gravity
+    joints: Json = {}
+    for name, q in zip(settings.robot.joint_names, moment.q, strict=True):
+        scale, unit = shown('position', name, settings)
+        joints[name] = {'position': q * scale, 'unit': unit}
+    return {
+        'joints': joints,
+        'roll_deg': math.degrees(math.atan2(-gy, -gz)),
+        'pitch_deg': math.degrees(math.atan2(gx, math.hypot(gy, gz))),
+        'payload_kg': moment.payload.mass,
+        'payload_cog_m': list(moment.payload.cog),
+    }
 
 
 @dataclass(slots=True)

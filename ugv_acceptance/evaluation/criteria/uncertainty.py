@@ -23,6 +23,7 @@ from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vec
 from ugv_acceptance.model.stability import SIDES, stances_of, standing, tip_angles_of
 from ugv_acceptance.model.statics import torque_of
 from ugv_acceptance.model.support import footings_of
+from ugv_acceptance.model.tree import Tree
 from ugv_acceptance.type_aliases import Floats
 
 Gravity = tuple[float, float, float]
@@ -69,12 +70,16 @@ class Effects:
 
 @dataclass(frozen=True, slots=True)
 class _Point:
-    """The numbers from which a row's margins are computed: robot, posture, gravity, payload."""
+    """The numbers from which a row's margins are computed: robot, posture, gravity, payload.
+
+    `tree` is that of the robot; None where its bodies are not those that it has.
+    """
 
     robot: Robot
     q: tuple[float, ...]
     gravity: Gravity
     payload: Payload
+    tree: Tree | None = None
 
 
 def effects_of(
@@ -86,8 +91,9 @@ def effects_of(
 ) -> Effects:
     """Return the effect of each source on the margins of one row: `q` (j), `gravity` (3) m/s2."""
     robot = settings.robot
-    point = _Point(robot, q, gravity, payload)
+    point = _Point(robot, q, gravity, payload, mechanics_of(robot).tree)
     margins = _margins_near(point)
+    nominal = margins(point)
     n, count = len(q), len(sources)
     table = np.zeros((count, n + len(SIDES)))
     position, limit, tilt = np.zeros((count, n)), np.zeros((count, n)), np.zeros(count)
@@ -95,7 +101,7 @@ def effects_of(
         if source.what == 'limit':
             limit[k, robot.joint_names.index(source.subject)] = source.value
             continue
-        some = [_effect(margins, point, one) for one in _alone(point, source)]
+        some = [_effect(margins, point, nominal, one) for one in _alone(point, source)]
         table[k] = some[0] if len(some) == 1 else combined(np.array(some), RSS)
         if source.what == 'offset':
             position[k, robot.joint_names.index(source.subject)] = source.value
@@ -110,14 +116,18 @@ def _alone(point: _Point, source: Source) -> list[Source]:
     return [replace(source, only=contact.name) for contact in point.robot.contacts]
 
 
-def _effect(margins: Callable[[_Point], Floats], point: _Point, source: Source) -> Floats:
-    """Return half the difference that +/- of a source makes, or the fall where both lower it."""
+def _effect(
+    margins: Callable[[_Point], Floats], point: _Point, nominal: Floats, source: Source
+) -> Floats:
+    """Return half the difference that +/- of a source makes, or the fall where both lower it.
+
+    `nominal` are the margins at the point.
+    """
     high, low = (margins(_moved(point, source, s * source.value)) for s in (1.0, -1.0))
     with np.errstate(invalid='ignore'):
         half = 0.5 * (high - low)
         if source.what not in FOOTING:
             return half
-        nominal = margins(point)
         both = np.minimum(nominal - high, nominal - low) > 0.0
         found: Floats = np.where(both, nominal - np.minimum(high, low), half)
     return found
@@ -131,7 +141,7 @@ def torque_effects(
     `gravity` (P, 3) m/s2; N m (N). Sources of limits and contacts have none.
     """
     columns: Any = tuple(gravity.T)
-    point: Any = _Point(robot, tuple(q.T), columns, payload)
+    point: Any = _Point(robot, tuple(q.T), columns, payload, mechanics_of(robot).tree)
     nominal = _torques(point, len(q))
     found = np.zeros((len(sources), *nominal.shape))
     for k, source in enumerate(sources):
@@ -167,7 +177,8 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
     edges = edges_of(mechanics, corners, stance.sides, rocks=True)
 
     def margins(at: _Point) -> Floats:
-        posture: Any = _posture(at)
+        same = at.robot is point.robot and at.q is point.q and at.payload is point.payload
+        posture: Any = nominal if same else _posture(at)
         hanging = torque_of(posture, at.gravity)
         torque = standing_torque(mechanics, posture, footing.points, at.gravity, hanging)
         terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]
@@ -186,7 +197,8 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
 
 
 def _posture(point: _Point) -> Posture:
-    return posture_once(point.robot, point.q, point.payload.mass, point.payload.cog)
+    load = point.payload
+    return posture_once(point.robot, point.q, load.mass, load.cog, point.tree)
 
 
 def _moved(point: _Point, source: Source, by: float) -> _Point:
@@ -198,7 +210,8 @@ def _moved(point: _Point, source: Source, by: float) -> _Point:
         j = point.robot.joint_names.index(source.subject)
         q = (*point.q[:j], point.q[j] + by, *point.q[j + 1 :])
         return replace(point, q=q)
-    return replace(point, robot=_other_robot(point.robot, source, by))
+    other = _other_robot(point.robot, source, by)
+    return replace(point, robot=other, tree=point.tree if source.subject == CONTACTS else None)
 
 
 def _other_payload(payload: Payload, source: Source, by: float) -> Payload:
@@ -351,22 +364,6 @@ _OF: dict[str, Callable[[Effects, Moment, Settings], Floats]] = {
     'tip_angle': _angle,
     'tilt': _tilt,
 }
-
-
-def moment_json(moment: Moment, settings: Settings) -> dict[str, Any]:
-    """Return posture, attitude and payload of a moment for JSON, in degrees, metres and kg."""
-    gx, gy, gz = moment.gravity
-    joints = {}
-    for name, q in zip(settings.robot.joint_names, moment.q, strict=True):
-        scale, unit = shown('position', name, settings)
-        joints[name] = {'position': q * scale, 'unit': unit}
-    return {
-        'joints': joints,
-        'roll_deg': math.degrees(math.atan2(-gy, -gz)),
-        'pitch_deg': math.degrees(math.atan2(gx, math.hypot(gy, gz))),
-        'payload_kg': moment.payload.mass,
-        'payload_cog_m': list(moment.payload.cog),
-    }
 
 
 def margin_bounds(result: dict[str, Any], limits: CriteriaMeasurement, bounds: Bounds) -> None:

@@ -32,6 +32,7 @@ from ugv_acceptance.evaluation.criteria.measurement import (
     KnownTime,
     MapMeasure,
     ValueMeasure,
+    moment_json,
 )
 from ugv_acceptance.evaluation.criteria.messages import (
     NO_VALUE,
@@ -50,7 +51,6 @@ from ugv_acceptance.evaluation.criteria.safeguards import (
     waived_words,
 )
 from ugv_acceptance.evaluation.criteria.statement import NotChecked
-from ugv_acceptance.evaluation.criteria.uncertainty import moment_json
 from ugv_acceptance.evaluation.margin_words import percent_words, share_words
 from ugv_acceptance.evaluation.permitted_limits import relaxed_words
 from ugv_acceptance.type_aliases import Json

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
+from ugv_acceptance.evaluation.effort.quantiles import f_quantile
 from ugv_acceptance.evaluation.effort.regression import Fit, independent_samples, least_squares
 from ugv_acceptance.type_aliases import Floats, Json
 
@@ -131,7 +131,7 @@ def in_motion(s: JointSamples) -> Json | None:
     left = float(s.margin[moving].min())
     return {
         'f': mean_squares[0] / mean_squares[1],
-        'critical': float(fdtri(freedom[0], freedom[1], 1.0 - ALPHA)),
+        'critical': f_quantile(freedom[0], freedom[1], 1.0 - ALPHA),
         'alpha': ALPHA,
         'freedom': freedom,
         'rms_motion': float(np.sqrt(mean_squares[0])),

@@ -25,6 +25,11 @@ class Lasting:
     _found: list[Spell] = field(default_factory=list)
     _open: Spell | None = None
 
+    @property
+    def open(self) -> bool:
+        """Whether a spell lasts until the last row: only then rows that are not bad matter."""
+        return self._open is not None
+
     def add(self, time: Times, until: Times, bad: NDArray[np.bool_], value: Floats) -> None:
         """Take rows (n,) that hold from `time` to `until` (ns): whether bad, and how large."""
         if not len(time) or (self._open is None and not bad.any()):

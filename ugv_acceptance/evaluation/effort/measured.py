@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.criteria.statement import Objection
 from ugv_acceptance.evaluation.effort.facts import CONSTANT, NONE, SCALED, JointMeaning
@@ -19,6 +18,8 @@ from ugv_acceptance.type_aliases import Floats
 
 # An effort at this share of the limit has reached it.
 REACHED = 0.999
+# Sums up to this share of a limit are below it, whatever is rounded.
+CERTAIN = 1.0 - 1e-9
 # A difference from the model must last this long (ns): shorter ones are of motion.
 LASTS = 500_000_000
 # Spells named as evidence.
@@ -52,28 +53,40 @@ class MeasuredLimits:
         """Take the margins of the next part of the recording; unknown ones and efforts are none."""
         if not len(rows.time):
             return
-        effort, torque = rows.effort, rows.torque
         with np.errstate(invalid='ignore'):
-            size, left = np.abs(effort), self._limit - np.abs(torque)
-            standing = rows.weighed & ~(rows.angle.min(axis=1) <= 0.0)
-            self._feed(self._over, rows, size >= REACHED * self._limit, size)
-            for sign, spells in self._apart.items():
-                apart = np.abs(sign * effort - torque)
-                bad = (apart > left) & (left > 0.0) & np.isfinite(left) & standing[:, None]
-                self._feed(spells, rows, bad, apart)
-            # Twice in a row, so that one wild number is none.
-            twice = np.fmin(size[1:], size[:-1])
-        self.most = np.fmax(self.most, np.nan_to_num(np.fmax.reduce(twice, axis=0, initial=0.0)))
+            largest = np.fmax.reduce(np.abs(rows.pairs.joints.effort), axis=0, initial=0.0)
+            for j, most in enumerate(largest.tolist()):
+                self._take_sizes(rows, j, most)
+                self._take_differences(rows, j, most)
 
-    def _feed(
-        self,
-        spells: list[Lasting],
-        rows: MarginRows,
-        bad: NDArray[np.bool_],
-        value: Floats,
-    ) -> None:
-        for j, lasting in enumerate(spells):
-            lasting.add(rows.time, rows.until, bad[:, j], value[:, j])
+    def _take_sizes(self, rows: MarginRows, j: int, most: float) -> None:
+        """Take how large a joint's efforts are; `most` is the largest of them, or more."""
+        reached, lasting = REACHED * self._limit[j], self._over[j]
+        if most < reached and most <= self.most[j] and not lasting.open:
+            return
+        size = np.abs(rows.pairs.joints.effort[rows.pairs.of_joints, j])
+        lasting.add(rows.time, rows.until, size >= reached, size)
+        # Twice in a row, so that one wild number is none.
+        twice = np.fmin(size[1:], size[:-1])
+        largest = np.nan_to_num(np.fmax.reduce(twice, initial=0.0))
+        self.most[j] = max(self.most[j], float(largest))
+
+    def _take_differences(self, rows: MarginRows, j: int, most: float) -> None:
+        """Take how far a joint's efforts are from the model; `most` is the largest, or more."""
+        torque, limit = rows.torque[:, j], self._limit[j]
+        load = np.abs(torque)
+        # None can be further away than the margin left.
+        little = most + 2.0 * np.fmax.reduce(load, initial=0.0) <= CERTAIN * limit
+        spells = {sign: lasting[j] for sign, lasting in self._apart.items()}
+        if little and not any(lasting.open for lasting in spells.values()):
+            return
+        left = limit - load
+        judged = (left > 0.0) & np.isfinite(left) & rows.weighed
+        judged &= ~(rows.angle.min(axis=1) <= 0.0)
+        effort = rows.pairs.joints.effort[rows.pairs.of_joints, j]
+        for sign, lasting in spells.items():
+            apart = np.abs(sign * effort - torque)
+            lasting.add(rows.time, rows.until, (apart > left) & judged, apart)
 
     def objections(
         self, joints: Sequence[JointMeaning], start: int, carrying: Collection[int] = ()

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
+from ugv_acceptance.evaluation.effort.quantiles import t_quantile
 from ugv_acceptance.type_aliases import Floats
 
 CONFIDENCE = 0.95
@@ -53,5 +53,5 @@ def least_squares(columns: Floats, y: Floats) -> Fit | None:
     freedom = max(worth - k, 1.0)
     variance = float(residual @ residual) / (n - k) * (n / max(worth, 1.0))
     deviation = np.sqrt(variance * np.diag(inverse))
-    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0))
+    quantile = t_quantile(freedom, 0.5 + CONFIDENCE / 2.0)
     return Fit(value / scale, quantile * deviation / scale, worth)

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, feed
 from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.imu_cell import A, Q, W
+from ugv_acceptance.evaluation.inputs.imu_grid import samples
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
 from ugv_acceptance.evaluation.inputs.imu_rest import RestChecks
 from ugv_acceptance.evaluation.inputs.imu_seen import ImuSeen, rested_messages
@@ -215,9 +217,13 @@ class ImuTracker:
         omega = _lines([s.angular_velocity for s in columns])[:, order]
         acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
         frame = self.settings.imu.frame
-        lengths = [len(s.log_time) for s in columns]
-        foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
-        self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
+        if len({s.frame_id for s in columns}) == 1:
+            foreign = np.full(len(time), _foreign(columns[0].frame_id, frame))
+            self._take_frames(time, np.array([columns[0].frame_id]))
+        else:
+            lengths = [len(s.log_time) for s in columns]
+            foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
+            self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
         self.seen.take(columns)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
@@ -225,7 +231,7 @@ class ImuTracker:
             return self._rows(time, stamp, told_by, (smooth, raw), foreign)
 
     def _take_frames(self, time: Times, names: NDArray[np.str_]) -> None:
-        """Take the frame that each message names, in order of receipt."""
+        """Take the frame that each message names, in order of receipt; the last for all after."""
         changed = np.flatnonzero(names[1:] != names[:-1]) + 1
         for k in [0, *changed.tolist()]:
             if names[k] != self._frame:
@@ -256,7 +262,9 @@ class ImuTracker:
         told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
         self._count(told, given)
         by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
-        oriented = np.where(rotation, by_orientation, np.nan)
+        oriented = np.array(by_orientation)
+        if not rotation.all():
+            oriented[:, ~rotation] = np.nan
         up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
         leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
         rest = still & (off <= imu.rest_acceleration)
@@ -269,7 +277,7 @@ class ImuTracker:
             gravity = np.where(believable & ~(size < FALL * g), force, np.nan)
         else:
             use = told & (imu.attitude != 'accelerometer')
-            gravity = -g * np.where(use, oriented, leaning)
+            gravity = -g * (oriented if use.all() else np.where(use, oriented, leaning))
             if imu.attitude == 'auto' and not believable.all():
                 gravity[:, ~believable] = np.nan
         unknown = believable & np.isnan(gravity[0])
@@ -280,14 +288,14 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw,)
-        samples = np.column_stack((*felt, told))
-        trusted = self._judge_motion(time, stamp, samples, gravity)
+        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw[:, Q], raw[:, W], raw[:, A])
+        table = samples(*felt, told)
+        trusted = self._judge_motion(time, stamp, table, gravity)
         self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable, trusted)
 
     def _judge_motion(self, time: Times, stamp: Times, x: Floats, gravity: Floats) -> Mask:
-        """Give samples (n, 11) to the checks in motion; set gravity to NaN while one says so.
+        """Give samples (n, WIDTH) to the checks in motion; set gravity to NaN while one says so.
 
         Return where the gyro is trusted (n,).
         """

@@ -98,6 +98,14 @@ class ImuGrid:
             return found
         return list(map(sub, self.line(end), self.line(end - rows)))
 
+    def windows(self, ends: Sequence[int], rows: int) -> list[list[float]]:
+        """Return `over` of many windows of so many rows."""
+        if isinstance(self.rows, np.ndarray):
+            at = np.asarray(ends, np.intp) - self.first
+            found: list[list[float]] = (self.rows[at] - self.rows[at - rows]).tolist()
+            return found
+        return [self.over(end, rows) for end in ends]
+
     def line(self, row: int) -> Row:
         """Return the row of that number."""
         found = self.rows[row - self.first]
@@ -257,15 +265,14 @@ def _added(x: Floats, edges: NDArray[np.intp], weight: Floats, g: float) -> Floa
     return out
 
 
-def samples(x: Floats) -> Floats:
-    """Return samples (n, WIDTH) of orientation, rate, acceleration, OK: with the other columns.
+def samples(q: Floats, w: Floats, a: Floats, told: NDArray[np.bool_]) -> Floats:
+    """Return samples (n, WIDTH) of orientation (n, 4), rate, acceleration (n, 3) and OK (n,).
 
     What cannot be summed is 0, and not GOOD. The time is left for the caller.
     """
-    table = np.zeros((len(x), WIDTH))
-    table[:, : OK + 1] = x
-    table[:, W2] = np.einsum('ij,ij->i', x[:, W], x[:, W])
-    table[:, A2] = np.einsum('ij,ij->i', x[:, A], x[:, A])
+    table = np.zeros((len(q), WIDTH))
+    table[:, Q], table[:, W], table[:, A], table[:, OK] = q, w, a, told
+    table[:, W2], table[:, A2] = (np.einsum('ij,ij->i', v, v) for v in (w, a))
     good = (table[:, W2] < LARGEST) & (table[:, A2] < LARGEST)
     table[:, GOOD] = good
     if not good.all():

@@ -6,11 +6,12 @@ two sources. Only the check for frozen values looks at every message at once.
 """
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,11 +31,11 @@ from ugv_acceptance.evaluation.inputs.imu_cell import (
 )
 from ugv_acceptance.evaluation.inputs.imu_frozen import FrozenCheck
 from ugv_acceptance.evaluation.inputs.imu_gravity import WINDOWS, gravity_over
-from ugv_acceptance.evaluation.inputs.imu_grid import GRID, HOP, LONGEST, ImuGrid, samples
+from ugv_acceptance.evaluation.inputs.imu_grid import GRID, HOP, LONGEST, ImuGrid
 from ugv_acceptance.evaluation.inputs.imu_placing import WINDOW as PLACING
 from ugv_acceptance.evaluation.inputs.imu_placing import Mounting, unit_over
 from ugv_acceptance.evaluation.inputs.imu_rates import WINDOW as TURNING
-from ugv_acceptance.evaluation.inputs.imu_rates import RatesFound, rates_over
+from ugv_acceptance.evaluation.inputs.imu_rates import RatesFound, rates_of
 from ugv_acceptance.evaluation.inputs.imu_sources import same_sign, suspected, two_sources
 from ugv_acceptance.evaluation.inputs.imu_tally import Tally
 from ugv_acceptance.evaluation.settings import Settings
@@ -84,6 +85,29 @@ class MotionSignals:
             self.frozen, self.contradiction, self.rates, self.rotation, self.mounting, self.unit,
             self.sources,
         )  # fmt: skip
+
+
+class Hop(NamedTuple):
+    """What the windows show that end at a `row` of the grid: the sums of WINDOWS, and the rates.
+
+    Of windows as long as the grid so far.
+    """
+
+    row: int
+    sums: tuple[Sequence[float], ...]
+    rates: RatesFound
+
+
+def hops_of(grid: ImuGrid, rows: Sequence[int]) -> list[Hop]:
+    """Return the hops that end at these rows of the grid, in order."""
+    sums: list[tuple[Sequence[float], ...]] = [()] * len(rows)
+    for length in WINDOWS:
+        late = bisect_left(rows, length)
+        for k, found in enumerate(grid.windows(rows[late:], length), late):
+            sums[k] = (*sums[k], found)
+    late = bisect_left(rows, TURNING)
+    rates = [RatesFound()] * late + rates_of(grid, rows[late:])
+    return list(map(Hop, rows, sums, rates))
 
 
 @dataclass(slots=True)
@@ -172,9 +196,9 @@ class MotionChecks:
         self._cell = []
         row = grid.row
         self._due = (row + 1) * GRID
-        for k in range(last // HOP * HOP + HOP, row + 1, HOP):
-            self._judge(k, now, self._recent)
-            if k % SOURCES == 0:
+        for hop in hops_of(grid, range(last // HOP * HOP + HOP, row + 1, HOP)):
+            self._judge(hop, now, self._recent)
+            if hop.row % SOURCES == 0:
                 self._window.clear()
         grid.trim()
 
@@ -195,7 +219,7 @@ class MotionChecks:
     def columns(self, time: Times, stamp: Times, x: Floats) -> None:
         """Take many messages in order of receipt, as `step` one at a time.
 
-        `x` (n, OK + 1) holds orientation, rate, acceleration and `told`.
+        `x` (n, WIDTH) are samples of imu_grid.py; their time is filled in here.
         """
         if self.tally is None:
             self.tally = Tally()
@@ -217,11 +241,10 @@ class MotionChecks:
     def _part(self, time: Times, passed: Times, x: Floats) -> None:
         """Take samples of one grid: judge all hops that end with one of them, keep the rest."""
         tau = self._tau + np.cumsum(passed)
-        table = samples(x)
-        table[:, TAU] = tau
+        x[:, TAU] = tau
         self._tau = int(tau[-1])
         grid, at = self._grid, tau // GRID
-        self._kept = np.concatenate((self._kept, table))
+        self._kept = np.concatenate((self._kept, x))
         if at[-1] == grid.row:
             return
         last = grid.row
@@ -229,9 +252,10 @@ class MotionChecks:
         end = len(self._kept) - len(tau) + int(np.searchsorted(at, at[-1]))
         grid.extend(self._kept[self._row_at : end + 1])
         times = self._kept[:, TAU]
-        for k in range(last // HOP * HOP + HOP, grid.row + 1, HOP):
-            closing = int(np.searchsorted(tau, k * GRID))
-            self._judge(k, int(time[closing]), partial(_part_of, self._kept, times, k))
+        rows = range(last // HOP * HOP + HOP, grid.row + 1, HOP)
+        closed = time[np.searchsorted(tau, np.array(rows) * GRID)].tolist()
+        for hop, now in zip(hops_of(grid, rows), closed, strict=True):
+            self._judge(hop, now, partial(_part_of, self._kept, times, hop.row))
         grid.trim()
         self._due = (grid.row + 1) * GRID
         begins = np.searchsorted(times, grid.row // SOURCES * SOURCES * GRID)
@@ -248,15 +272,14 @@ class MotionChecks:
         self._tau, self._due = 0, GRID
         self._before = [math.nan] * 3
 
-    def _judge(self, row: int, now: int, recent: Callable[[], Floats]) -> None:
-        """Judge the hop that ends at a row of the grid and at `now` (ns).
+    def _judge(self, hop: Hop, now: int, recent: Callable[[], Floats]) -> None:
+        """Judge a hop that ends at `now` (ns).
 
         `recent` gives the samples of the window that is searched for two sources.
         """
-        of, grid, tally = self.faults, self._grid, self.tally
-        unit = self._gravity(row, now)
-        rates = rates_over(grid, row) if row >= TURNING else RatesFound()
-        source = self._sources(row, now, recent)
+        of, tally, row, rates = self.faults, self.tally, hop.row, hop.rates
+        unit = self._gravity(hop, now)
+        source = self._sources(hop, now, recent)
         if tally:
             tally.others(unit, source)
             if row >= TURNING:
@@ -269,23 +292,20 @@ class MotionChecks:
         self._tell(of.rotation, now, 0.0 if self._calm >= CALM else turn)
         self._tell(of.sources, now, source)
         if row >= PLACING and (self.mounting.kind != 0.0 or not of.mounting.quiet):
-            found = self.mounting.judge(grid, row, now)
+            found = self.mounting.judge(self._grid, row, now)
             self._tell(of.mounting, now, found, now - self._began)
 
-    def _gravity(self, row: int, now: int) -> float:
+    def _gravity(self, hop: Hop, now: int) -> float:
         """Tell where orientation and mean acceleration differ; return the unit of the latter.
 
         Of windows of several lengths the shortest is told.
         """
         unit = angle = math.nan
-        reach, grid = 0, self._grid
-        for rows in WINDOWS:
-            if row < rows:
-                break
-            d = grid.over(row, rows)
+        reach, g = 0, self._grid.g
+        for rows, d in zip(WINDOWS, hop.sums, strict=False):
             if rows == PLACING:
-                unit = unit_over(d, grid.g)
-            found = gravity_over(d, rows, grid.g)
+                unit = unit_over(d, g)
+            found = gravity_over(d, rows, g)
             if found is None:
                 continue
             if self.tally:
@@ -297,11 +317,11 @@ class MotionChecks:
         self._agrees = angle == 0.0
         return unit
 
-    def _sources(self, row: int, now: int, recent: Callable[[], Floats]) -> float:
+    def _sources(self, hop: Hop, now: int, recent: Callable[[], Floats]) -> float:
         """Return the number of SOURCE_KINDS; NaN where two sources were not looked for."""
         found = math.nan
-        if row % SOURCES == 0:
-            d = self._grid.over(row, SOURCES)
+        if hop.row % SOURCES == 0:
+            d = hop.sums[WINDOWS.index(SOURCES)]
             found = 0.0
             if suspected(d[PAIRS], d[FORCE_JUMPS]):
                 found = 1.0 if two_sources(recent()[:, A], APART_FORCE) else 0.0

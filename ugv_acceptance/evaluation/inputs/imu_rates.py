@@ -1,10 +1,12 @@
 """The gyro against the orientation's own change, in motion: units, axes, stuck, contradicting.
 
 Rotations over half a second are compared in windows of 3 s; the orientation may come up to 1 s
-late, as that of a filter does. A window counts only where something turned.
+late, as that of a filter does. A window counts only where something turned. Windows in which both
+do not plainly agree are looked at side by side: one live, all those of a part of a recording.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -40,6 +42,8 @@ LEAST_RATE = 40.0
 AGREES, ALIKE = 0.7, (0.5, 2.0)
 # A smaller cosine contradicts; a rotation of axes must explain it by at least this cosine.
 DIFFERS, EXPLAINED, EXPLAINED_UNIT = 0.5, 0.85, 0.8
+# Less than this share of a bound is below it, whatever is rounded.
+CERTAIN = 1.0 - 1e-9
 # Degrees for radians, a factor of 57.3; a ratio beyond these says that one of the two stands still.
 DEGREES, STUCK, IDLE = (35.0, 90.0), 5.0, 0.2
 
@@ -74,6 +78,23 @@ class RatesFound(NamedTuple):
 
 def rates_over(grid: ImuGrid, end: int) -> RatesFound:
     """Return what the window that ends at the row number `end` of the grid shows."""
+    return rates_of(grid, (end,))[0]
+
+
+def rates_of(grid: ImuGrid, ends: Sequence[int]) -> list[RatesFound]:
+    """Return what the windows that end at these row numbers of the grid show."""
+    looks = [_plainly(grid, end) for end in ends]
+    found = [look if isinstance(look, RatesFound) else RatesFound() for look in looks]
+    noise = {k: look for k, look in enumerate(looks) if isinstance(look, float)}
+    if noise:
+        rows = np.stack([grid.table(ends[k], WINDOW) for k in noise])
+        for k, judged in zip(noise, _closer(rows, np.array(list(noise.values()))), strict=True):
+            found[k] = judged
+    return found
+
+
+def _plainly(grid: ImuGrid, end: int) -> RatesFound | float:
+    """Return what a window plainly shows, else the noise (rad/s) of a mean rate: look closer."""
     last, before = grid.line(end), grid.line(end - PLACES)
     count = last[COMPARED] - before[COMPARED]
     g2, o2 = last[GYRO_2] - before[GYRO_2], last[OWN_2] - before[OWN_2]
@@ -94,126 +115,192 @@ def rates_over(grid: ImuGrid, end: int) -> RatesFound:
         return RatesFound(0.0, 0.0, excited=True, cosine=cosine)
     # Where both differ by no more than a small rate nothing contradicts, however late one comes.
     apart = math.sqrt(max(g2 + o2 - 2.0 * both, 0.0) / count) / (0.1 * SPAN)
-    if apart <= EXCITED + noise:
-        return RatesFound(excited=True, cosine=cosine)
-    return _window(grid.table(end, WINDOW), noise).judge()
+    return RatesFound(excited=True, cosine=cosine) if apart <= EXCITED + noise else noise
 
 
-def _window(rows: Floats, noise: float) -> 'Window':
-    """Return the window of these rows of the grid (WINDOW + 1, n)."""
-    d = rows[SPAN:] - rows[:-SPAN]
-    known = d[:, KNOWN] == SPAN
-    q = np.where(known[:, None], rows[:-SPAN, QUATERNION], (0.0, 0.0, 0.0, 1.0))
-    x, y, z, w = q.T
-    up = np.stack((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w + z * z - x * x - y * y), 1)
-    up /= np.einsum('ij,ij->i', q, q)[:, None]
-    return Window(d[:, TURN] * known[:, None], d[:, OWN] * known[:, None], known, up, noise)
+def _closer(rows: Floats, noise: Floats) -> list[RatesFound]:
+    """Return what windows show, given their rows of the grid (m, WINDOW + 1, n) and noise (m,)."""
+    first, last = rows[:, :-SPAN], rows[:, SPAN:]
+    known = last[..., KNOWN] - first[..., KNOWN] == SPAN
+    q = np.where(known[..., None], first[..., QUATERNION], (0.0, 0.0, 0.0, 1.0))
+    x, y, z, w = np.moveaxis(q, -1, 0)
+    up = np.stack((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w + z * z - x * x - y * y), -1)
+    up /= np.einsum('ij,ij->i', q.reshape(-1, 4), q.reshape(-1, 4)).reshape(*known.shape, 1)
+    turned, own = ((last[..., of] - first[..., of]) * known[..., None] for of in (TURN, OWN))
+    alike: dict[bytes, list[int]] = {}
+    for k, row in enumerate(known):
+        alike.setdefault(row.tobytes(), []).append(k)
+    found = [RatesFound()] * len(rows)
+    for at in alike.values():
+        windows = Windows(_Pairs(turned[at], own[at], up[at]), known[at[0]], noise[at])
+        for k, judged in zip(at, windows.judge(), strict=True):
+            found[k] = judged
+    return found
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
-    """A window in which gyro and orientation do not plainly agree: rotations (n, 3) in rad.
+class _Pairs:
+    """Rotations (m, n, 3) in rad of gyro and orientation over the same times, in m windows.
 
-    `turned` of the gyro, `own` of the orientation, where it is `known` (n,); `up` (n, 3) is the
-    world's z axis in sensor axes, `noise` (rad/s) that of a mean rate.
+    `up` is the world's z axis in sensor axes. What the properties return is of each window (m,).
     """
 
     turned: Floats
     own: Floats
-    known: NDArray[np.bool_]
-    up: Floats
-    noise: float
-
-    def judge(self) -> RatesFound:
-        """Return what is wrong with gyro and orientation."""
-        pairs = [pair for late in range(LATE + 1) if (pair := self._late(late))]
-        found = max(pairs, key=lambda pair: pair.cosine, default=None)
-        if found is None:
-            return RatesFound()
-        c, s = found.cosine, found.ratio
-        if c >= AGREES and ALIKE[0] <= s <= ALIKE[1]:
-            return RatesFound(0.0, 0.0, excited=True, cosine=c)
-        if found.error <= EXCITED + self.noise:
-            return RatesFound(excited=True, cosine=c)
-        gyro = _gyro_kind(s, c, pairs)
-        if gyro:
-            return RatesFound(gyro, excited=True, cosine=c)
-        kind = self._orientation_kind(found) or math.nan
-        return RatesFound(orientation=kind, excited=True, cosine=c)
-
-    def _late(self, late: int) -> '_Pair | None':
-        """Return the rotations with an orientation that comes `late` rows late."""
-        n = len(self.turned) - late
-        known = self.known[late:]
-        if known.sum() < FEWEST:
-            return None
-        return _Pair(self.turned[:n][known], self.own[late:][known], self.up[late:][known])
-
-    def _orientation_kind(self, found: '_Pair') -> float:
-        tilt_error, tilt_cosine = found.tilt
-        tilts = tilt_error > EXCITED + self.noise and tilt_cosine < DIFFERS
-        if found.ratio > STUCK:
-            return 3.0
-        if found.ratio < IDLE and tilts:
-            return 2.0
-        return 1.0 if found.cosine < DIFFERS and tilts else 0.0
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """Rotations (n, 3) of gyro and orientation over the same times, and `up` in sensor axes."""
-
-    turned: Floats
-    own: Floats
     up: Floats
 
-    @property
-    def cosine(self) -> float:
-        return _cosine(self.turned, self.own)
+    def late(self, late: int, known: NDArray[np.bool_]) -> '_Pairs':
+        """Return the rotations with an orientation that comes `late` rows late, where `known`."""
+        of = np.flatnonzero(known[late:])
+        return _Pairs(*(x.take(at, axis=1) for x, at in zip(
+            (self.turned, self.own, self.up), (of, of + late, of + late), strict=True,
+        )))  # fmt: skip
+
+    def of(self, some: NDArray[np.intp]) -> '_Pairs':
+        """Return those of some of the windows."""
+        return _Pairs(self.turned[some], self.own[some], self.up[some])
 
     @property
-    def ratio(self) -> float:
-        return math.sqrt(float((self.turned**2).sum() / ((self.own**2).sum() + 1e-12)))
+    def cosine(self) -> Floats:
+        return _cosines(self.turned, self.own)
 
     @property
-    def error(self) -> float:
+    def ratio(self) -> Floats:
+        ratio: Floats = np.sqrt(_dots(self.turned, self.turned) / (self._own + 1e-12))
+        return ratio
+
+    @property
+    def error(self) -> Floats:
         """Root mean square of the difference (rad/s)."""
-        return _size(self.turned - self.own)
+        return _sizes(self.turned - self.own)
 
     @property
-    def tilt(self) -> tuple[float, float]:
+    def tilt(self) -> tuple[Floats, Floats]:
         """Difference (rad/s) and cosine of the parts that change the tilt."""
-        level = [v - (v * self.up).sum(axis=1, keepdims=True) * self.up for v in self._both()]
-        return _size(level[0] - level[1]), _cosine(*level)
-
-    def _both(self) -> tuple[Floats, Floats]:
-        return self.turned, self.own
+        up = self.up
+        a, b = (v - (v * up).sum(axis=2, keepdims=True) * up for v in (self.turned, self.own))
+        return _sizes(a - b), _cosines(a, b)
 
     @property
-    def explained(self) -> tuple[float, float]:
+    def explained(self) -> tuple[Floats, Floats]:
         """Cosine after the best rotation of the axes, and after the best that may mirror."""
-        product = self.turned.T @ self.own
-        u, sizes, v = np.linalg.svd(product)
-        whole = math.sqrt(float((self.turned**2).sum() * (self.own**2).sum()) + 1e-18)
-        hand = 1.0 if np.linalg.det(u @ v) > 0.0 else -1.0
-        return float(sizes[0] + sizes[1] + hand * sizes[2]) / whole, float(sizes.sum()) / whole
+        u, sizes, v = np.linalg.svd(self._product)
+        whole = self._whole
+        hand = np.where(np.linalg.det(u @ v) > 0.0, 1.0, -1.0)
+        turns = (sizes[:, 0] + sizes[:, 1] + hand * sizes[:, 2]) / whole
+        return turns, sizes.sum(axis=1) / whole
+
+    @property
+    def most_explained(self) -> Floats:
+        """No less than both of `explained`, without singular values.
+
+        The square of the sum of three numbers is the sum of their squares, and twice that of their
+        products: at most the square root of three times the sum of the products' squares, which is
+        that of the squares of all cofactors.
+        """
+        rows = self._product
+        cofactors = np.cross(rows, rows[:, [1, 2, 0]])
+        square = _dots(rows, rows) + 2.0 * np.sqrt(3.0 * _dots(cofactors, cofactors))
+        most: Floats = np.sqrt(square) / self._whole
+        return most
+
+    @property
+    def _product(self) -> Floats:
+        found: Floats = np.matmul(self.turned.transpose(0, 2, 1), self.own)
+        return found
+
+    @property
+    def _whole(self) -> Floats:
+        whole: Floats = np.sqrt(_dots(self.turned, self.turned) * self._own + 1e-18)
+        return whole
+
+    @property
+    def _own(self) -> Floats:
+        return _dots(self.own, self.own)
 
 
-def _gyro_kind(ratio: float, cosine: float, pairs: list[_Pair]) -> float:
-    """Return what is wrong with the gyro alone, number of GYRO_KINDS, 0 for nothing known."""
-    turns, mirrors = np.max([pair.explained for pair in pairs[::2]], axis=0)
-    if DEGREES[0] < ratio < DEGREES[1] and turns > EXPLAINED_UNIT:
-        return 1.0
-    if ratio < 1.0 / DEGREES[0] and turns > EXPLAINED_UNIT:
-        return 2.0
-    if ALIKE[0] < ratio < ALIKE[1] and cosine < DIFFERS:
-        return 3.0 if turns > EXPLAINED else 4.0 if mirrors > EXPLAINED else 0.0
-    return 0.0
+@dataclass(frozen=True, slots=True)
+class Windows:
+    """Windows (m,) in which gyro and orientation do not plainly agree, judged side by side.
+
+    The orientation is `known` (n,) at the same places of all; `noise` (m,) is that of a mean rate
+    (rad/s).
+    """
+
+    pairs: _Pairs
+    known: NDArray[np.bool_]
+    noise: Floats
+
+    def judge(self) -> list[RatesFound]:
+        """Return what is wrong with gyro and orientation, window by window."""
+        lates = [k for k in range(LATE + 1) if np.count_nonzero(self.known[k:]) >= FEWEST]
+        if not lates:
+            return [RatesFound()] * len(self.noise)
+        pairs = [self.pairs.late(late, self.known) for late in lates]
+        cosines = np.array([of.cosine for of in pairs])
+        best = cosines.argmax(axis=0)
+        ratio, error, kind = (np.zeros(len(best)) for _ in range(3))
+        for late in np.unique(best):
+            at = np.flatnonzero(best == late)
+            found = pairs[late].of(at)
+            ratio[at], error[at] = found.ratio, found.error
+        cosine = cosines[best, np.arange(len(best))]
+        agree = (cosine >= AGREES) & (ratio >= ALIKE[0]) & (ratio <= ALIKE[1])
+        small = error <= EXCITED + self.noise
+        gyro = _gyro_kinds(ratio, cosine, pairs, ~(agree | small))
+        left = ~(agree | small) & (gyro == 0.0)
+        for late in np.unique(best[left]):
+            at = np.flatnonzero(left & (best == late))
+            kind[at] = self._orientation_kinds(pairs[late].of(at), ratio[at], cosine[at], at)
+        kind[agree], gyro[agree] = 0.0, 0.0
+        kind[~agree & (small | (gyro > 0.0) | (kind == 0.0))] = math.nan
+        gyro[~agree & (gyro == 0.0)] = math.nan
+        told = zip(gyro.tolist(), kind.tolist(), cosine.tolist(), strict=True)
+        return [RatesFound(a, b, excited=True, cosine=c) for a, b, c in told]
+
+    def _orientation_kinds(
+        self, found: _Pairs, ratio: Floats, cosine: Floats, at: NDArray[np.intp]
+    ) -> Floats:
+        """Return what is wrong with the orientation of the windows `at`, of ORIENTATION_KINDS."""
+        tilt_error, tilt_cosine = found.tilt
+        tilts = (tilt_error > EXCITED + self.noise[at]) & (tilt_cosine < DIFFERS)
+        kind = np.where((cosine < DIFFERS) & tilts, 1.0, 0.0)
+        kind[(ratio < IDLE) & tilts] = 2.0
+        kind[ratio > STUCK] = 3.0
+        return kind
 
 
-def _cosine(a: Floats, b: Floats) -> float:
-    return float((a * b).sum()) / math.sqrt(float((a * a).sum() * (b * b).sum()) + 1e-18)
+def _gyro_kinds(
+    ratio: Floats, cosine: Floats, pairs: Sequence[_Pairs], wanted: NDArray[np.bool_]
+) -> Floats:
+    """Return what is wrong with the gyro alone, of GYRO_KINDS, 0 for nothing known or `wanted`."""
+    large = (ratio > DEGREES[0]) & (ratio < DEGREES[1])
+    tiny = ratio < 1.0 / DEGREES[0]
+    alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & (cosine < DIFFERS)
+    kind = np.zeros(len(ratio))
+    at = np.flatnonzero(wanted & (large | tiny | alike))
+    most = np.max([of.of(at).most_explained for of in pairs[::2]], axis=0)
+    at = at[most > CERTAIN * min(EXPLAINED, EXPLAINED_UNIT)]
+    if not len(at):
+        return kind
+    turns, mirrors = np.max([of.of(at).explained for of in pairs[::2]], axis=0)
+    axes = np.where(turns > EXPLAINED, 3.0, np.where(mirrors > EXPLAINED, 4.0, 0.0))
+    unit = np.where(large[at], 1.0, 2.0) * (turns > EXPLAINED_UNIT)
+    kind[at] = np.where(alike[at], axes, unit)
+    return kind
 
 
-def _size(v: Floats) -> float:
-    return math.sqrt(float((v * v).sum()) / len(v)) / (0.1 * SPAN)
+def _dots(a: Floats, b: Floats) -> Floats:
+    """Return the sum of products of rotations (m, n, 3), of each window (m,)."""
+    found: Floats = (a * b).reshape(len(a), a.shape[1] * a.shape[2]).sum(axis=1)
+    return found
+
+
+def _cosines(a: Floats, b: Floats) -> Floats:
+    cosine: Floats = _dots(a, b) / np.sqrt(_dots(a, a) * _dots(b, b) + 1e-18)
+    return cosine
+
+
+def _sizes(v: Floats) -> Floats:
+    size: Floats = np.sqrt(_dots(v, v) / v.shape[1]) / (0.1 * SPAN)
+    return size

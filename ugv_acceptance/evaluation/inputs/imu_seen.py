@@ -35,8 +35,8 @@ class ImuSeen:
             self.messages += len(s.log_time)
             self.no_rate += int((s.angular_velocity_covariance_0 == -1.0).sum())
             self.no_force += int((s.linear_acceleration_covariance_0 == -1.0).sum())
-            turned = int(s.angular_velocity.any(axis=1).sum())
-            self.turned += turned
+            x, y, z = s.angular_velocity.T != 0.0
+            self.turned += int(np.count_nonzero(x | y | z))
 
 
 def rested_messages(time: Times, rest: NDArray[np.bool_]) -> int:
