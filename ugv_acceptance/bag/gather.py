@@ -22,7 +22,52 @@ Span: TypeAlias = tuple[int, int, int]  # block, first and last + 1 of its float
 LEAD = 8  # bytes kept free in front of a chunk's records, so that a row may begin before the first
 SLACK = 8  # and behind them, so that a row may end after the last
 HEAD = 31  # opcode, length, channel, sequence, log time, publish time
+_MESSAGE = 5  # opcode of a message record
+_HEADS = np.dtype(
+    [
+        ('opcode', 'u1'),
+        ('length', '<i8'),
+        ('channel', '<u2'),
+        ('sequence', '<u4'),
+        ('log_time', '<i8'),
+        ('publish_time', '<i8'),
+    ]
+)
 _BEFORE = 5  # a row starts this far before its record: then CDR's origin is a multiple of 8
+
+
+def as_records(
+    buffer: Bytes, lengths: Offsets, channels: int | Offsets, log_times: Times
+) -> Offsets:
+    """Make the n messages in a buffer look like those in a chunk; return their records' offsets.
+
+    They lie one after another from `buffer[LEAD]` on, with HEAD bytes free before each, into which
+    the head of a message record is written; `lengths` (n,) are of what is between.
+    """
+    heads = np.zeros(len(lengths), _HEADS)
+    heads['opcode'], heads['length'], heads['channel'] = _MESSAGE, lengths + (HEAD - 9), channels
+    heads['log_time'] = heads['publish_time'] = log_times
+    offsets = np.cumsum(lengths + HEAD) - (lengths + HEAD)
+    _items(buffer, LEAD, HEAD)[offsets] = heads.view(f'V{HEAD}')
+    return offsets
+
+
+def contents(
+    buffer: Bytes, size: int, offsets: Offsets, channel: int
+) -> tuple[NDArray[np.bool_], Offsets, Offsets, Times]:
+    """Return which records at `offsets` (n,) of a chunk of `size` bytes are a channel's messages.
+
+    And of these (k,) where in the buffer their contents begin, their lengths, and log times (ns).
+    """
+    room = size - HEAD - offsets
+    good = room >= 0
+    heads = np.zeros(len(offsets), _HEADS)
+    if good.any():
+        heads[good] = _items(buffer, LEAD, HEAD)[offsets[good]].view(_HEADS)
+    lengths = heads['length'] - (HEAD - 9)
+    good &= (heads['opcode'] == _MESSAGE) & (heads['channel'] == channel)
+    good &= (lengths >= 0) & (lengths <= room)
+    return good, offsets[good] + (LEAD + HEAD), lengths[good], heads['log_time'][good]
 
 
 @dataclass(slots=True)
@@ -129,8 +174,10 @@ class Gather:
 
 def _gather(buffer: Bytes, offsets: Offsets, start: int, size: int, kind: str) -> NDArray[Any]:
     """Return `size` bytes from byte `start` of every row, as (n, size / 8) numbers of `kind`."""
-    base = LEAD - _BEFORE + start
-    everywhere = np.ndarray(
-        (buffer.size - base - size + 1,), f'V{size}', buffer, offset=base, strides=(1,)
-    )
-    return everywhere[offsets].view(kind).reshape(len(offsets), size // 8)
+    found = _items(buffer, LEAD - _BEFORE + start, size)[offsets]
+    return found.view(kind).reshape(len(offsets), size // 8)
+
+
+def _items(buffer: Bytes, base: int, size: int) -> NDArray[Any]:
+    """Return the `size` bytes from every byte on from `base` as an item, without a copy."""
+    return np.ndarray((buffer.size - base - size + 1,), f'V{size}', buffer, base, (1,))

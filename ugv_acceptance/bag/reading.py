@@ -125,7 +125,8 @@ class Member:
         for channel in self.index.channels.values():
             kind, wire = topics.get(channel.topic), wire_of(channel)
             if kind and wire and normal_type(channel.type) == kind.type:
-                found[channel.id] = (channel.topic, ColumnDecoder(kind, channel.id, wire))
+                decoder = ColumnDecoder(kind, channel.id & 0xFFFF, wire)
+                found[channel.id] = (channel.topic, decoder)
         return found
 
 
