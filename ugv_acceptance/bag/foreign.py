@@ -27,7 +27,7 @@ _LAST_ID = (1 << 63) - 1
 # Of some rows: the contents with room for a head between them, the log times, and topic and length
 # in one number, which is 0 where the content is no blob (for SQLite: number < text < blob).
 _JOINED = f"""
-    SELECT count(*), CAST(group_concat(data, zeroblob({HEAD})) AS BLOB),
+    SELECT count(*), CAST(group_concat(data, x'{bytes(HEAD).hex()}') AS BLOB),
         CAST(group_concat(timestamp) AS BLOB),
         CAST(group_concat(((topic_id << 32) | length(data)) * (data >= x'')) AS BLOB)
     FROM messages WHERE id BETWEEN ? AND ? AND topic_id IN """
@@ -62,7 +62,10 @@ def open_sqlite(path: Path, name: str) -> ForeignIndex:
         }
         found = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
         counts = {int(i): int(n) for i, n in found}
-        first, last = db.execute('SELECT min(timestamp), max(timestamp) FROM messages').fetchone()
+        first, last = (  # each by itself is found by the index
+            db.execute(f'SELECT {which}(timestamp) FROM messages').fetchone()[0]
+            for which in ('min', 'max')
+        )
     return ForeignIndex(channels, counts, int(first or 0), int(last or 0))
 
 
@@ -252,7 +255,10 @@ def _joined(db: sqlite3.Connection, wanted: Collection[int]) -> Iterator[tuple[i
     """Yield the messages of some rows at a time, by id, with an id up to which all were read."""
     if not _usual(db) or not all(0 < channel < 1 << 31 for channel in wanted):
         raise _IrregularError
-    first, until = db.execute('SELECT min(id), min(timestamp) FROM messages').fetchone()
+    first, until = (
+        db.execute(f'SELECT min({name}) FROM messages').fetchone()[0]
+        for name in ('id', 'timestamp')
+    )
     buffer = np.zeros(0, np.uint8)
     while first is not None:
         last = min(first + _BLOCK - 1, _LAST_ID)

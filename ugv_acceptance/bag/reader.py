@@ -111,8 +111,8 @@ class Bag:
     def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
         """Read the messages of `topics` as an iterator of batches in order of log time.
 
-        Memory is bounded by the size of a chunk. `workers` threads decompress and decode; by
-        default two if there is more than one core.
+        Memory is bounded by the size of a chunk. With two `workers` a thread unpacks ahead of the
+        caller's, which decodes; by default two if there is more than one core.
         """
         chosen = ((JOINT_STATE, topics.joint_states), (IMU, topics.imu), (PAYLOAD, topics.payload))
         wanted = {name: kind for kind, name in chosen if name is not None}
