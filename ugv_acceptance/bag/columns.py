@@ -48,15 +48,16 @@ def batch(columns: Iterable[Columns]) -> Batch:
     )
 
 
+# Of each type the fields that are one value for all rows.
+_COMMON = {JointStateColumns: ('names',), ImuColumns: ('frame_id',), PayloadColumns: ('frame_id',)}
+_NAMES = {kind: tuple(f.name for f in fields(kind)) for kind in _COMMON}
+
+
 def select(columns: AnyColumns, rows: NDArray[Any] | slice) -> AnyColumns:
     """Return the given rows of `columns`."""
-    arrays = {
-        f.name: value[rows]
-        for f in fields(columns)
-        if isinstance(value := getattr(columns, f.name), np.ndarray)
-    }
-    changes: dict[str, Any] = arrays
-    return replace(columns, **changes)
+    kind = type(columns)
+    values = ((name, getattr(columns, name)) for name in _NAMES[kind])
+    return kind(*(value if name in _COMMON[kind] else value[rows] for name, value in values))
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,15 +248,15 @@ class _Job:
         if not fit:
             return
         inside, offsets = self.pending[:fit], offsets[:fit]
-        good, words = plan.gather.matching(self.buffer, offsets)
+        good, held = plan.gather.matching(self.buffer, offsets)
         left = self.pending[fit:]
         if good is not None:
             left = np.concatenate((inside[~good], left))
-            inside, offsets, words = inside[good], offsets[good], words[good]
+            inside = inside[good]
         if inside.size:
-            blocks = plan.gather.blocks(self.buffer, offsets)
             place = inside if self.place is None else self.place[inside]
-            self.found.append((plan.key, _Raw(place, *plan.gather.times(words), blocks)))
+            times, blocks = plan.gather.times(held), plan.gather.blocks(held)
+            self.found.append((plan.key, _Raw(place, *times, blocks)))
         self.pending = left
 
     def message(self, channel: int, place: int) -> bytes | None:

@@ -64,12 +64,13 @@ class Sequencer:
 
 def _split(columns: Columns, until: int | None) -> tuple[list[Columns], list[Columns]]:
     """Split columns into messages logged before `until` (ns) and the others, order kept."""
-    if until is None or not columns.log_time.size or columns.log_time.max() < until:
+    times = columns.log_time
+    if until is None or not times.size or times.max() < until:
         return [columns], []
-    before = columns.log_time < until
-    number = int(np.count_nonzero(before))
-    if not number:
+    if times.min() >= until:
         return [], [columns]
+    before = times < until
+    number = int(np.count_nonzero(before))
     if before[:number].all():
         return [select(columns, slice(number))], [select(columns, slice(number, None))]
     return [select(columns, before)], [select(columns, ~before)]
