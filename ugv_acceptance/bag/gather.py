@@ -33,7 +33,7 @@ _HEADS = np.dtype(
         ('publish_time', '<i8'),
     ]
 )
-_TOGETHER = 64  # messages compared at a time
+_TOGETHER = 32  # messages compared at a time
 _BEFORE = 5  # a row starts this far before its record: then CDR's origin is a multiple of 8
 
 
@@ -91,12 +91,21 @@ class _Check:
             return bool(((words ^ self.text[0]) & self.bits[0]).max())
         flat = words.reshape(-1)
         whole = len(flat) // len(self.text) * len(self.text)
-        return self._wrong(flat[:whole].reshape(-1, len(self.text))) or self._wrong(flat[whole:])
+        return self._wrong(flat[:whole].reshape(-1, len(self.text))) or self._wrong(
+            flat[whole:].reshape(-1, self.size)
+        )
 
     def _wrong(self, words: Words) -> bool:
-        wrong = words ^ self.text[: words.shape[-1]]
-        wrong &= self.bits[: words.shape[-1]]
-        return bool(wrong.max(initial=0))
+        """Return whether any row differs: a bit is right in all if it is in OR and AND of them."""
+        if not len(words):
+            return False
+        text, bits = self.text[: words.shape[1]], self.bits[: words.shape[1]]
+        some, every = np.bitwise_or.reduce(words), np.bitwise_and.reduce(words)
+        some ^= text
+        every ^= text
+        some |= every
+        some &= bits
+        return bool(some.max())
 
     def fits(self, words: Words) -> NDArray[np.bool_]:
         """Return which rows of the section's `words` (n, m) are as expected."""
