@@ -91,6 +91,5 @@ def _sizes(buffer: Bytes, starts: Offsets, lengths: Offsets) -> Offsets:
     at = starts + 6 - single.astype(np.int64) + dictionary
     claimed = (words[at] & kept) + np.where(code == 1, 256, 0).astype(np.uint64)
     known = ((heads & np.uint64(0xFFFFFFFF)) == _FRAME) & (kept > 0)
-    known &= claimed <= _MAX_MESSAGE
     sizes[places[known]] = claimed[known].astype(np.int64)
     return sizes
