@@ -29,7 +29,7 @@ from ugv_acceptance.bag.reader import Topics, choose_topics, open_bag
 from ugv_acceptance.bag.reading import Facts
 from ugv_acceptance.evaluation.samples import Batch
 
-Row = tuple[int, int, int, Any]  # id, topic, timestamp, data
+Row = tuple[int, int, Any, Any]  # id, topic, timestamp, data
 
 
 def motley(count: int = 400) -> list[Message]:
@@ -69,8 +69,8 @@ def compressed(messages: list[Message]) -> list[Message]:
 def in_order(batches: list[Batch]) -> list[Any]:
     """The rows of batches, in the columns of which messages are by time."""
     for batch in batches:
-        for columns in (*batch.joints, *batch.imu, *batch.payload):
-            assert (np.diff(columns.log_time) >= 0).all()
+        of_each: list[Any] = [*batch.joints, *batch.imu, *batch.payload]
+        assert all((np.diff(columns.log_time) >= 0).all() for columns in of_each)
     return rows(batches)
 
 
@@ -102,7 +102,9 @@ def stored(messages: list[Message], step: int = 1) -> list[Row]:
 @pytest.mark.parametrize('packed', [False, True])
 @pytest.mark.parametrize('suffix', ['db3', 'mcap'])
 def test_columns_of_every_form_are_those_one_by_one(
-    tmp_path: Path, suffix: str, packed: bool
+    tmp_path: Path,
+    suffix: str,
+    packed: bool,  # noqa: FBT001
 ) -> None:
     """Whatever the messages are, form and compression change neither columns nor findings."""
     plain = motley()

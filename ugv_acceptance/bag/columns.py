@@ -6,7 +6,7 @@ the same numbers. Some columns are views, to save a copy, so not all are contigu
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np

@@ -24,13 +24,15 @@ from ugv_acceptance.type_aliases import Times
 
 _BLOCK = 4096  # messages a batch
 _LAST_ID = (1 << 63) - 1
+# Each by itself is found by the index.
+_SPAN = 'SELECT (SELECT min(timestamp) FROM messages), (SELECT max(timestamp) FROM messages)'
 # Of some rows: the contents with room for a head between them, the log times, and topic and length
 # in one number, which is 0 where the content is no blob (for SQLite: number < text < blob).
 _JOINED = f"""
     SELECT count(*), CAST(group_concat(data, x'{bytes(HEAD).hex()}') AS BLOB),
         CAST(group_concat(timestamp) AS BLOB),
         CAST(group_concat(((topic_id << 32) | length(data)) * (data >= x'')) AS BLOB)
-    FROM messages WHERE id BETWEEN ? AND ? AND topic_id IN """
+    FROM messages WHERE id BETWEEN ? AND ? AND topic_id IN """  # noqa: S608 (a number of zeros)
 # The oldest of the rows behind an id. The index by time is left after about a block.
 _NEXT = """
     SELECT timestamp FROM messages WHERE timestamp >= ? AND +id > ? ORDER BY timestamp LIMIT 1"""
@@ -62,10 +64,7 @@ def open_sqlite(path: Path, name: str) -> ForeignIndex:
         }
         found = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
         counts = {int(i): int(n) for i, n in found}
-        first, last = (  # each by itself is found by the index
-            db.execute(f'SELECT {which}(timestamp) FROM messages').fetchone()[0]
-            for which in ('min', 'max')
-        )
+        first, last = db.execute(_SPAN).fetchone()
     return ForeignIndex(channels, counts, int(first or 0), int(last or 0))
 
 
@@ -218,7 +217,8 @@ def _block_of(messages: list[_Message], until: int) -> _Block:
     contents = (data for _, _, data in messages)
     joined = bytearray(bytes(HEAD).join((bytes(LEAD), *contents, bytes(SLACK))))
     numbers = [(channel, time, len(data)) for channel, time, data in messages]
-    return _Block(np.frombuffer(joined, np.uint8), *np.array(numbers, np.int64).T, until)
+    channels, times, lengths = np.array(numbers, np.int64).T
+    return _Block(np.frombuffer(joined, np.uint8), channels, times, lengths, until)
 
 
 def _blocks(storage: str, path: Path, name: str, wanted: Collection[int]) -> Iterator[_Block]:
@@ -255,10 +255,8 @@ def _joined(db: sqlite3.Connection, wanted: Collection[int]) -> Iterator[tuple[i
     """Yield the messages of some rows at a time, by id, with an id up to which all were read."""
     if not _usual(db) or not all(0 < channel < 1 << 31 for channel in wanted):
         raise _IrregularError
-    first, until = (
-        db.execute(f'SELECT min({name}) FROM messages').fetchone()[0]
-        for name in ('id', 'timestamp')
-    )
+    (first,) = db.execute('SELECT min(id) FROM messages').fetchone()
+    until, _ = db.execute(_SPAN).fetchone()
     buffer = np.zeros(0, np.uint8)
     while first is not None:
         last = min(first + _BLOCK - 1, _LAST_ID)
@@ -272,7 +270,7 @@ def _joined(db: sqlite3.Connection, wanted: Collection[int]) -> Iterator[tuple[i
             continue
         if buffer.size < LEAD + HEAD + len(row[1]) + SLACK:
             buffer = np.zeros(LEAD + HEAD + len(row[1]) * 5 // 4 + SLACK, np.uint8)
-        yield last, _block_in(buffer, *row, until)
+        yield last, _block_in(buffer, row, until)
 
 
 def _usual(db: sqlite3.Connection) -> bool:
@@ -286,10 +284,9 @@ def _usual(db: sqlite3.Connection) -> bool:
     return keys == [('id', 'INTEGER')] and 'timestamp' in by
 
 
-def _block_in(
-    buffer: Bytes, count: int, contents: bytes, times: bytes, packed: bytes, until: int
-) -> _Block:
-    """Return a block of joined rows, by log time."""
+def _block_in(buffer: Bytes, row: tuple[int, bytes, bytes, bytes], until: int) -> _Block:
+    """Return a block of the rows that SQLite joined, by log time."""
+    count, contents, times, packed = row
     log_times, kinds = _numbers(times, count), _numbers(packed, count)
     channels, lengths = kinds >> 32, kinds & 0xFFFFFFFF
     if not kinds.all() or lengths.sum() + HEAD * (count - 1) != len(contents):

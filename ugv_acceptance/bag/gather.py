@@ -151,9 +151,7 @@ class Gather:
             }
         )
 
-    def _find(
-        self, layout: Layout, channel: int, spans: list[tuple[int, int]]
-    ) -> list[_Section]:
+    def _find(self, layout: Layout, channel: int, spans: list[tuple[int, int]]) -> list[_Section]:
         """Return the sections; the first is all before the first block."""
         width = -(-(_BEFORE + self.record) // 8) * 8
         text, mask = np.zeros(width, np.uint8), np.zeros(width, np.uint8)

@@ -188,11 +188,11 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
 def _chunk_index(content: bytes) -> records.ChunkIndex:
     """Parse the index of a chunk; of many topics, the package would take most of opening a file."""
     length = int.from_bytes(content[32:36], 'little')
-    if length % 10 or 36 + length > len(content):
-        return parse(records.ChunkIndex.read, content, 'chunk index')
-    without = content[:32] + bytes(4) + content[36 + length :]
-    index = parse(records.ChunkIndex.read, without, 'chunk index')
-    index.message_index_offsets = dict(_OFFSET.iter_unpack(content[36 : 36 + length]))
+    usual = length % 10 == 0 and 36 + length <= len(content)
+    without = content[:32] + bytes(4) + content[36 + length :] if usual else content
+    index: records.ChunkIndex = parse(records.ChunkIndex.read, without, 'chunk index')
+    if usual:
+        index.message_index_offsets = dict(_OFFSET.iter_unpack(content[36 : 36 + length]))
     return index
 
 

@@ -21,9 +21,7 @@ _PACKED = '.zstd'
 _DEEP, _NAMED = 3, 3
 _ODD = (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError)
 # The key of the topics, followed by the first of them; of a topic, a plain name and count.
-_TOPICS = re.compile(
-    r'^(?P<key> +)topics_with_message_count:\n(?=(?P<item> +)- )', re.MULTILINE
-)
+_TOPICS = re.compile(r'^(?P<key> +)topics_with_message_count:\n(?=(?P<item> +)- )', re.MULTILINE)
 _NAME = re.compile(r'name: (/[A-Za-z0-9_/]+)\n')
 _COUNT = re.compile(r'message_count: (0|[1-9][0-9]{0,17})\n')
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)

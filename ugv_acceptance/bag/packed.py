@@ -68,7 +68,9 @@ def unpack(buffer: Bytes, starts: Offsets, lengths: Offsets) -> Unpacked | None:
         parts = _decompressor().multi_decompress_to_buffer(source)
     except zstandard.ZstdError:
         return None
-    joined = bytearray(bytes(HEAD).join((bytes(LEAD), *parts, bytes(SLACK))))
+    joined = bytearray(
+        bytes(HEAD).join([bytes(LEAD), *(parts[i] for i in range(len(parts))), bytes(SLACK)])
+    )
     return Unpacked(np.frombuffer(joined, np.uint8), sizes[mask], mask)
 
 

@@ -242,7 +242,7 @@ def _topics(members: Iterable[Member]) -> tuple[dict[str, Topic], list[str]]:
     for name in sorted(held):
         kinds = list(held[name])
         if len(kinds) > 1:
-            kinds.sort(key=lambda k: (not wire_of(Channel(0, '', *k)), -held[name][k]))  # noqa: B023 (called here)
+            kinds.sort(key=lambda k: (not wire_of(Channel(0, '', *k)), -held[name][k]))
             listed = ', '.join(f'{t} ({e}, {held[name][t, e]} messages)' for t, e in kinds)
             findings.append(f'{name} has channels of several types: {listed}')
         topics[name] = Topic(kinds[0][0], held[name][kinds[0]], kinds[0][1])
