@@ -105,7 +105,9 @@ def main() -> None:
     floor = figures['mcap, summary only (floor)']
     for name, runs in figures.items():
         ratio = statistics.median(run / low for run, low in zip(runs, floor, strict=True))
-        print(f'{name:30s} best {min(runs):.3f} s, median {statistics.median(runs):.3f} s, ', end='')
+        print(
+            f'{name:30s} best {min(runs):.3f} s, median {statistics.median(runs):.3f} s, ', end=''
+        )
         print(f'{ratio:.2f} x floor')
 
 

@@ -2,6 +2,7 @@
 
 import threading
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import zstandard
@@ -65,12 +66,10 @@ def unpack(buffer: Bytes, starts: Offsets, lengths: Offsets) -> Unpacked | None:
     segments = np.stack((starts[mask], lengths[mask]), axis=1).astype(np.uint64)
     source = zstandard.BufferWithSegments(buffer.data, segments.tobytes())
     try:
-        parts = _decompressor().multi_decompress_to_buffer(source)
+        parts: Any = _decompressor().multi_decompress_to_buffer(source)
     except zstandard.ZstdError:
         return None
-    joined = bytearray(
-        bytes(HEAD).join([bytes(LEAD), *(parts[i] for i in range(len(parts))), bytes(SLACK)])
-    )
+    joined = bytearray(bytes(HEAD).join([bytes(LEAD), *parts, bytes(SLACK)]))
     return Unpacked(np.frombuffer(joined, np.uint8), sizes[mask], mask)
 
 
