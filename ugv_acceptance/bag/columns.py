@@ -5,18 +5,27 @@ that differ are tried with the other known layouts, and finally decoded one by o
 the same numbers. Some columns are views, to save a copy, so not all are contiguous.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 from ugv_acceptance import BadSample
 from ugv_acceptance.bag.cdr import IMU, JOINT_STATE, PAYLOAD, Decoder, Kind
-from ugv_acceptance.bag.gather import HEAD, LEAD, Bytes, Gather, Offsets, Span
+from ugv_acceptance.bag.gather import (
+    HEAD,
+    LEAD,
+    Bytes,
+    Gather,
+    Offsets,
+    Span,
+    as_records,
+    contents,
+)
 from ugv_acceptance.bag.layout import Layout, Wire
+from ugv_acceptance.bag.packed import plain, unpack
 from ugv_acceptance.evaluation.samples import Batch, ImuColumns, JointStateColumns, PayloadColumns
 from ugv_acceptance.type_aliases import Floats, Times
 
@@ -27,7 +36,6 @@ _Row: TypeAlias = tuple[int, int, int, list[tuple[float, ...]]]  # place, log ti
 
 _GUESSES = 8  # layouts learnt a chunk before the rest goes message by message
 _MAX_PLANS = 16
-_MAX_MESSAGE = 1 << 24
 
 
 def batch(columns: Iterable[Columns]) -> Batch:
@@ -40,15 +48,16 @@ def batch(columns: Iterable[Columns]) -> Batch:
     )
 
 
+# Of each type the fields that are one value for all rows.
+_COMMON = {JointStateColumns: ('names',), ImuColumns: ('frame_id',), PayloadColumns: ('frame_id',)}
+_NAMES = {kind: tuple(f.name for f in fields(kind)) for kind in _COMMON}
+
+
 def select(columns: AnyColumns, rows: NDArray[Any] | slice) -> AnyColumns:
     """Return the given rows of `columns`."""
-    arrays = {
-        f.name: value[rows]
-        for f in fields(columns)
-        if isinstance(value := getattr(columns, f.name), np.ndarray)
-    }
-    changes: dict[str, Any] = arrays
-    return replace(columns, **changes)
+    kind = type(columns)
+    values = ((name, getattr(columns, name)) for name in _NAMES[kind])
+    return kind(*(value if name in _COMMON[kind] else value[rows] for name, value in values))
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,18 +144,25 @@ class ColumnDecoder:
         The chunk's `size` bytes of records begin at `buffer[LEAD]` and offsets count from there;
         the buffer has SLACK bytes behind them.
         """
-        job = _Job(buffer, size, offsets, np.arange(len(offsets)))
+        jobs = [_Job(buffer, size, offsets, np.arange(len(offsets)))]
         if self.regular:
-            for plan in self._plans:
-                job.attempt(plan)
-                if not job.pending.size:
-                    break
-            for _ in range(_GUESSES):
-                guess = self._guess(job)
-                if guess is None:
-                    break
-                job.attempt(guess)
-        return self._rest(job)
+            self._at_once(jobs[0])
+            if unpacked := jobs[0].unpack(self.channel):
+                self._at_once(unpacked)
+                jobs.append(unpacked)
+        return self._rest(jobs)
+
+    def _at_once(self, job: '_Job') -> None:
+        """Decode pending messages whose layouts are known, and those of a few new ones."""
+        for plan in self._plans:
+            job.attempt(plan)
+            if not job.pending.size:
+                return
+        for _ in range(_GUESSES):
+            guess = self._guess(job)
+            if guess is None:
+                return
+            job.attempt(guess)
 
     def _guess(self, job: '_Job') -> '_Plan | None':
         """Learn and return the layout of the first pending message; None if it is not valid."""
@@ -162,32 +178,22 @@ class ColumnDecoder:
         self._plans = (plan, *self._plans)[:_MAX_PLANS]
         return plan
 
-    def _rest(self, job: '_Job') -> Decoded:
+    def _rest(self, jobs: 'Sequence[_Job]') -> Decoded:
         """Decode the pending messages one by one; return all decoded ones in their order."""
-        messages: list[tuple[int, int, bytes]] = []
-        for place in job.pending.tolist():
-            data = job.message(self.channel, place)
-            if data is not None:
-                messages.append((place, job.log_time(place), data))
-        one, malformed, reason = self._one_by_one(messages) if messages else ([], 0, '')
-        columns, count = self._assemble(job.found + one)
-        return Decoded(columns, count, malformed, reason, len(job.pending) - len(messages))
-
-    def messages(self, messages: Iterable[tuple[int, bytes]]) -> Decoded:
-        """Decode messages, given as (log time in ns, bytes), one by one."""
-        placed = ((place, log, data) for place, (log, data) in enumerate(messages))
-        one, malformed, reason = self._one_by_one(placed)
-        columns, count = self._assemble(one)
-        return Decoded(columns, count, malformed, reason)
+        rest = [message for job in jobs for message in job.rest(self.channel)]
+        one, malformed, reason = self._one_by_one(sorted(rest)) if rest else ([], 0, '')
+        columns, count = self._assemble([part for job in jobs for part in job.found] + one)
+        broken = sum(job.pending.size for job in jobs) - len(rest)
+        return Decoded(columns, count, malformed, reason, broken)
 
     def _one_by_one(
-        self, messages: Iterable[tuple[int, int, bytes]]
+        self, messages: Iterable[tuple[int, int, bytes, bool]]
     ) -> tuple[list[tuple[Key, _Raw]], int, str]:
         malformed, reason = 0, ''
         groups: dict[Key, list[_Row]] = {}
-        for place, log_time, packed in messages:
+        for place, log_time, data, packed in messages:
             try:
-                layout, stamp, blocks = self._one.raw(plain(packed))
+                layout, stamp, blocks = self._one.raw(plain(data) if packed else data)
             except BadSample as error:
                 malformed += 1
                 reason = reason or str(error)
@@ -218,12 +224,16 @@ class _Plan:
 
 @dataclass(slots=True)
 class _Job:
-    """The decoding of a chunk's messages: positions still `pending`, and those `found`."""
+    """The decoding of a chunk's messages: positions still `pending`, and those `found`.
+
+    Of messages that have been unpacked, `place` is their position among the packed ones.
+    """
 
     buffer: Bytes
     size: int
     offsets: Offsets
     pending: Offsets
+    place: Offsets | None = None
     found: list[tuple[Key, _Raw]] = field(default_factory=list)
 
     def attempt(self, plan: _Plan) -> None:
@@ -238,14 +248,15 @@ class _Job:
         if not fit:
             return
         inside, offsets = self.pending[:fit], offsets[:fit]
-        good, words = plan.gather.matching(self.buffer, offsets)
+        good, held = plan.gather.matching(self.buffer, offsets)
         left = self.pending[fit:]
         if good is not None:
             left = np.concatenate((inside[~good], left))
-            inside, offsets, words = inside[good], offsets[good], words[good]
+            inside = inside[good]
         if inside.size:
-            blocks = plan.gather.blocks(self.buffer, offsets)
-            self.found.append((plan.key, _Raw(inside, *plan.gather.times(words), blocks)))
+            place = inside if self.place is None else self.place[inside]
+            times, blocks = plan.gather.times(held), plan.gather.blocks(held)
+            self.found.append((plan.key, _Raw(place, *times, blocks)))
         self.pending = left
 
     def message(self, channel: int, place: int) -> bytes | None:
@@ -259,22 +270,33 @@ class _Job:
             return None
         return self.buffer[start + HEAD : start + 9 + length].tobytes()
 
-    def log_time(self, place: int) -> int:
-        """Return a message's log time in ns."""
-        start = LEAD + int(self.offsets[place]) + 15
-        return int(self.buffer[start : start + 8].view('<i8')[0])
+    def rest(self, channel: int) -> Iterator[tuple[int, int, bytes, bool]]:
+        """Yield place, log time (ns), content, "may be packed" of what is pending and a message."""
+        for at in self.pending.tolist():
+            data = self.message(channel, at)
+            if data is not None:
+                start = LEAD + int(self.offsets[at]) + 15
+                log_time = int(self.buffer[start : start + 8].view('<i8')[0])
+                place = at if self.place is None else int(self.place[at])
+                yield place, log_time, data, self.place is None
 
+    def unpack(self, channel: int) -> '_Job | None':
+        """Take the pending messages that are compressed singly, and return the job to decode them.
 
-def plain(data: bytes) -> bytes:
-    """Decompress a message if rosbag2 compressed it (mode: message); BadSample if broken."""
-    if data[:4] != zstandard.FRAME_HEADER:
-        return data
-    try:
-        if zstandard.frame_content_size(data) > _MAX_MESSAGE:
-            raise BadSample(f'message claims more than {_MAX_MESSAGE} bytes')
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=_MAX_MESSAGE)
-    except zstandard.ZstdError as error:
-        raise BadSample(f'message: its zstd data is broken ({error})') from error
+        None if there is none of them, or one is broken.
+        """
+        if not self.pending.size:
+            return None
+        offsets = self.offsets[self.pending]
+        good, starts, lengths, times = contents(self.buffer, self.size, offsets, channel)
+        found = unpack(self.buffer, starts, lengths)
+        if found is None:
+            return None
+        good[good] = found.which
+        place, self.pending = self.pending[good], self.pending[~good]
+        at = as_records(found.buffer, found.sizes, channel, times[found.which])
+        size = int(at[-1]) + HEAD + int(found.sizes[-1])
+        return _Job(found.buffer, size, at, np.arange(len(at)), place)
 
 
 def _raw_of(rows: list[_Row]) -> _Raw:

@@ -7,12 +7,11 @@ import os
 import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from io import BytesIO
 from typing import BinaryIO, TypeVar
 
 from mcap import records
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.chunks import (
@@ -30,6 +29,7 @@ ORIGIN, SIMULATED = 'origin', 'simulated'
 # That of the quality of service which its publishers offered.
 QOS = 'offered_qos_profiles'
 UNKNOWN = '?'  # the type of a channel whose schema was not found
+_OFFSET = struct.Struct('<HQ')  # of a channel's message index
 _FOOTER_BYTES = 29 + len(MAGIC)
 _MAX_SUMMARY_BYTES = 1 << 30
 
@@ -96,9 +96,36 @@ def pread(file: BinaryIO, start: int, length: int) -> bytes:
 def parse(read: Callable[[ReadDataStream], Record], content: bytes, what: str) -> Record:
     """Parse the content of a record; BadBag if it is garbled. `what` names it in the error."""
     try:
-        return read(ReadDataStream(BytesIO(content)))
+        return read(_Content(content))
     except (McapError, struct.error, ValueError, KeyError) as error:
         raise BadBag(f'{what}: damaged record ({error!r})') from error
+
+
+class _Content(ReadDataStream):
+    """The content of a record, as the mcap package reads it, without a file object in between."""
+
+    def __init__(self, content: bytes) -> None:
+        self._content = content
+        self._count = 0
+
+    def read(self, length: int) -> bytes:
+        """Return the next `length` bytes; fewer at the end, and an error beyond it."""
+        if length == 0:
+            return b''
+        data = self._content[self._count : self._count + length]
+        if not data:
+            raise EndOfFile
+        self._count += len(data)
+        return data
+
+    def read_prefixed_string(self) -> str:
+        """Return the text that follows its length."""
+        start = self._count + 4
+        stop = start + int.from_bytes(self._content[start - 4 : start], 'little')
+        if stop > len(self._content) or start > len(self._content):
+            return super().read_prefixed_string()  # which says what is missing
+        self._count = stop
+        return self._content[start:stop].decode()
 
 
 def define(index: McapIndex, schemas: dict[int, str], found: Iterable[tuple[int, bytes]]) -> None:
@@ -149,12 +176,23 @@ def from_summary(file: BinaryIO, max_chunk_bytes: int = MAX_CHUNK_BYTES) -> Mcap
         if opcode in (3, 4):
             define(index, schemas, [(opcode, content)])
         elif opcode == 8:
-            chunks.append(parse(records.ChunkIndex.read, content, 'chunk index'))
+            chunks.append(_chunk_index(content))
         elif opcode == 11:
             statistics = parse(records.Statistics.read, content, 'statistics')
         pos += 9 + length
     _check(index, chunks, statistics)
     index.pieces = _pieces(index, file, chunks, max_chunk_bytes)
+    return index
+
+
+def _chunk_index(content: bytes) -> records.ChunkIndex:
+    """Parse the index of a chunk; of many topics, the package would take most of opening a file."""
+    length = int.from_bytes(content[32:36], 'little')
+    usual = length % 10 == 0 and 36 + length <= len(content)
+    without = content[:32] + bytes(4) + content[36 + length :] if usual else content
+    index: records.ChunkIndex = parse(records.ChunkIndex.read, without, 'chunk index')
+    if usual:
+        index.message_index_offsets = dict(_OFFSET.iter_unpack(content[36 : 36 + length]))
     return index
 
 
@@ -227,8 +265,8 @@ def _indexed_piece(chunk: records.ChunkIndex, start: int, head: ChunkHead, size:
     stop = start + head.length
     length = chunk.message_index_length
     offsets = chunk.message_index_offsets
-    inside = all(stop <= at < stop + length for at in offsets.values())
-    if not offsets or not inside or stop + length > size or length > head.length + (1 << 20):
+    inside = offsets and stop <= min(offsets.values()) <= max(offsets.values()) < stop + length
+    if not inside or stop + length > size or length > head.length + (1 << 20):
         return Piece(start, head.length, head.first, head.last, head)
     return Piece(start, head.length, head.first, head.last, head, offsets, length)
 

@@ -58,8 +58,23 @@ def open_mcap(file: BinaryIO, name: str, max_chunk_bytes: int = MAX_CHUNK_BYTES)
         return index
 
 
+@dataclass(frozen=True, slots=True)
+class Unpacked:
+    """A piece that was unpacked: its `size` bytes of records from `records[LEAD]` on.
+
+    `offsets` returns those of a channel's messages, None if its index is wrong. Or a sentence about
+    why the piece is `lost`.
+    """
+
+    piece: Piece
+    records: Bytes = field(default_factory=lambda: np.zeros(0, np.uint8))
+    size: int = 0
+    offsets: Callable[[int], Offsets | None] = lambda _: None
+    lost: str = ''
+
+
 class McapSource:
-    """An open MCAP file and its wanted channels; `decode` may be called by several threads."""
+    """An open MCAP file and its wanted channels; a thread may unpack while another decodes."""
 
     def __init__(self, path: Path, name: str, index: McapIndex, wanted: Wanted) -> None:
         self.name = name
@@ -76,26 +91,33 @@ class McapSource:
             if p.indexes is None or not self.wanted.keys().isdisjoint(p.indexes)
         ]
 
-    def decode(self, piece: Piece, buffers: Buffers) -> Piecework:
-        """Decode one piece; damage in it becomes a finding."""
-        work = Piecework()
-        at = f'{self.name}: chunk at byte {piece.start}'
+    def unpack(self, piece: Piece, buffers: Buffers) -> Unpacked:
+        """Read one piece into `buffers` and unpack it; damage in it becomes a finding."""
         try:
-            records, size, offsets = self._records(piece, buffers)
+            return Unpacked(piece, *self._records(piece, buffers))
         except BadBag as error:
-            work.findings.append(f'{at} not used: {error}{self._lost(piece)}')
+            at = f'{self.name}: chunk at byte {piece.start}'
+            return Unpacked(piece, lost=f'{at} not used: {error}{self._lost(piece)}')
+
+    def decode(self, unpacked: Unpacked) -> Piecework:
+        """Decode one piece as long as the buffers that hold it are not used again."""
+        work = Piecework()
+        if unpacked.lost:
+            work.findings.append(unpacked.lost)
             return work
+        records, size = unpacked.records, unpacked.size
         broken = 0
         results: list[tuple[str, Decoded]] = []
         for channel, (topic, decoder) in self.wanted.items():
-            found = offsets(channel)
+            found = unpacked.offsets(channel)
             if found is not None and found.size:
                 results.append((topic, decoder.records(records, size, found)))
                 broken += results[-1][1].broken
             elif found is None:
                 broken += 1
         if broken:
-            results = self._walked(records, size, results, work, f'{at}: {broken}')
+            what = f'{self.name}: chunk at byte {unpacked.piece.start}: {broken}'
+            results = self._walked(records, size, results, work, what)
         for topic, decoded in results:
             work.add(topic, decoded)
         return work

@@ -2,9 +2,10 @@
 
 import os
 import posixpath
+import re
 import shlex
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,11 @@ SUFFIXES = ('.mcap', '.mcap.zstd', '.db3', '.db3.zstd', '.bag')
 _PACKED = '.zstd'
 # Depth of folders that is searched for runs, and number of runs named in an error.
 _DEEP, _NAMED = 3, 3
+_ODD = (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError)
+# The key of the topics, followed by the first of them; of a topic, a plain name and count.
+_TOPICS = re.compile(r'^(?P<key> +)topics_with_message_count:\n(?=(?P<item> +)- )', re.MULTILINE)
+_NAME = re.compile(r'name: (/[A-Za-z0-9_/]+)\n')
+_COUNT = re.compile(r'message_count: (0|[1-9][0-9]{0,17})\n')
 _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
@@ -38,20 +44,63 @@ def read_metadata(folder: Path) -> Metadata:
     path = folder / NAME
     if path.stat().st_size > _MAX_BYTES:
         raise BadBag(f'{path}: {path.stat().st_size} bytes are too many for {NAME}')
+    content = path.read_bytes()
     try:
-        data = yaml.load(path.read_bytes(), Loader=_Loader)  # noqa: S506 (a safe loader)
-        info = data['rosbag2_bagfile_information']
-        topics = {
-            str(t['topic_metadata']['name']): int(t['message_count'])
-            for t in info.get('topics_with_message_count') or ()
-        }
-        files = tuple(str(name) for name in info.get('relative_file_paths') or ())
-        return Metadata(files, int(info['message_count']), topics)
+        return _alike(content) or _metadata(content)
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         text = ' '.join(str(error).split())
         raise BadBag(f'{path}: not the metadata of a rosbag2 folder ({text})') from error
     except RecursionError as error:
         raise BadBag(f'{path}: nested too deeply') from error
+
+
+def _metadata(content: bytes) -> Metadata:
+    info = yaml.load(content, Loader=_Loader)['rosbag2_bagfile_information']  # noqa: S506 (safe)
+    files = tuple(str(name) for name in info.get('relative_file_paths') or ())
+    topics = _counts(info.get('topics_with_message_count') or ())
+    return Metadata(files, int(info['message_count']), topics)
+
+
+def _counts(topics: Iterable[Any]) -> dict[str, int]:
+    return {str(t['topic_metadata']['name']): int(t['message_count']) for t in topics}
+
+
+def _alike(content: bytes) -> Metadata | None:
+    """Read the metadata of many topics, most of which differ from another only in name and count.
+
+    Of those alike only one is parsed as YAML, which takes nearly all the time. None where the text
+    is not as rosbag2 writes it, or not valid: then it has to be parsed as a whole.
+    """
+    text = content.decode('ascii', 'replace')
+    start = _TOPICS.search(text)
+    once = text.count('topics_with_message_count') == 1 and content.isascii()
+    if not start or not once or start['key'] > start['item']:
+        return None
+    item = start['item']
+    end = re.compile(rf'^(?!{item}[- ] )', re.MULTILINE).search(text, start.end())
+    stop = end.start() if end else len(text)
+    counts: dict[str, int] = {}
+    parsed = set[str]()
+    try:
+        for topic in re.split(rf'^(?={item}- )', text[start.end() : stop], flags=re.MULTILINE)[1:]:
+            one, alike = _plain(topic)
+            if alike not in parsed and _counts(yaml.load(topic, Loader=_Loader)) != one:  # noqa: S506 (safe)
+                return None
+            parsed.add(alike)
+            counts |= one
+        rest = _metadata((text[: start.end()] + text[stop:]).encode())
+    except _ODD:
+        return None
+    return replace(rest, counts=counts) if rest.counts == {} else None
+
+
+def _plain(topic: str) -> tuple[dict[str, int], str]:
+    """Return name and count of a topic's YAML, and the text without them; ValueError if unusual."""
+    (name,), (count,) = _NAME.findall(topic), _COUNT.findall(topic)
+    if topic.count('name:') != 1 or topic.count('message_count:') != 1:
+        raise ValueError(topic)
+    alike = topic.replace(f'name: {name}\n', 'name:\n').replace(f'count: {count}\n', 'count:\n')
+    return {name: int(count)}, alike
 
 
 def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:

@@ -14,11 +14,11 @@ from rosbags.typesys.store import Typestore
 
 from ugv_acceptance import BadBag, BadSample
 from ugv_acceptance.bag.chunks import Buffers, log_times, walk
-from ugv_acceptance.bag.columns import plain
 from ugv_acceptance.bag.foreign import foreign_messages
 from ugv_acceptance.bag.gather import LEAD, SLACK
 from ugv_acceptance.bag.mcap_index import Piece
 from ugv_acceptance.bag.metadata import NAME
+from ugv_acceptance.bag.packed import plain
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
 

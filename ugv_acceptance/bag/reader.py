@@ -111,8 +111,8 @@ class Bag:
     def batches(self, topics: Topics, *, workers: int | None = None) -> Reading:
         """Read the messages of `topics` as an iterator of batches in order of log time.
 
-        Memory is bounded by the size of a chunk. `workers` threads decompress and decode; by
-        default two if there is more than one core.
+        Memory is bounded by the size of a chunk. With two `workers` a thread unpacks ahead of the
+        caller's, which decodes; by default two if there is more than one core.
         """
         chosen = ((JOINT_STATE, topics.joint_states), (IMU, topics.imu), (PAYLOAD, topics.payload))
         wanted = {name: kind for kind, name in chosen if name is not None}
@@ -140,13 +140,15 @@ def open_bag(
             part = [_member(file, max_chunk_bytes) for file in files]
         except OSError as error:
             raise BadBag(f'{path}: cannot be read ({error})') from error
-        findings += found + _compared(metadata, part)
+        topics, odd = _topics(part)
+        findings += found + _compared(metadata, topics)
         promised.update(metadata.counts or {})
         members += part
     kinds = sorted({member.storage for member in members})
     if len(kinds) > 1:
         raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
-    topics, odd = _topics(members)
+    if len(given) > 1:
+        topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
     findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
     salvaged = [f'{m.name}: {text}' for m in members if (text := _salvaged(m.index))]
@@ -214,10 +216,9 @@ def _salvaged(index: McapIndex | ForeignIndex) -> str | None:
     return index.salvaged if isinstance(index, McapIndex) else None
 
 
-def _compared(metadata: Metadata, members: list[Member]) -> list[str]:
+def _compared(metadata: Metadata, held: dict[str, Topic]) -> list[str]:
     """Return findings where metadata.yaml and the files disagree on numbers of messages."""
     findings = []
-    held, _ = _topics(members)
     said = metadata.counts or {}
     for name in sorted(said):
         count = held[name].count if name in held else 0
@@ -231,19 +232,20 @@ def _compared(metadata: Metadata, members: list[Member]) -> list[str]:
 
 def _topics(members: Iterable[Member]) -> tuple[dict[str, Topic], list[str]]:
     """Return the topics of all files, and a finding for each topic with several types."""
-    held: dict[str, dict[Channel, int]] = {}
+    held: dict[str, dict[tuple[str, str], int]] = {}
     for member in members:
         for channel in member.index.channels.values():
-            alike = Channel(0, channel.topic, normal_type(channel.type), channel.encoding)
+            alike = normal_type(channel.type), channel.encoding
             same = held.setdefault(channel.topic, {})
             same[alike] = same.get(alike, 0) + member.index.counts.get(channel.id, 0)
     topics, findings = {}, []
     for name in sorted(held):
-        kinds = sorted(held[name], key=lambda c: (not wire_of(c), -held[name][c]))
-        topics[name] = Topic(kinds[0].type, held[name][kinds[0]], kinds[0].encoding)
+        kinds = list(held[name])
         if len(kinds) > 1:
-            listed = ', '.join(f'{c.type} ({c.encoding}, {held[name][c]} messages)' for c in kinds)
+            kinds.sort(key=lambda k: (not wire_of(Channel(0, '', *k)), -held[name][k]))
+            listed = ', '.join(f'{t} ({e}, {held[name][t, e]} messages)' for t, e in kinds)
             findings.append(f'{name} has channels of several types: {listed}')
+        topics[name] = Topic(kinds[0][0], held[name][kinds[0]], kinds[0][1])
     return topics, findings
 
 

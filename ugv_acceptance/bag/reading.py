@@ -1,13 +1,15 @@
-"""Reads a recording once from start to end: a few threads decode chunks in order of log time."""
+"""Reads a recording once from start to end, chunk after chunk in order of log time.
+
+One thread unpacks ahead of the one that decodes.
+"""
 
 import os
-from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from ugv_acceptance.bag.columns import ColumnDecoder, Columns, batch, select
 from ugv_acceptance.bag.foreign import ForeignIndex, foreign_blocks
 from ugv_acceptance.bag.layout import Wire
 from ugv_acceptance.bag.mcap_index import Channel, McapIndex, Piece
-from ugv_acceptance.bag.mcap_source import McapSource, Piecework, Wanted
+from ugv_acceptance.bag.mcap_source import McapSource, Piecework, Unpacked, Wanted
 from ugv_acceptance.evaluation.samples import Batch
 
 
@@ -62,12 +64,13 @@ class Sequencer:
 
 def _split(columns: Columns, until: int | None) -> tuple[list[Columns], list[Columns]]:
     """Split columns into messages logged before `until` (ns) and the others, order kept."""
-    if until is None or not columns.log_time.size or columns.log_time.max() < until:
+    times = columns.log_time
+    if until is None or not times.size or times.max() < until:
         return [columns], []
-    before = columns.log_time < until
-    number = int(np.count_nonzero(before))
-    if not number:
+    if times.min() >= until:
         return [], [columns]
+    before = times < until
+    number = int(np.count_nonzero(before))
     if before[:number].all():
         return [select(columns, slice(number))], [select(columns, slice(number, None))]
     return [select(columns, before)], [select(columns, ~before)]
@@ -75,6 +78,7 @@ def _split(columns: Columns, until: int | None) -> tuple[list[Columns], list[Col
 
 _WIRES: dict[str, Wire] = {'cdr': 'cdr', 'ros1': 'ros1'}
 _MAX_FINDINGS = 200
+_AHEAD = 3  # pieces in memory: one is decoded, one ready, one being unpacked
 
 
 def normal_type(name: str) -> str:
@@ -125,7 +129,8 @@ class Member:
         for channel in self.index.channels.values():
             kind, wire = topics.get(channel.topic), wire_of(channel)
             if kind and wire and normal_type(channel.type) == kind.type:
-                found[channel.id] = (channel.topic, ColumnDecoder(kind, channel.id, wire))
+                decoder = ColumnDecoder(kind, channel.id & 0xFFFF, wire)
+                found[channel.id] = (channel.topic, decoder)
         return found
 
 
@@ -267,7 +272,7 @@ class Reading(Iterator[Batch]):
             jobs = [(piece, source) for source in sources for piece in source.pieces]
             jobs.sort(key=lambda job: job[0].first)
             firsts: list[int | None] = [piece.first for piece, _ in jobs[1:]]
-            results = _inline(jobs) if self._workers == 1 else _threaded(jobs, self._workers)
+            results = _inline(jobs) if self._workers == 1 else _ahead(jobs)
             yield from zip(results, [*firsts, None], strict=False)
             if not jobs:
                 yield Piecework(), None
@@ -279,30 +284,39 @@ _Job = tuple[Piece, McapSource]
 def _inline(jobs: list[_Job]) -> Iterator[Piecework]:
     buffers = Buffers()
     for piece, source in jobs:
-        yield source.decode(piece, buffers)
+        yield source.decode(source.unpack(piece, buffers))
 
 
-def _threaded(jobs: list[_Job], workers: int) -> Iterator[Piecework]:
-    """Decode a few pieces ahead in threads; yield results in the order of the jobs."""
-    spare: SimpleQueue[Buffers] = SimpleQueue()
-    for _ in range(workers):
+def _ahead(jobs: list[_Job]) -> Iterator[Piecework]:
+    """Unpack pieces in a thread while this one decodes the one before, in the order of the jobs.
+
+    A thread that decoded as well would contend for the interpreter at every step of it.
+    """
+    spare: SimpleQueue[Buffers | None] = SimpleQueue()
+    ready: SimpleQueue[tuple[Unpacked, Buffers] | BaseException] = SimpleQueue()
+    for _ in range(_AHEAD):
         spare.put(Buffers())
 
-    def decode(piece: Piece, source: McapSource) -> Piecework:
-        buffers = spare.get()
+    def unpack() -> None:
         try:
-            return source.decode(piece, buffers)
-        finally:
-            spare.put(buffers)
+            for piece, source in jobs:
+                buffers = spare.get()
+                if buffers is None:
+                    return
+                ready.put((source.unpack(piece, buffers), buffers))
+        except BaseException as error:  # noqa: BLE001 (raised again where it is waited for)
+            ready.put(error)
 
-    ahead: deque[Future[Piecework]] = deque()
-    pool = ThreadPoolExecutor(workers, 'bag')
+    thread = Thread(target=unpack, name='bag', daemon=True)
+    thread.start()
     try:
-        for job in jobs:
-            ahead.append(pool.submit(decode, *job))
-            if len(ahead) > workers:
-                yield ahead.popleft().result()
-        while ahead:
-            yield ahead.popleft().result()
+        for _, source in jobs:
+            found = ready.get()
+            if isinstance(found, BaseException):
+                raise found
+            unpacked, buffers = found
+            yield source.decode(unpacked)
+            spare.put(buffers)
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        spare.put(None)
+        thread.join()
