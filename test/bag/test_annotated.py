@@ -9,7 +9,8 @@ from bag.recordings import SHAPES, chunk_starts
 from mcap.reader import make_reader
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.bag.annotated import Said, write_annotated
+from ugv_acceptance.bag.annotated import write_annotated
+from ugv_acceptance.bag.blocks import block_of
 from ugv_acceptance.bag.reader import open_bag
 
 WRITTEN = run(60)
@@ -48,7 +49,7 @@ def test_no_half_file_is_left(tmp_path: Path) -> None:
     path = write_mcap(tmp_path / 'in.mcap', WRITTEN)
 
     def fault() -> Any:
-        yield Said(WRITTEN[0][2], '/said', b'\0\1\0\0')
+        yield block_of([(WRITTEN[0][2], WRITTEN[0][2], 0, b'\0\1\0\0')])
         raise ValueError('no more')
 
     with pytest.raises(ValueError, match='no more'):

@@ -153,6 +153,27 @@ def test_a_message_index_of_another_channel_is_not_believed(tmp_path: Path) -> N
     assert any('message index are wrong' in text for text in facts.findings)
 
 
+@pytest.mark.parametrize('edit', ['left out', 'of each other'])
+def test_serialised_messages_do_not_hang_on_a_message_index(tmp_path: Path, edit: str) -> None:
+    """Where an index leaves a message out, or has one of another channel, each is found once."""
+    path = write_mcap(tmp_path / 'run.mcap', WRITTEN)
+    # The second chunk, for the first has definitions as well.
+    data, at, entries = path.read_bytes(), chunk_starts(path.read_bytes())[1], list[int]()
+    for _ in range(3):  # the chunk, and the indexes of two channels
+        if data[at] == 7:
+            entries.append(at + 15)
+        at += 9 + struct.unpack_from('<Q', data, at + 1)[0]
+    one, other = entries
+    if edit == 'left out':
+        damaged(path, one + 24, data[one + 8 : one + 16])
+    else:
+        damaged(path, one + 24, data[other + 24 : other + 32])
+        damaged(path, other + 24, data[one + 24 : one + 32])
+    bag = open_bag(path)
+    found = [(m.topic, m.log_time, m.data) for m in raw_messages(bag, bag.topics)]
+    assert sorted(found) == sorted((topic, time, data) for topic, _, time, data in WRITTEN)
+
+
 @pytest.mark.parametrize(
     ('shape', 'finding'),
     [

@@ -27,7 +27,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from ugv_acceptance.bag.annotated import Said, write_annotated
+from ugv_acceptance.bag.annotated import write_annotated
+from ugv_acceptance.bag.blocks import block_of
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.footprint import TILTS
@@ -344,7 +345,7 @@ def test_any_messages_are_merged_with_what_is_said(
             writer.add_message(made[k], log_time, data, published)
             wanted.append((log_time, published, f'/t{k}', data))
         writer.finish()  # type: ignore[no-untyped-call]
-    ours = [Said(t, '/said', b'\0\1\0\0') for t in sorted(said)]
+    ours = [block_of([(t, t, 0, b'\0\1\0\0')]) for t in sorted(said)]
     types = {'/said': 'std_msgs/msg/Empty'}
     count = write_annotated(path, open_bag(source), types, ours)
     found = raw(path)

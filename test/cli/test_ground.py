@@ -116,9 +116,12 @@ def test_an_annotated_recording_says_it_at_each_moment() -> None:
     """In the window the verdicts beside a recording call the tilt left an upper bound."""
     found = evaluate(BAG, ground=Ground(windows=(GroundWindow(STAIRS, 12.0, 20.0),)))
     start, seen = found.recording.start_ns, {}
-    for said in Annotation(found).said():
-        if said.topic == '/acceptance_monitor/verdict':
-            seen[(said.log_time - start) / 1e9] = said.data
+    told = Annotation(found)
+    topics = list(told.types)
+    for block in told.said():
+        for log_time, _, channel, data in block.messages():
+            if topics[channel] == '/acceptance_monitor/verdict':
+                seen[(log_time - start) / 1e9] = data
     flat = [data for at, data in seen.items() if not 11.9 < at < 20.1]
     stairs = [data for at, data in seen.items() if 12.6 < at < 20.0]
     assert stairs

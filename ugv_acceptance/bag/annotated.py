@@ -1,17 +1,16 @@
-"""Copies a recording message by message into one MCAP file and adds further topics.
+"""Copies the messages of a recording into one MCAP file and adds further topics.
 
 Both are merged in order of log time, so that only a chunk or two is held in memory.
 """
 
-import heapq
 import os
 import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from operator import attrgetter
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from mcap import records
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
@@ -19,44 +18,34 @@ from mcap.stream_reader import StreamReader
 
 from ugv_acceptance import BadBag, __version__
 from ugv_acceptance.bag.atomic_files import is_stream, naming, whole
+from ugv_acceptance.bag.blocks import Block, merged
 from ugv_acceptance.bag.mcap_writer import McapWriter
-from ugv_acceptance.bag.raw import Logged, messages_of
+from ugv_acceptance.bag.raw import blocks_of
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
 from ugv_acceptance.bag.writer import definition_of
 
 CHUNK = 1 << 20
-# Messages between two calls of `progress`.
-STRIDE = 4096
 # What the mcap package raises for a broken file.
 _BROKEN = (McapError, OSError, ValueError, KeyError, struct.error)
-
-
-@dataclass(frozen=True, slots=True)
-class Said:
-    """A message to add to a recording: log time (ns), topic, content as CDR."""
-
-    log_time: int
-    topic: str
-    data: bytes
 
 
 def write_annotated(
     path: Path,
     bag: Bag,
-    types: dict[str, str],
-    said: Iterable[Said],
+    types: Mapping[str, str],
+    said: Iterable[Block],
     progress: Callable[[int], None] = lambda _: None,
 ) -> int:
     """Write a copy of a recording with the messages `said` added; return the number copied.
 
-    `types` gives the ROS 2 type of each added topic, `said` is in order of log time, except for
-    messages that are late on purpose; `progress` is called with the log time reached (ns). Every
-    chunk has a checksum. The file gets its name only when it is complete. Raises AcceptanceError if
-    it cannot be written.
+    `types` gives the ROS 2 type of each added topic, whose place in it (0, 1, ...) is the channel
+    of a message in `said`. They are in order of log time, except for messages that are late on
+    purpose; `progress` is called with the log time reached (ns). Every chunk has a checksum. The
+    file gets its name only when it is complete. Raises AcceptanceError if it cannot be written.
     """
     with naming(path), whole(path) as file:
-        writer = McapWriter(file, f'ugv_acceptance {__version__}')
+        writer = McapWriter(file, f'ugv_acceptance {__version__}', level=1)
         count = _write(writer, bag, types, said, progress)
         writer.finish()
         file.flush()
@@ -68,48 +57,41 @@ def write_annotated(
 def _write(
     writer: McapWriter,
     bag: Bag,
-    types: dict[str, str],
-    said: Iterable[Said],
+    types: Mapping[str, str],
+    said: Iterable[Block],
     progress: Callable[[int], None],
 ) -> int:
-    own = {name: _new(writer, name, kind) for name, kind in types.items()}
-    streams: list[Iterable[_Copy | Said]] = [_copied(writer, bag, m) for m in bag.members]
-    count = 0
-    merged = heapq.merge(*streams, said, key=attrgetter('log_time'))
-    for k, message in enumerate(merged):
-        if isinstance(message, Said):
-            writer.message(own[message.topic], message.log_time, message.data)
-        else:
-            logged, channel = message.logged, message.channel
-            writer.message(channel, logged.log_time, logged.data, logged.published)
-            count += 1
-        if (held := writer.pending) and held[0] >= CHUNK:
-            writer.end_chunk()
-        if not k % STRIDE:
-            progress(message.log_time)
-    return count
+    own = dict(enumerate(_new(writer, name, kind) for name, kind in types.items()))
+    streams = [_copied(writer, bag, member) for member in bag.members]
+    for block in merged([*streams, (_renumbered(part, own) for part in said)]):
+        writer.messages(block, CHUNK)
+        progress(int(block.log_time[-1]))
+    return sum(count for channel, count in writer.counts.items() if channel not in own.values())
 
 
-@dataclass(frozen=True, slots=True)
-class _Copy:
-    """A recorded message and its channel in the new file."""
-
-    log_time: int
-    logged: Logged
-    channel: int
-
-
-def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[_Copy]:
+def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[Block]:
     """Return one file's messages; its channels are created now, at the new file's beginning."""
     channels = _channels(writer, member)
-    messages = _readable(messages_of(member, set(bag.topics)))
-    return (_Copy(m.log_time, m, channels[m.channel]) for m in messages if m.channel in channels)
+    found = _readable(blocks_of(member, set(bag.topics)))
+    return (_renumbered(block, channels) for block in found)
 
 
-def _readable(messages: Iterator[Logged]) -> Iterator[Logged]:
+def _renumbered(block: Block, channels: Mapping[int, int]) -> Block:
+    """Return the messages whose channel has another number in the new file, with that number."""
+    old = np.array(sorted(channels), np.int64)
+    if not len(old):
+        return block.take(slice(0))
+    place = np.minimum(np.searchsorted(old, block.channel), len(old) - 1)
+    new = np.array([channels[number] for number in old.tolist()], np.int64)[place]
+    known = old[place] == block.channel
+    block = replace(block, channel=new)
+    return block if known.all() else block.take(known)
+
+
+def _readable(blocks: Iterator[Block]) -> Iterator[Block]:
     """Yield messages up to where their file breaks off, which the reader has reported already."""
     with suppress(BadBag):
-        yield from messages
+        yield from blocks
 
 
 def _channels(writer: McapWriter, member: Member) -> dict[int, int]:

@@ -8,10 +8,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ugv_acceptance.type_aliases import Floats, Times
+
 Numbers: TypeAlias = Sequence[float] | NDArray[np.float64]
 
 _NS = 1_000_000_000
-_STAMP = struct.Struct('<iI')
+_STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
+# What fills up to a multiple of four, by the length modulo four.
+_PADS = (b'', bytes(3), bytes(2), bytes(1))
 _HEAD = b'\x00\x01\x00\x00'  # plain CDR, little endian
 
 
@@ -53,6 +57,19 @@ class JointStateBytes:
         self._floats.pack_into(data, self._position_at, *position)
         self._floats.pack_into(data, self._effort_at, *effort)
         return bytes(data)
+
+    def table(self, stamp: Times, position: Floats, effort: Floats) -> NDArray[np.uint8]:
+        """Return the bytes (n, m) of n messages: `stamp` (n,) in ns, tables (n, j) as in `fill`."""
+        out = np.repeat(np.frombuffer(self._data, np.uint8)[None], len(stamp), axis=0)
+        seconds = np.stack((stamp // _NS, stamp % _NS), 1).astype('<u4')
+        for at, values in (
+            (4, seconds),
+            (self._position_at, position.astype('<f8')),
+            (self._effort_at, effort.astype('<f8')),
+        ):
+            part = np.ascontiguousarray(values).view(np.uint8)
+            out[:, at : at + part.shape[1]] = part
+        return out
 
 
 def imu_cdr(
@@ -121,15 +138,13 @@ def _texts(frame_id: str, names: tuple[str, ...] | None) -> bytes:
 
 def put_text(out: bytearray, text: str) -> None:
     """Append a CDR string: its length and its UTF-8 bytes with a final zero."""
-    data = text.encode() + b'\0'
-    put_count(out, len(data))
-    out += data
+    data = text.encode()
+    out += _PADS[len(out) & 3] + _COUNT.pack(len(data) + 1) + data + b'\0'
 
 
 def put_count(out: bytearray, number: int) -> None:
     """Append a uint32, such as a length, aligned to four bytes."""
-    out += bytes(-len(out) % 4)
-    out += number.to_bytes(4, 'little')
+    out += _PADS[len(out) & 3] + _COUNT.pack(number)
 
 
 def put_floats(

@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from itertools import chain
 
 from ugv_acceptance.bag.encode import message_head, put_count, put_floats, put_text
@@ -12,6 +13,8 @@ Colour = tuple[float, float, float, float]
 
 _NS = 1_000_000_000
 _STAMP = struct.Struct('<iI')
+# Pose and scale of a marker, and its colour.
+_PLACE = struct.Struct('<10d4f')
 _HEAD = b'\x00\x01\x00\x00'
 # Marker.action.
 _ADD, _DELETE = 0, 2
@@ -103,29 +106,37 @@ def _time(ns: int) -> bytes:
 
 def _put_marker(out: bytearray, stamp: bytes, frame_id: str, lifetime: bytes, shape: Shape) -> None:
     _align(out)
-    out += stamp
-    put_text(out, frame_id)
-    put_text(out, shape.name)
     action = _ADD if shape.points or shape.text else _DELETE
-    for number in (0, shape.kind, action):
-        put_count(out, number)
-    upright = (0.0, 0.0, 0.0, 1.0)
-    put_floats(out, (*shape.position, *upright, *(shape.size,) * 3))
-    out += struct.pack('<4f', *shape.colour) + lifetime
-    out.append(0)  # frame_locked
+    out += stamp + _named(frame_id, shape.name, shape.kind, action)
+    out += bytes(-(len(out) - 4) % 8)
+    size = shape.size
+    out += _PLACE.pack(*shape.position, 0.0, 0.0, 0.0, 1.0, size, size, size, *shape.colour)
+    out += lifetime + bytes(4)  # frame_locked
     put_count(out, len(shape.points))
     put_floats(out, tuple(chain.from_iterable(shape.points)))
     put_count(out, len(shape.colours))
-    out += b''.join(struct.pack('<4f', *colour) for colour in shape.colours)
-    _put_no_texture(out)
+    out += struct.pack(f'<{4 * len(shape.colours)}f', *chain.from_iterable(shape.colours))
+    out += _no_texture()
     put_text(out, shape.text)
-    for _ in ('mesh_resource', 'mesh_file.filename'):
-        put_text(out, '')
-    put_count(out, 0)  # mesh_file.data
-    out.append(0)  # mesh_use_embedded_materials
+    _align(out)
+    out += _no_mesh()
 
 
-def _put_no_texture(out: bytearray) -> None:
+@lru_cache(maxsize=256)
+def _named(frame_id: str, name: str, kind: int, action: int) -> bytes:
+    """Return a marker's frame, name, number, kind and action, from a multiple of four on."""
+    out = bytearray()
+    put_text(out, frame_id)
+    put_text(out, name)
+    for number in (0, kind, action):
+        put_count(out, number)
+    return bytes(out)
+
+
+@cache
+def _no_texture() -> bytes:
+    """Return a marker's empty texture_resource, texture and uv_coordinates."""
+    out = bytearray()
     put_text(out, '')
     _align(out)
     out += _time(0)
@@ -133,6 +144,17 @@ def _put_no_texture(out: bytearray) -> None:
         put_text(out, '')
     for _ in ('data', 'uv_coordinates'):
         put_count(out, 0)
+    return bytes(out)
+
+
+@cache
+def _no_mesh() -> bytes:
+    """Return a marker's empty mesh_resource and mesh_file, and mesh_use_embedded_materials."""
+    out = bytearray()
+    for _ in ('mesh_resource', 'mesh_file.filename'):
+        put_text(out, '')
+    put_count(out, 0)  # mesh_file.data
+    return bytes(out) + b'\0'
 
 
 def _align(out: bytearray) -> None:

@@ -8,36 +8,52 @@ import struct
 from dataclasses import dataclass, field
 from typing import BinaryIO, Literal
 
+import numpy as np
 import zstandard
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
+from ugv_acceptance.bag.blocks import RECORD_HEAD, Block, copy_parts, put_rows
 from ugv_acceptance.bag.chunks import crc32, pack
+from ugv_acceptance.bag.gather import Offsets
 from ugv_acceptance.bag.mcap_index import MAGIC
 
 Compression = Literal['zstd', 'lz4', '']
 _MESSAGE = struct.Struct('<BQHIQQ')
+_INDEX, _ENTRY = struct.Struct('<BQHI'), struct.Struct('<QQ')
 
 
 @dataclass(slots=True)
 class _Open:
-    """The chunk being filled; `at` holds (log time, offset) of each message by channel id."""
+    """The chunk being filled; `at` holds the entries of each channel's MessageIndex."""
 
-    parts: list[bytes] = field(default_factory=list)
+    parts: list[bytes | memoryview] = field(default_factory=list)
     size: int = 0
     first: int = 0
     last: int = 0
-    at: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
+    at: dict[int, list[bytes]] = field(default_factory=dict)
+
+    def span(self, first: int, last: int) -> None:
+        """Take that messages from log time `first` to `last` (ns) are added."""
+        if self.at:
+            first, last = min(self.first, first), max(self.last, last)
+        self.first, self.last = first, last
 
 
 class McapWriter:
-    """Writes MCAP records to `file`, which the caller closes; all times are in ns."""
+    """Writes MCAP records to `file`, which the caller closes; all times are in ns.
 
-    def __init__(self, file: BinaryIO, library: str, compression: Compression = 'zstd') -> None:
+    `level` is that of zstd: 1 is half as fast again as 3, for a twelfth more bytes.
+    """
+
+    def __init__(
+        self, file: BinaryIO, library: str, compression: Compression = 'zstd', level: int = 3
+    ) -> None:
         self._file = file
         self._compression = compression
-        self._zstd = zstandard.ZstdCompressor(level=3)
+        self._zstd = zstandard.ZstdCompressor(level=level)
         self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
         self._channels: list[records.Channel] = []
         self._chunks: list[records.ChunkIndex] = []
@@ -93,15 +109,44 @@ class McapWriter:
         """Add a message to the open chunk; `published` is by default the log time."""
         sent = log_time if published is None else published
         chunk = self._open
-        if chunk.at:
-            chunk.first, chunk.last = min(chunk.first, log_time), max(chunk.last, log_time)
-        else:
-            chunk.first = chunk.last = log_time
-        chunk.at.setdefault(channel, []).append((log_time, chunk.size))
+        chunk.span(log_time, log_time)
+        chunk.at.setdefault(channel, []).append(_ENTRY.pack(log_time, chunk.size))
         head = (5, 22 + len(data), channel, self._counts[channel] & 0xFFFFFFFF, log_time, sent)
         self._counts[channel] += 1
         self._append(_MESSAGE.pack(*head))
         self._append(data)
+
+    def messages(self, block: Block, full: int) -> None:
+        """Add many messages, as `message` adds one; a chunk ends when it has `full` bytes."""
+        ends, done = np.cumsum(RECORD_HEAD.itemsize + block.length), 0
+        while done < len(block):
+            before = int(ends[done - 1]) if done else 0
+            room = full - self._open.size + before
+            stop = max(done, int(np.searchsorted(ends, room))) + 1
+            self._fill(block.take(slice(done, stop)), ends[done:stop] - before)
+            done = stop
+            if self._open.size >= full:
+                self.end_chunk()
+
+    def _fill(self, block: Block, ends: Offsets) -> None:
+        """Add messages to the open chunk; their records end at `ends` (n,) from here."""
+        chunk, sizes = self._open, RECORD_HEAD.itemsize + block.length
+        at = ends - sizes
+        chunk.span(int(block.log_time.min()), int(block.log_time.max()))
+        entries = np.stack((block.log_time, at + chunk.size), 1).astype('<i8')
+        heads = np.empty(len(block), RECORD_HEAD)
+        heads['opcode'], heads['length'] = Opcode.MESSAGE, sizes - 9
+        for name in ('channel', 'log_time', 'published'):
+            heads[name] = getattr(block, name)
+        for channel, rows in _by_channel(block.channel):
+            count = self._counts[channel]
+            heads['sequence'][rows] = (count + np.arange(len(rows))) & 0xFFFFFFFF
+            self._counts[channel] = count + len(rows)
+            chunk.at.setdefault(channel, []).append(entries[rows].tobytes())
+        out = np.empty(int(ends[-1]), np.uint8)
+        put_rows(heads, out, at)
+        copy_parts((block.data, block.start), (out, at + RECORD_HEAD.itemsize), block.length)
+        self._append(out.data)
 
     def end_chunk(self) -> None:
         """Write the open chunk, unless it is empty, and flush it to the operating system."""
@@ -121,7 +166,9 @@ class McapWriter:
         offsets = {}
         for channel, at in chunk.at.items():
             offsets[channel] = start + end
-            out.append(_record(records.MessageIndex(channel, at)))
+            entries = b''.join(at)
+            head = (Opcode.MESSAGE_INDEX, 6 + len(entries), channel, len(entries))
+            out.append(_INDEX.pack(*head) + entries)
             end += len(out[-1])
         self._put(b''.join(out))
         self._chunks.append(
@@ -184,7 +231,7 @@ class McapWriter:
             schema_count=len(self._schemas),
         )
 
-    def _append(self, part: bytes) -> None:
+    def _append(self, part: bytes | memoryview) -> None:
         self._open.parts.append(part)
         self._open.size += len(part)
 
@@ -193,6 +240,13 @@ class McapWriter:
         while left:  # a file without a buffer may take a part
             left = left[self._file.write(left) :]
         self._pos += len(data)
+
+
+def _by_channel(channel: NDArray[np.int64]) -> list[tuple[int, NDArray[np.intp]]]:
+    """Return each channel with the rows (n,) that are its, in the order in which they begin."""
+    order = np.argsort(channel, kind='stable')
+    parts = np.split(order, np.flatnonzero(np.diff(channel[order])) + 1)
+    return [(int(channel[rows[0]]), rows) for rows in sorted(parts, key=lambda rows: int(rows[0]))]
 
 
 def _record(record: records.McapRecord) -> bytes:

@@ -2,27 +2,32 @@
 
 import heapq
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
+from zstandard import FRAME_HEADER
 
 from ugv_acceptance import BadBag, BadSample
-from ugv_acceptance.bag.chunks import Buffers, log_times, walk
+from ugv_acceptance.bag.blocks import Block, Message, block_of, joined, record_heads
+from ugv_acceptance.bag.chunks import MESSAGE, Buffers, indexed, walk
 from ugv_acceptance.bag.foreign import foreign_messages
-from ugv_acceptance.bag.gather import LEAD, SLACK
-from ugv_acceptance.bag.mcap_index import Piece
+from ugv_acceptance.bag.gather import HEAD, LEAD, SLACK, Bytes, Offsets
+from ugv_acceptance.bag.mcap_index import Channel, Piece
 from ugv_acceptance.bag.metadata import NAME
 from ugv_acceptance.bag.packed import plain
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
 
-_HEADER = 31  # bytes of a Message record before its content
+# Most messages, and about as many bytes, of an SQLite or ROS 1 file that are held at a time.
+_MESSAGES, _BYTES = 4096, 1 << 20
 # What YAML that is none of QoS raises.
 _ODD = (yaml.YAMLError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
 
@@ -58,78 +63,132 @@ def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
 
 def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:
     """Yield the messages of one file, as `messages` does."""
-    channels = member.index.channels
-    for message in (_mcap if member.storage == 'mcap' else _foreign)(member, wanted):
-        content = message.data
-        if channels[message.channel].encoding == 'cdr':
-            try:
-                content = plain(content)
-            except BadSample:
-                continue
-        yield message if content is message.data else message._replace(data=content)
+    topics = {c.id: c.topic for c in member.index.channels.values()}
+    for block in blocks_of(member, wanted):
+        for log_time, published, channel, data in block.messages():
+            yield Logged(log_time, topics[channel], data, published, channel)
 
 
-def _mcap(member: Member, wanted: set[str]) -> Iterator[Logged]:
+def blocks_of(member: Member, wanted: set[str]) -> Iterator[Block]:
+    """Yield the messages of one file as `messages` does, many at a time, by channel id."""
+    channels = [c for c in member.index.channels.values() if c.topic in wanted]
+    packed = np.array([c.id for c in channels if c.encoding == 'cdr'], np.int64)
+    for block in (_mcap if member.storage == 'mcap' else _foreign)(member, channels):
+        yield _plain(block, packed)
+
+
+def _plain(block: Block, packed: NDArray[np.int64]) -> Block:
+    """Return messages decompressed that rosbag2 compressed one by one, on channels `packed`."""
+    long = np.flatnonzero(block.length >= len(FRAME_HEADER))
+    if not len(long):
+        return block
+    every = np.ndarray(block.data.size - 3, '<u4', block.data, strides=(1,))
+    looks = every[block.start[long]] == int.from_bytes(FRAME_HEADER, 'little')
+    if not looks.any() or not np.isin(block.channel[long[looks]], packed).any():
+        return block
+    found = list[Message]()
+    for message, undo in zip(block.messages(), np.isin(block.channel, packed), strict=True):
+        with suppress(BadSample):
+            found.append((*message[:3], plain(message[3]) if undo else message[3]))
+    return block_of(found)
+
+
+def _mcap(member: Member, wanted: Sequence[Channel]) -> Iterator[Block]:
     """Yield an MCAP file's messages by log time, held back until no earlier one can come."""
     index: Any = member.index
-    channels = {c.id: c.topic for c in index.channels.values() if c.topic in wanted}
-    buffers, held = Buffers(), list[tuple[int, int, Logged]]()
-    held_in = [p for p in index.pieces if p.indexes is None or channels.keys() & p.indexes]
+    channels = {c.id for c in wanted}
+    buffers, held, places = Buffers(), block_of(()), np.zeros(0, np.int64)
+    held_in = [p for p in index.pieces if p.indexes is None or channels & p.indexes.keys()]
     pieces = sorted(held_in, key=lambda piece: piece.first)
     with member.content.open('rb') as file:
-        for k, piece in enumerate(pieces):
-            held += _piece(file.fileno(), piece, buffers, channels)
-            held.sort(key=lambda item: item[:2])
-            until = pieces[k + 1].first if k + 1 < len(pieces) else None
-            ready = [item for item in held if until is None or item[0] < until]
-            del held[: len(ready)]
-            yield from (message for _, _, message in ready)
+        for piece, after in zip_longest(pieces, pieces[1:]):
+            found = _piece(file.fileno(), piece, buffers, channels)
+            places = np.concatenate((places, piece.start + found.start))
+            held = joined((held, found))
+            order = np.lexsort((places, held.log_time))
+            held, places = held.take(order), places[order]
+            ready = len(held) if after is None else held.log_time.searchsorted(after.first)
+            yield held.take(slice(ready))
+            held, places = held.take(slice(ready, None)), places[ready:]
 
 
-def _piece(
-    file: int, piece: Piece, buffers: Buffers, channels: dict[int, str]
-) -> list[tuple[int, int, Logged]]:
-    room = np.zeros(LEAD + piece.length + SLACK, np.uint8)
+def _piece(file: int, piece: Piece, buffers: Buffers, channels: set[int]) -> Block:
+    total = piece.length + piece.index_length
+    room = np.zeros(LEAD + total + SLACK, np.uint8)
     try:
         if piece.head is None:
             size, records = piece.length, room
             os.preadv(file, [room.data[LEAD : LEAD + size]], piece.start)
         else:
-            os.preadv(file, [room.data[: piece.length]], piece.start)
-            size, records = (
-                piece.head.size,
-                buffers.records(piece.head, room[: piece.length + SLACK]),
-            )
+            os.preadv(file, [room.data[:total]], piece.start)
+            size, records = piece.head.size, buffers.records(piece.head, room)
     except BadBag:
-        return []
-    data = records.data[LEAD : LEAD + size]
-    found = []
-    for channel, offsets in walk(data).messages.items():
-        topic = channels.get(channel)
-        if topic is not None:
-            times = log_times(np.asarray(data), offsets).tolist()
-            for at, time in zip(offsets.tolist(), times, strict=True):
-                length = int.from_bytes(data[at + 1 : at + 9], 'little')
-                content = bytes(data[at + _HEADER : at + 9 + length])
-                published = int.from_bytes(data[at + 23 : at + _HEADER], 'little')
-                logged = Logged(time, topic, content, published, channel)
-                found.append((time, piece.start + at, logged))
-    return found
+        return block_of(())
+    data = records[LEAD : LEAD + size].copy()  # the next piece overwrites the buffer
+    found = _indexed(data, room, piece) or walk(data.data).messages
+    held = {c: at for c, at in found.items() if c in channels}
+    if not held:
+        return block_of(())
+    at = np.concatenate(list(held.values()))
+    head = record_heads(data)[at]
+    log_time, published = (head[name].astype(np.int64) for name in ('log_time', 'published'))
+    channel = np.repeat(list(held), [len(offsets) for offsets in held.values()])
+    length = head['length'].astype(np.int64) - (HEAD - 9)
+    return Block(log_time, published, channel, at + HEAD, length, data)
 
 
-def _foreign(member: Member, wanted: set[str]) -> Iterator[Logged]:
-    channels = {c.id: c for c in member.index.channels.values() if c.topic in wanted}
+def _indexed(data: Bytes, room: Bytes, piece: Piece) -> dict[int, Offsets] | None:
+    """Return the messages' places in a chunk by channel, as its index tells them.
+
+    None unless the records at these places fill the chunk without a gap, and are of these channels:
+    then a walk over the records would find the same.
+    """
+    if not piece.indexes or len(data) < HEAD:
+        return None
+    found = dict[int, Offsets]()
+    for channel, place in piece.indexes.items():
+        offsets = indexed(room.data[place - piece.start :], channel)
+        if offsets is None:
+            return None
+        found[channel] = offsets
+    at = np.concatenate(list(found.values()))
+    if not len(at) or at.max() > len(data) - HEAD:
+        return None
+    head = record_heads(data)[at]
+    of = np.repeat(list(found), [len(offsets) for offsets in found.values()])
+    ends = at + 9 + head['length'].astype(np.int64)
+    right = (head['opcode'] == MESSAGE) & (head['length'] >= HEAD - 9) & (head['channel'] == of)
+    order = np.argsort(at)
+    whole = np.array_equal(np.append(0, ends[order]), np.append(at[order], len(data)))
+    return found if whole and right.all() else None
+
+
+def _foreign(member: Member, wanted: Sequence[Channel]) -> Iterator[Block]:
+    channels = {c.id: c for c in wanted}
     # ROS 2's types: their headers have no sequence number, and ROS 1's is left out.
     store = get_typestore(Stores.ROS2_JAZZY) if member.storage == 'ros1' else None
     if store is not None:
         channels = {k: c for k, c in channels.items() if normal_type(c.type) in store.types}
     found = foreign_messages(member.storage, member.content, str(member.path), channels)
-    for channel, now, data in found:
+    held, size, broken = list[Message](), 0, None
+    while True:
+        try:
+            channel, now, data = next(found)
+        except (StopIteration, BadBag) as error:
+            broken = error
+            break
         content: bytes | None = data
         if store is not None:
             content = _cdr(store, data, normal_type(channels[channel].type))
         if content is not None:
-            yield Logged(now, channels[channel].topic, content, now, channel)
+            held.append((now, now, channel, content))
+            size += len(content)
+        if len(held) >= _MESSAGES or size >= _BYTES:
+            yield block_of(held)
+            held, size = [], 0
+    yield block_of(held)
+    if isinstance(broken, BadBag):
+        raise broken
 
 
 def _cdr(store: Typestore, data: bytes, kind: str) -> bytes | None:

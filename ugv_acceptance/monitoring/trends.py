@@ -51,14 +51,15 @@ def end_words(subject: str, seconds: str, *, tips: bool) -> str:
 class Trends:
     """Follows the margins of a running robot: their minima and their rates of change.
 
-    `tilt` and `load` hold (smallest margin, its time in ns) of each of SIDES and of each joint.
+    `tilt` and `load` hold (smallest margin, its time in ns) of each of SIDES and of each joint;
+    from `due` (ns) on the next sample is kept for rates.
     """
 
     settings: Settings
     tilt: list[tuple[float, int]] = field(init=False)
     load: list[tuple[float, int]] = field(init=False)
     _recent: deque[Margins] = field(default_factory=lambda: deque(maxlen=SPAN // SPACING + 1))
-    _due: int = 0
+    due: int = 0
     # The least tilts and the largest torques so far, under the limits of these settings.
     _least: list[float] = field(init=False)
     _most: list[float] = field(default_factory=list)
@@ -81,8 +82,8 @@ class Trends:
             self._least = [left for left, _ in self.tilt]
         if self.settings is not self._of or any(map(gt, map(abs, margins.torque), self._most)):
             self._see_loads(margins)
-        if margins.time >= self._due:
-            self._due = margins.time + SPACING
+        if margins.time >= self.due:
+            self.due = margins.time + SPACING
             self._recent.append(margins)
 
     def _see_loads(self, margins: Margins) -> None:

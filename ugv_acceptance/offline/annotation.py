@@ -6,11 +6,11 @@ monitor's own functions, which are called for the recording's moments one after 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from itertools import takewhile
 
 import numpy as np
 
-from ugv_acceptance.bag.annotated import Said
+from ugv_acceptance.bag.blocks import Block, Message, block_of, joined
 from ugv_acceptance.bag.encode import JointStateBytes
 from ugv_acceptance.bag.encode_views import (
     Diagnosis,
@@ -21,16 +21,11 @@ from ugv_acceptance.bag.encode_views import (
     polygon_cdr,
 )
 from ugv_acceptance.bag.reader import Bag
-from ugv_acceptance.evaluation.alerts.rules import RuleSet
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
-from ugv_acceptance.evaluation.alerts.tipping_watch import TippingWatch
-from ugv_acceptance.evaluation.ground import KINDS
 from ugv_acceptance.evaluation.margin_table import MarginRows
-from ugv_acceptance.evaluation.sample_margins import Margins
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import ordered
-from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.model.stability import NO_CONTACT, SIDES, Stability
+from ugv_acceptance.model.stability import NO_CONTACT, SIDES
 from ugv_acceptance.monitoring.alarm_tracker import Event, events_of
 from ugv_acceptance.monitoring.diagnostics import Status, alert_status, margin_statuses, verdict_of
 from ugv_acceptance.monitoring.drawing import (
@@ -44,7 +39,8 @@ from ugv_acceptance.monitoring.drawing import (
 from ugv_acceptance.monitoring.footprint import TILTS, in_frame
 from ugv_acceptance.offline.evaluation import Evaluation, Judgement
 from ugv_acceptance.offline.margins import margin_rows
-from ugv_acceptance.offline.replayed_session import PastClock, ReplayedSession, moment_of
+from ugv_acceptance.offline.replayed_advice import AdviceBook, moment_of
+from ugv_acceptance.offline.replayed_session import PastClock, Replay, ReplayedSession
 
 MONITOR, OTHER = 'acceptance_monitor', 'acceptance_evaluation'
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -62,6 +58,8 @@ TYPES = {
     'support_polygon': 'geometry_msgs/msg/PolygonStamped',
     'center_of_mass': 'geometry_msgs/msg/PointStamped',
 }
+# A topic is named in a message by its number.
+_NUMBERS = {word: number for number, word in enumerate(TYPES)}
 # Nanoseconds between verdicts, and between drawings.
 SECOND, DRAWING = 1_000_000_000, round(PERIOD * 1e9)
 
@@ -87,17 +85,20 @@ class Annotation:
     _events: list[Event] = field(init=False)
     _open: dict[int, Alert] = field(default_factory=dict)
     _due: list[int] = field(init=False)
-    _until: int = 0
-    _stamp: int = 0
-    _trend: TippingWatch = field(init=False)
+    _replay: Replay = field(init=False)
+    _advice: AdviceBook = field(init=False)
 
     def __post_init__(self) -> None:
         self.names = topic_names(self.bag)
         log, results = ordered(self._judgement.evaluator.watch.log), self.evaluation.alerts
         told = {moment_of(a): r.advice for a, r in zip(log, results, strict=True)}
+        loads = self._judgement.measurement.payloads.at
+        self._advice = AdviceBook(self.settings, loads, log)
         nothing = (lambda _stamp, _margins: None, lambda: None, lambda _text: None)
-        self._session = ReplayedSession(self.settings, *nothing, self._clock, told=told)
-        self._trend = RuleSet(self.settings).trend
+        self._session = ReplayedSession(
+            self.settings, *nothing, self._clock, told=told, book=self._advice.found
+        )
+        self._replay = Replay(self._session, loads)
         self._figure = figure_of(self.settings.robot)
         names = self.settings.robot.joint_names
         self._bytes = JointStateBytes(names), JointStateBytes(TILTS)
@@ -124,57 +125,51 @@ class Annotation:
         """The type of each topic that messages are generated for."""
         return {self.names[word]: kind for word, kind in TYPES.items()}
 
-    def said(self) -> Iterator[Said]:
-        """Yield all messages in order of log time; the recording is read once more."""
+    def said(self) -> Iterator[Block]:
+        """Yield all messages in order of log time; the recording is read once more.
+
+        The channel of a message is its topic's place in `types`.
+        """
         for rows in margin_rows(self.bag, self._judgement.topics, self.settings, detail=True):
-            yield from self._stretch(rows)
-        yield from self._up_to(self.bag.end_ns + 1)
+            if len(rows.time):
+                yield self._part(rows)
+        yield block_of(list(self._up_to(self.bag.end_ns + 1)))
 
-    def _stretch(self, rows: MarginRows) -> Iterator[Said]:
-        payloads, heard = self._judgement.measurement.payloads, rows.pairs.joints.time
-        of, until = rows.pairs.of_joints.tolist(), rows.until.tolist()
-        felt = (rows.pairs.joints.qd, rows.pairs.joints.effort)
-        measured = list(zip(*(map(tuple, table.tolist()) for table in felt), strict=True))
-        for k, (now, stamp, margins) in enumerate(_margins(rows)):
-            yield from self._up_to(now)
-            self._until, self._stamp = until[k], stamp
-            j = of[k]
-            load = payloads.at(int(heard[j]))
-            self._session.take(margins, load, measured[j])
-            if len(rows.ground.kind):
-                self._stand_on(int(rows.ground.kind[k]), margins, load)
-            if margins is not None:
-                yield from self._margins(now, stamp, margins)
+    def _part(self, rows: MarginRows) -> Block:
+        """Return the messages of the next part: of every row, and what is due before its last."""
+        end = int(rows.time[-1])
+        changes = list(takewhile(lambda time: time < end, (e.time for e in self._events[::-1])))
+        judged = sorted([*range(self._due[0], end, SECOND), *changes])
+        self._replay.part(rows, [*judged, *range(self._due[1], end, DRAWING)])
+        self._advice.look_up(rows, judged)
+        told = joined((self._of_rows(rows), block_of(list(self._up_to(end)))))
+        return told.take(np.argsort(told.log_time, kind='stable')).packed()
 
-    def _stand_on(self, number: int, margins: Margins | None, load: Payload) -> None:
-        """Let the session stand on a kind of ground (a number in KINDS), with the trend so far."""
-        session, trend = self._session, self._trend
-        if session.settings.ground.taken != KINDS[number]:
-            ground = replace(self.settings.ground, kind=KINDS[number])
-            settings = replace(self.settings, ground=ground)
-            session.settings = session.evaluator.settings = settings
-            trend.adopt(settings)
-        if margins is not None and margins.time >= trend.due:
-            angle: Any = margins.stability.angle
-            trend.keep(margins.time, angle, margins.q, margins.gravity, load)
-            trend.judge()
-        session.evaluator.watch.trend.level = trend.level
-        session.evaluator.watch.trend.cautious = trend.cautious
+    def _of_rows(self, rows: MarginRows) -> Block:
+        """Return the messages of every row whose margins are known."""
+        at, (joints, sides) = np.flatnonzero(rows.known), self._bytes
+        stamp, q, torque = rows.stamp[at], rows.q[at], rows.torque[at]
+        left = np.array(self.settings.limits.torque) - np.abs(torque)
+        tables = {
+            'static_torque': joints.table(stamp, q, torque),
+            'torque_margin': joints.table(stamp, q, left),
+            'stability': sides.table(stamp, rows.angle[at], rows.moment[at]),
+        }
+        sizes = np.array([table.shape[1] for table in tables.values()])
+        # Of each row one after the other, though each table lies in one piece.
+        first = np.cumsum(sizes * len(at)) - sizes * len(at)
+        time = np.repeat(rows.time[at], len(tables))
+        numbers = [_NUMBERS[word] for word in tables]
+        return Block(
+            time,
+            time,
+            np.tile(numbers, len(at)),
+            (first + np.arange(len(at))[:, None] * sizes).reshape(-1),
+            np.tile(sizes, len(at)),
+            np.concatenate([table.reshape(-1) for table in tables.values()]),
+        )
 
-    def _margins(self, now: int, stamp: int, margins: Margins) -> Iterator[Said]:
-        joints, sides = self._bytes
-        torque, stability = margins.torque, margins.stability
-        pairs = zip(self.settings.limits.torque, torque, strict=True)
-        left = [limit - abs(tau) for limit, tau in pairs]
-        angle, moment = map(float, stability.angle), map(float, stability.moment)
-        for word, data in (
-            ('static_torque', joints.fill(stamp, margins.q, torque)),
-            ('torque_margin', joints.fill(stamp, margins.q, left)),
-            ('stability', sides.fill(stamp, tuple(angle), tuple(moment))),
-        ):
-            yield Said(now, self.names[word], data)
-
-    def _up_to(self, end: int) -> Iterator[Said]:
+    def _up_to(self, end: int) -> Iterator[Message]:
         """Yield the alerts, verdicts and drawings due before `end` (ns), at their margins."""
         while True:
             verdict, drawing = self._due
@@ -182,9 +177,8 @@ class Annotation:
             now = min(verdict, drawing, event)
             if now >= end:
                 return
-            if now > self._until:
-                self._session.evaluator.margins = None
             self._clock.at = now
+            self._replay.to(now)
             if event == now:
                 yield from self._change(self._events.pop())
             elif verdict == now:
@@ -195,7 +189,7 @@ class Annotation:
                 self._due[1] += DRAWING
                 yield from self._draw(now)
 
-    def _change(self, event: Event) -> Iterator[Said]:
+    def _change(self, event: Event) -> Iterator[Message]:
         """Yield the messages of an alert's beginning (`which` is 1) or end, and the new verdict."""
         session, now, alert = self._session, event.time, event.alert
         if event.begins:
@@ -208,7 +202,7 @@ class Annotation:
             changes = session.alarm_tracker.take()
         session.advisory.renew(now, session.active)
         statuses = [alert_status(change, session) for change in changes]
-        yield Said(now, self.names['alerts'], self._array(now, statuses))
+        yield _message(now, 'alerts', self._array(now, statuses))
         yield from self._verdict(now)
 
     def _peak(self, alert: Alert) -> tuple[float, int | None]:
@@ -217,18 +211,18 @@ class Annotation:
         if margins is None or rule.code not in {'TIP_OVER', 'TORQUE_LIMIT'}:
             return alert.peak, alert.worst_at
         if rule.code == 'TIP_OVER':
-            return -float(margins.stability.angle[SIDES.index(rule.subject)]), margins.time
+            return -float(margins.angle[SIDES.index(rule.subject)]), margins.time
         joint = self.settings.robot.joint_names.index(rule.subject)
         return abs(margins.torque[joint]), margins.time
 
-    def _verdict(self, now: int) -> Iterator[Said]:
+    def _verdict(self, now: int) -> Iterator[Message]:
         session, status = self._session, verdict_of(self._session)
-        yield Said(now, self.names['verdict'], diagnosis_cdr(self._diagnosis(status)))
+        yield _message(now, 'verdict', diagnosis_cdr(self._diagnosis(status)))
         of = margin_statuses(session.evaluator, session.active)
         monitor = replace(status, name='Monitor')
-        yield Said(now, self.names['diagnostics'], self._array(now, [monitor, *of]))
+        yield _message(now, 'diagnostics', self._array(now, [monitor, *of]))
 
-    def _draw(self, now: int) -> Iterator[Said]:
+    def _draw(self, now: int) -> Iterator[Message]:
         margins = self._session.evaluator.margins
         if margins is None:
             return
@@ -236,7 +230,7 @@ class Annotation:
         skeleton = skeleton_of(self._figure, margins.q, margins.gravity, load)
         if skeleton is not None:
             shapes = shapes_of(skeleton, margins, self.settings)
-            stamp, frame = self._stamp, self.settings.frame
+            stamp, frame = self._replay.stamp, self.settings.frame
             stands = margins.stability.state < NO_CONTACT
             found = in_frame(self.settings, skeleton.polygon if stands else (), skeleton.cog)
             for word, data in (
@@ -244,7 +238,7 @@ class Annotation:
                 ('support_polygon', polygon_cdr(stamp, frame, found.polygon)),
                 ('center_of_mass', point_cdr(stamp, frame, found.center)),
             ):
-                yield Said(now, self.names[word], data)
+                yield _message(now, word, data)
 
     def _array(self, now: int, statuses: Sequence[Status]) -> bytes:
         return diagnoses_cdr(now, [self._diagnosis(status) for status in statuses])
@@ -260,18 +254,5 @@ class Annotation:
         return Diagnosis(status.level, name, status.message, robot, values)
 
 
-def _margins(rows: MarginRows) -> Iterator[tuple[int, int, Margins | None]]:
-    """Yield time and header stamp (ns) of each row, and its margins, None if not known."""
-    lists = [np.asarray(x).tolist() for x in (rows.q, rows.gravity, rows.torque)]
-    stable = (rows.angle, rows.moment, rows.energy, rows.zmp, rows.state)
-    lists += [np.asarray(x).tolist() for x in stable]
-    known = zip(rows.time.tolist(), rows.stamp.tolist(), rows.known.tolist(), strict=True)
-    for (now, stamp, there), line in zip(known, zip(*lists, strict=True), strict=True):
-        if not there:
-            yield now, stamp, None
-            continue
-        q, gravity, torque, angle, moment, energy, zmp, state = line
-        angles = tuple(angle)
-        stability = Stability(angles, tuple(moment), tuple(energy), zmp, state)
-        given = now, stamp, tuple(q), tuple(gravity), tuple(torque), angles, state, stability
-        yield now, stamp, Margins(*given)
+def _message(now: int, word: str, data: bytes) -> Message:
+    return now, now, _NUMBERS[word], data

@@ -1,6 +1,6 @@
 """Judges a recording: reads it once, and makes the part of a result that needs no files but it."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,15 +39,12 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.offline.evaluation import Judgement
 from ugv_acceptance.offline.recorded_transforms import with_transforms
+from ugv_acceptance.offline.stretches import stretches
 from ugv_acceptance.offline.training import TrainingRecord
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
 RESULT_VERSION = 2
-
-# Messages evaluated at a time, so that the arrays of a kernel stay in the processor's cache.
-STRETCH = 16384
-
 
 Taker = Callable[[MarginRows], None]
 
@@ -97,7 +94,7 @@ def judge(
     reading = _Reading(settings, sources, evaluator, limits, asked, options)
     batches = bag.batches(topics, workers=options.readers)
     evaluator.start(bag.start_ns)
-    for batch in _stretches(batches):
+    for batch in stretches(batches):
         reading.take(batch)
     evaluator.finish(bag.end_ns)
     reading.finish(bag.end_ns)
@@ -219,29 +216,6 @@ def _limits(settings: Settings) -> dict[str, Any]:
     found = [breach.words for breach in relaxed(settings)]
     told = {'reason': settings.unsafe, 'limits': found} if found else None
     return {'limits_hash': limits_hash(settings), 'limits_relaxed': told}
-
-
-def _stretches(batches: Iterable[Batch]) -> Iterator[Batch]:
-    """Yield batches merged to at least STRETCH messages each, to save calls."""
-    held: list[Batch] = []
-    count = 0
-    for batch in batches:
-        held.append(batch)
-        count += sum(len(s.log_time) for s in batch.joints)
-        count += sum(len(s.log_time) for s in batch.imu)
-        if count >= STRETCH:
-            yield _together(held)
-            held, count = [], 0
-    if held:
-        yield _together(held)
-
-
-def _together(batches: Sequence[Batch]) -> Batch:
-    return Batch(
-        [s for b in batches for s in b.joints],
-        [s for b in batches for s in b.imu],
-        [s for b in batches for s in b.payload],
-    )
 
 
 def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None:

@@ -14,6 +14,7 @@ from ugv_acceptance.evaluation.samples import Batch
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Robot
 from ugv_acceptance.model.stability import SIDES, STATES
+from ugv_acceptance.offline.stretches import stretches
 from ugv_acceptance.type_aliases import Floats, Times
 
 Column = Floats | Times | NDArray[np.str_]
@@ -60,7 +61,7 @@ def margin_rows(
     """
     evaluator = RecordedEvaluator(settings, detail=detail)
     evaluator.start(bag.start_ns)
-    for batch in bag.batches(topics):
+    for batch in stretches(bag.batches(topics)):
         yield evaluator.batch(batch)
 
 

@@ -1,19 +1,16 @@
 """Writes margins over time to files, part by part: CSV, and Parquet if PyArrow is installed."""
 
-import io
 from collections.abc import Callable
 from contextlib import ExitStack
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
-
-import numpy as np
+from typing import Any, BinaryIO
 
 from ugv_acceptance import AcceptanceError, pip_install
 from ugv_acceptance.bag.atomic_files import naming, whole
 from ugv_acceptance.evaluation.margin_table import MarginRows
 from ugv_acceptance.evaluation.settings import Settings
+from ugv_acceptance.offline.csv_text import csv_lines, header_line
 from ugv_acceptance.offline.margins import (
     NOT_IN_CSV,
     arrow_table,
@@ -33,15 +30,15 @@ class CsvSink:
         self._path = path
         self._settings = settings
         self._start = start
-        self._file: TextIO | None = None
+        self._file: BinaryIO | None = None
         self._stack = ExitStack()
 
     def __enter__(self) -> 'CsvSink':  # noqa: PYI034 - Self is Python 3.11
         """Open a temporary file beside the path and write the header line."""
         if self._path is not None:
-            binary = self._stack.enter_context(whole(self._path))
-            self._file = io.TextIOWrapper(binary, encoding='utf-8', newline='\n')
-            self._file.write(','.join(csv_columns(self._settings)) + '\n')
+            file = self._file = self._stack.enter_context(whole(self._path))
+            header = header_line(csv_columns(self._settings))
+            _written(self._path, lambda: file.write(header))
         return self
 
     def __exit__(
@@ -61,21 +58,10 @@ class CsvSink:
         return [] if self._file is None else [self._write]
 
     def _write(self, rows: MarginRows) -> None:
-        columns = named_columns(rows, self._settings, self._start)
-        texts = {name: columns.pop(name) for name in ('time_s', 'stamp_ns', 'state')}
-        numbers = np.column_stack([c for name, c in columns.items() if name not in NOT_IN_CSV])
-        lines = zip(*(c.tolist() for c in texts.values()), numbers.tolist(), strict=True)
-        file = self._file
+        file, columns = self._file, named_columns(rows, self._settings, self._start)
         if file is not None:
-            text = (
-                f'{time:.9f},{stamp},{state},{",".join(map(_cell, cells))}\n'
-                for time, stamp, state, cells in lines
-            )
-            _written(self._path, lambda: file.writelines(text))
-
-
-def _cell(number: Any) -> str:  # noqa: ANN401 - a float
-    return repr(number) if isfinite(number) else ''
+            wanted = {name: c for name, c in columns.items() if name not in NOT_IN_CSV}
+            _written(self._path, lambda: file.write(csv_lines(wanted)))
 
 
 class ParquetSink:

@@ -60,6 +60,8 @@ def _nothing(url: str, *_: Any, **__: Any) -> Any:  # noqa: ANN401 - WeasyPrint'
 AROUND = 5.0
 MOST_EVENTS = 8
 MOST_ALERTS = 60
+# Alerts named below one chart.
+MOST_TITLES = 12
 # Signals whose worst moment is drawn in an event.
 MOMENTS = {
     'tip': ('tip_angle',),
@@ -189,7 +191,7 @@ def _views(
 def _spans(result: Json) -> list[tuple[str, float, float]]:
     """Return the times (s) to show in detail: alerts above WARN, joined where they overlap."""
     duration = result['coverage']['duration_s']
-    spans: list[tuple[str, float, float]] = []
+    spans: list[tuple[list[str], float, float]] = []
     for alert in result['alerts']:
         if alert['level'] == 'WARN':
             continue
@@ -197,8 +199,15 @@ def _spans(result: Json) -> list[tuple[str, float, float]]:
         start, end = max(0.0, alert['start_s'] - AROUND), min(duration, end + AROUND)
         title = f'{alert["start_s"]:.2f} s: {level_words(alert["level"])}, {alert["message"]}'
         if spans and start < spans[-1][2]:
-            before = spans[-1]
-            spans[-1] = (f'{before[0]}; {title}', before[1], max(before[2], end))
+            titles, begin, before = spans[-1]
+            titles.append(title)
+            spans[-1] = (titles, begin, max(before, end))
         else:
-            spans.append((title, start, end))
-    return spans
+            spans.append(([title], start, end))
+    return [(_caption(titles), start, end) for titles, start, end in spans]
+
+
+def _caption(titles: list[str]) -> str:
+    """Return the titles of alerts as one text, at most MOST_TITLES of them."""
+    more = len(titles) - MOST_TITLES
+    return '; '.join([*titles[:MOST_TITLES], *([f'and {more} more alerts'] if more > 0 else [])])

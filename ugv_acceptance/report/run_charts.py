@@ -107,25 +107,32 @@ def _shade_unknown(axes: Axes, result: Json, end: float) -> None:
 
 
 def _draw_alerts(axes: Axes, alerts: list[Json], kinds: list[tuple[str, str]], end: float) -> None:
+    """Draw a lane for each of `kinds`; all alerts of a lane and level are one collection."""
+    bars: dict[tuple[int, str], list[tuple[float, float]]] = {}
+    worst: dict[int, list[float]] = {}
+    lanes = {kind: lane for lane, kind in enumerate(kinds)}
     for alert in alerts:
-        kind = (alert['code'], alert['subject'])
-        if kind not in kinds:
+        lane = lanes.get((alert['code'], alert['subject']))
+        if lane is None:
             continue
-        length = max(_end(alert, end) - alert['start_s'], 0.0)
-        level = alert['level']
-        axes.barh(
-            kinds.index(kind),
-            length,
-            left=alert['start_s'],
-            height=0.7 if level == 'ERROR' else 0.4,
-            color=ALERT_COLOURS.get(level, '#777777'),
+        start, at = alert['start_s'], worst_time(alert)
+        span = start, max(_end(alert, end) - start, 0.0)
+        bars.setdefault((lane, alert['level']), []).append(span)
+        if at is not None:
+            worst.setdefault(lane, []).append(at)
+    # A danger begins as a caution, so that it is drawn over it.
+    for lane, level in sorted(bars, key=lambda of: of[1] != 'WARN'):
+        height = 0.7 if level == 'ERROR' else 0.4
+        axes.broken_barh(
+            bars[lane, level],
+            (lane - height / 2.0, height),
+            facecolors=ALERT_COLOURS.get(level, '#777777'),
             hatch=ALERT_HATCHES.get(level, ''),
             edgecolor='black',
             linewidth=0.4,
         )
-        worst = worst_time(alert)
-        if worst is not None:
-            axes.plot(worst, kinds.index(kind), 'v', color='black', markersize=4.0)
+    for lane, times in worst.items():
+        axes.plot(times, [lane] * len(times), 'v', color='black', markersize=4.0)
     names = [plain(f'{code} {subject}') for code, subject in kinds]
     axes.set_yticks(range(len(kinds)), names, fontsize=6.5)
     axes.set_ylim(len(kinds) - 0.4, -0.6)

@@ -1,6 +1,7 @@
 """The declared payload: which messages are plausible, and which payload was in force when."""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -114,5 +115,5 @@ class PayloadLog:
 
     def at(self, time: int) -> Payload:
         """Return the payload in force for a joint state received at `time` (ns)."""
-        k = int(np.searchsorted(np.array(self.since, dtype=np.int64), time, side='right'))
+        k = bisect_right(self.since, time)
         return self.payloads[k - 1] if k else self.settings.robot.payload
