@@ -1,11 +1,11 @@
 """Live path: CPU a message, latency from publishing to the margin, loss; beside three others.
 
-    nice python -m bench.bench_live [--seconds 7] [--rounds 3] [--moving] [--before CHECKOUT]
+    nice python -m bench.bench_live [--seconds 12] [--rounds 3] [--moving] [--before CHECKOUT]
 
 Every round starts each listener anew with the same load: an empty raw subscriber on the events
 executor (the floor), an empty decoded one, our monitor (margins of every message, its topics at
 their default rate, each with a subscriber), a naive monitor, and with --before the monitor of an
-earlier version, from a checkout of it. Medians of the rounds, without the first two seconds; the
+earlier version, from a checkout of it. Medians of the rounds, without the first four seconds; the
 ratios are to the floor of the same round.
 """
 
@@ -92,7 +92,7 @@ def show(table: dict[str, dict[str, float]], rates: tuple[int, int]) -> None:
 def main() -> None:
     """Print a table for each load."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--seconds', type=float, default=7.0)
+    parser.add_argument('--seconds', type=float, default=12.0)
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--modes', nargs='*', default=MODES)
     parser.add_argument('--rates', nargs='*', default=RATES, help='Hz of joints + Hz of the IMU')
