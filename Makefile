@@ -150,7 +150,7 @@ colcon: .venv312/.installed
 	colcon --log-base $(COLCON)/log test \
 	    --build-base $(COLCON)/build --install-base $(COLCON)/install --test-result-base $(COLCON)/build \
 	    --event-handlers console_direct+ --return-code-on-test-failure \
-	    --pytest-args -n $(JOBS) --dist worksteal --no-cov $(ONCE) $(ARGS)
+	    --pytest-args -n $(JOBS) --dist worksteal --no-cov --hypothesis-profile=again $(ONCE) $(ARGS)
 	colcon --log-base $(COLCON)/log test-result --test-result-base $(COLCON)/build | tee $(COLCON)/summary.txt
 	@grep -q '^Summary: [1-9]' $(COLCON)/summary.txt || { echo 'colcon test: expected tests, none ran'; exit 1; }
 

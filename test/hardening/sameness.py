@@ -32,14 +32,14 @@ class Way:
     """A bag read by so many threads, or message by message by the decoder of the live monitor."""
 
     bag: Bag
-    workers: int | None = None
+    workers: int = 1
     single: bool = False
 
     def __getattr__(self, name: str) -> Any:
         """Be the bag in all but its batches."""
         return getattr(self.bag, name)
 
-    def batches(self, topics: Topics, workers: int | None = None) -> Any:
+    def batches(self, topics: Topics, workers: int = 1) -> Any:
         """Return what `Bag.batches` returns, read this way unless that is asked for."""
         if self.single:
             return Singly(self.bag, topics)

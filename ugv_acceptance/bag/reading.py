@@ -3,7 +3,6 @@
 One thread unpacks ahead of the one that decodes.
 """
 
-import os
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -163,14 +162,14 @@ class Reading(Iterator[Batch]):
         members: Sequence[Member],
         topics: dict[str, Kind[Any]],
         expected: dict[str, int],
-        workers: int | None = None,
+        workers: int = 1,
         until: int | None = None,
     ) -> None:
         self._until = until
         self._members = members
         self._topics = topics
         self._expected = expected
-        self._workers = workers or min(2, os.cpu_count() or 1)
+        self._workers = workers
         self._total = Piecework(counts=dict.fromkeys(topics, 0))
         self._sequencer = Sequencer()
         self._complete = False

@@ -17,7 +17,7 @@ from ugv_acceptance.campaign.sources import Source, is_unchanged, local_paths
 from ugv_acceptance.config import Config
 from ugv_acceptance.evaluation.criteria.criteria import CriteriaSet
 from ugv_acceptance.offline.evaluate import evaluate
-from ugv_acceptance.offline.judge import RESULT_VERSION, Options
+from ugv_acceptance.offline.judge import RESULT_VERSION
 from ugv_acceptance.type_aliases import Json
 
 
@@ -123,7 +123,7 @@ def _judged(bag: Bag, brief: Brief) -> _Found:
     if key in brief.known:
         return _Found(key, sha256, size, None)
     # One thread: the other cores have runs of their own.
-    found = evaluate(Recording(bag), config=config, criteria=criteria, options=Options(readers=1))
+    found = evaluate(Recording(bag), config=config, criteria=criteria)
     result = found.result
     result['start_ns'] = bag.start_ns
     return _Found(key, sha256, size, result)

@@ -55,16 +55,17 @@ class Options:
 
     Each of `takers` is called with the margins of every part of the recording in order; they hold
     moments, energies and ZMP if `detail` asks for them. `progress` is called with the log time (ns)
-    reached. With `compare_effort` the result compares measured efforts at rest. `readers` is the
-    number of threads that read, by default two if there is more than one core. `training` are
-    records of operators' drills: they change a verdict only where the criteria require one.
+    reached. With `compare_effort` the result compares measured efforts at rest. With two
+    `readers` a thread unpacks ahead: it takes more CPU, and saves time only where the disk is slow.
+    `training` are records of operators' drills: they change a verdict only where the criteria
+    require one.
     """
 
     takers: tuple[Taker, ...] = ()
     progress: Callable[[int], None] = lambda _: None
     detail: bool = False
     compare_effort: bool = False
-    readers: int | None = None
+    readers: int = 1
     training: tuple[TrainingRecord, ...] = ()
 
 
