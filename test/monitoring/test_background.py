@@ -14,6 +14,7 @@ from ugv_acceptance.config.uncertain import sources_from
 from ugv_acceptance.evaluation.advice.search import advise
 from ugv_acceptance.evaluation.criteria.uncertainty import effects_of
 from ugv_acceptance.monitoring.background import AtOnce
+from ugv_acceptance.monitoring.ok_word import OkWord
 from ugv_acceptance.monitoring.session import Session
 
 SOURCES = sources_from(load())
@@ -123,6 +124,22 @@ def test_without_bounds_yet_nothing_is_in_doubt_and_they_are_looked_for_soon() -
     session = run(Never(), FOLDED)
     assert session.certainty.told == {}
     assert session.certainty.due <= session.clock.now()
+
+
+def test_the_word_for_programs_waits_for_the_first_bound() -> None:
+    """A margin of which nobody knows how well it is known is not OK for a program."""
+    words = []
+    for pool in (Never(), Counting()):
+        session = run(pool, FOLDED)
+        word = OkWord(session)
+        word.why_not()
+        for _ in range(40):
+            session.clock.at += 50_000_000  # type: ignore[attr-defined]
+            give(session, FOLDED)
+            session.tick()
+            said = word.why_not()
+        words.append(said)
+    assert words == ['how well the margins are known is not worked out yet', '']
 
 
 def test_what_the_bounds_raise_is_a_fault_of_the_monitor() -> None:

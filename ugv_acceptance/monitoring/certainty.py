@@ -59,6 +59,11 @@ class Certainty:
     _asked: 'Future[Effects] | None' = None
     _bounds: tuple[Floats, Floats] | None = None
 
+    @property
+    def known(self) -> bool:
+        """Whether a bound has been computed yet, or none is needed."""
+        return self._bounds is not None or not self.sources
+
     def look(self, now: int, margins: Margins | None, payload: Payload) -> None:
         """Judge the margins at `now` (ns), None if unknown; `told` are then those in doubt.
 

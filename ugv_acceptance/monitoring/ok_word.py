@@ -12,6 +12,7 @@ false wherever the verdict is DANGER or NO DATA, and also
   payload than declared, a margin smaller than its uncertainty, a wrong clock, a slow input, an IMU
   or a motor that contradicts itself. An alert that is new here is one of these;
 * while a failure of the robot that is over waits to be acknowledged, of tip-over to be reset;
+* until the uncertainty of the margins has been worked out once;
 * while the data are older than the stale limit of their input: by receipt, by a header stamp that
   stands still (a driver that repeats its last message), and by how much later than the quickest of
   the last minute they come (a queue before us). With simulated time not by the last.
@@ -154,6 +155,8 @@ class OkWord:
                 yield f'{level_words(rule.level)} {rule.code} {rule.subject}'
         if session.evaluator.waits_for_trend:
             yield 'whether the robot begins to tip is not known yet'
+        if not session.certainty.known:
+            yield 'how well the margins are known is not worked out yet'
         if session.settings.unknown:
             yield unknown_words(session.settings)
         for alarm in session.alarm_tracker.waiting:

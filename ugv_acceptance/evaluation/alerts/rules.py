@@ -142,7 +142,11 @@ class RuleSet:
         for tau, limit in zip(torque, most, strict=True):
             if tau >= limit or tau <= -limit:
                 return False
-        return not min(angle) <= least
+        # Not by the least of them: that of a NaN and a number may be the NaN.
+        for left in angle:  # noqa: SIM110 - every message would pay for a generator
+            if left <= least:
+                return False
+        return True
 
     def step(self, now: int, torque: Sequence[float], angle: Sequence[float]) -> bool:
         """Take static torques (j,) and tip angles (4,; none: not judged) of a message at `now`.
