@@ -21,9 +21,9 @@ G, IMU = 9.81, (0.05, 0.02, 0.4)
 FRONT, LEFT, REAR = (SIDES.index(side) for side in ('front', 'left', 'rear'))
 
 
-def box() -> Robot:
+def box(inertia: tuple[float, float, float] = INERTIA) -> Robot:
     """Return a box on four points, with an arm that weighs nothing."""
-    xx, yy, zz = INERTIA
+    xx, yy, zz = inertia
     links = (
         Link('base', MASS, (0.0, 0.0, HEIGHT), ((xx, 0.0, 0.0), (0.0, yy, 0.0), (0.0, 0.0, zz))),
         Link('arm'),
@@ -112,17 +112,28 @@ def test_the_frequency_is_that_of_the_pendulum() -> None:
     assert margins()[3][FRONT] == pytest.approx(wanted, rel=1e-12)
 
 
+# The slowest pendulum that is allowed for: wn^2 just above 2 / s2.
+SLOW = (32.0, 32.0, 32.0)
+
+
+@pytest.mark.parametrize(('inertia', 'most'), [(INERTIA, 0.6), (SLOW, 0.1)])
 @given(
-    st.floats(-0.6, 0.6),
-    st.floats(-0.5, 0.5),
+    st.floats(-1.0, 1.0),
+    st.floats(-1.0, 1.0),
     st.floats(0.0, 1.0),
     st.floats(0.0, 2.0 * math.pi),
 )
-def test_a_rate_up_to_the_bound_takes_no_degree(
-    pitch: float, roll: float, share: float, heading: float
+def test_a_rate_up_to_the_bound_takes_no_degree(  # noqa: PLR0913, PLR0917 - what is given
+    inertia: tuple[float, float, float],
+    most: float,
+    pitch: float,
+    roll: float,
+    share: float,
+    heading: float,
 ) -> None:
     """Where the closer look is left out, no margin is a degree less than the tip angle."""
-    mechanics = mechanics_of(box())
+    pitch, roll = most * pitch, most * roll
+    mechanics = mechanics_of(box(inertia))
     gravity = (
         G * math.sin(pitch),
         -G * math.sin(roll) * math.cos(pitch),
@@ -133,13 +144,30 @@ def test_a_rate_up_to_the_bound_takes_no_degree(
     assume(min(angles) > 0.0)
     rate = share * math.sqrt(turn_bound(min(angles)))
     omega = (rate * math.cos(heading), rate * math.sin(heading), 0.0)
-    margin, *_ = run_tipping(
+    margin, *_, frequency = run_tipping(
         stance_kernel(mechanics, stance, IMU),
         stance,
         inertia_of(mechanics).one(0.0, 0.0, 0.0, 0.0, 0.0),
         (*gravity, *(-g for g in gravity), *omega, 0.0, 0.0, 0.0),
     )
+    assert min(frequency) > 2.0
     assert max(a - m for a, m in zip(angles, margin, strict=True)) <= MATTERS
+
+
+def test_a_rate_a_little_above_the_bound_may_take_a_degree() -> None:
+    """The bound is no smaller than it must be: with half as much again a slow robot loses one."""
+    mechanics = mechanics_of(box(SLOW))
+    (stance,) = stances_of(mechanics, posture_of(mechanics, (0.0,), 0.0, (0.0, 0.0, 0.0)))
+    gravity = (0.0, 0.0, -G)
+    angles: Any = tip_angles_of(stance, gravity)[0]
+    rate = math.sqrt(1.5 * turn_bound(min(angles)))
+    margin, *_ = run_tipping(
+        stance_kernel(mechanics, stance, IMU),
+        stance,
+        inertia_of(mechanics).one(0.0, 0.0, 0.0, 0.0, 0.0),
+        (*gravity, *(-g for g in gravity), rate, 0.0, 0.0, 0.0, 0.0, 0.0),
+    )
+    assert max(a - m for a, m in zip(angles, margin, strict=True)) > MATTERS
 
 
 def test_a_rate_well_above_the_bound_takes_a_degree() -> None:

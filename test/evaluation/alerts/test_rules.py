@@ -94,3 +94,26 @@ def test_every_signal_is_listed_once() -> None:
     assert len(set(rules)) == len(rules)
     assert all(signal.log is watch.log for signal in watch.signals)
     assert {('SLIDE', 'robot', WARN), ('TORQUE_LIMIT', 'slide', ERROR)} <= set(rules)
+
+
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+@pytest.mark.parametrize('joint', [0, 1])
+def test_a_torque_of_either_sign_is_not_small_at_the_first_limit(joint: int, sign: float) -> None:
+    """A message whose torques are all below it is not looked at closer."""
+    watch = RuleSet(settings(limits=Limits((40.0, 30.0), torque_warn=0.8)))
+    limit = (32.0, 24.0)[joint]
+    for value, small in ((limit - 0.01, True), (limit, False), (math.nan, True)):
+        torque = [0.0, 0.0]
+        torque[joint] = sign * value
+        assert watch.is_small(torque, (1.0,) * 4) is small
+
+
+@pytest.mark.parametrize('side', range(4))
+def test_a_tilt_of_any_side_is_not_small_at_the_first_limit(side: int) -> None:
+    """Whatever is known of the other sides; infinite is a side without an edge."""
+    watch = RuleSet(settings(limits=Limits((40.0, 30.0), tip_warn=0.3)))
+    for others in (1.0, math.inf, math.nan):
+        for value, small in ((0.31, True), (0.3, False), (-0.5, False), (math.nan, True)):
+            angle = [others] * 4
+            angle[side] = value
+            assert watch.is_small((0.0, 0.0), angle) is small
