@@ -123,7 +123,7 @@ SLOW = (32.0, 32.0, 32.0)
     st.floats(0.0, 1.0),
     st.floats(0.0, 2.0 * math.pi),
 )
-def test_a_rate_up_to_the_bound_takes_no_degree(  # noqa: PLR0913, PLR0917 - what is given
+def test_a_rate_up_to_the_bound_takes_no_degree(
     inertia: tuple[float, float, float],
     most: float,
     pitch: float,
