@@ -8,7 +8,7 @@ endif
 # Pythons beside those of `make test` for which ROS has wheels.
 VERSIONS ?= 3.10 3.13
 # Processes that run tests side by side: many of them wait for most of their time.
-JOBS ?= 3
+JOBS ?= 4
 
 SHELL := bash
 .SHELLFLAGS := -euo pipefail -c

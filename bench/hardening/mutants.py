@@ -41,9 +41,6 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
     ('evaluation/alerts/state_machine.py', 'Signal.step',
      'value > self.peak -> value >= self.peak'):
         'a value as bad as the peak leaves everything as it is',
-    ('evaluation/alerts/prediction.py', '', '3 -> 4'):
-        'FEW only chooses between two ways to one result',
-    ('evaluation/alerts/prediction.py', '_feed', 'len(time) > FEW -> len(time) >= FEW'): 'the same',
     ('evaluation/downsampling.py', 'Sampler', '1 -> 2'): 'no slot is below 0',
     ('evaluation/inputs/low_pass.py', 'LowPass', '0 -> 1'):
         'nothing is carried to the first sample',
@@ -71,8 +68,8 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'whether the row before the first is usable is not read',
     ('evaluation/recorded.py', 'RecordedEvaluator.__post_init__', '0 -> 1'): 'the same',
     ('evaluation/recorded.py', '', '1 -> 2'): 'no row and no time is below 0',
-    ('evaluation/recorded.py', 'RecordedEvaluator._watch_stand',
-     'self.watch.slide.on < np.inf -> self.watch.slide.on <= np.inf'):
+    ('evaluation/margin_watch.py', '_watch_stand',
+     'watch.slide.on < np.inf -> watch.slide.on <= np.inf'):
         'nothing slides where friction is not known, a call is saved',
     ('evaluation/recorded.py', 'RecordedEvaluator._watch_joints',
      'signal.on < np.inf -> signal.on <= np.inf'):
@@ -97,7 +94,7 @@ EQUIVALENT: dict[tuple[str, str, str], str] = {
         'the same',
     ('evaluation/alerts/prediction.py', '_ahead', 'len(time) > OVER -> len(time) >= OVER'):
         'of so few looks there is no rate: empty arrays',
-    ('evaluation/alerts/prediction.py', 'Prediction._judge', '0.0 -> 1.0'):
+    ('evaluation/alerts/prediction.py', 'Prediction.values', '0.0 -> 1.0'):
         'where there is no limit a warning begins at infinity',
     ('evaluation/effort/plateaus.py', 'EffortComparison.plateaus', '0.0 -> 1.0'):
         'only efforts above ten are held to the largest of the run',
