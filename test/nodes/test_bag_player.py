@@ -184,7 +184,6 @@ def simulated(folder: Path) -> Path:
         ('recorded', ()),
         ('recorded', ('--rate', '3')),
         ('recorded', ('--loop',)),
-        ('simulated', ('--rate', '0.5')),
         ('simulated', ('--loop',)),
     ],
 )

@@ -132,7 +132,7 @@ def warned(live: Live, robot: Controller, monitor: Any) -> set[str]:
     return {str(code) for code in codes} - {'INPUT_STALE', 'CLOCK'}
 
 
-@pytest.mark.parametrize('declared', ['4', '1.5', '0'])
+@pytest.mark.parametrize('declared', ['4', '0'])
 def test_a_monitor_beside_the_simulator_has_nothing_to_warn_of(
     live: Live, repository: Path, tmp_path: Path, declared: str
 ) -> None:
