@@ -100,16 +100,17 @@ def test_advice_found_before_is_told_again_where_it_still_holds() -> None:
     assert found
 
 
-def test_other_settings_need_other_advice() -> None:
-    """Limits that an operator changes are those that the advice keeps."""
+def test_other_settings_need_other_advice_and_bounds() -> None:
+    """Limits that an operator changes are those that the advice keeps, and the bounds."""
     pool = Counting()
     session = run(pool, STRETCHED)
-    limits = PACKBOT.limits
-    settings = load().settings
-    assert settings.limits == limits
-    session.adopt(settings)
+    # Equal, but another object, as a changed parameter gives.
+    session.adopt(load().settings)
     session.advisory.renew(session.clock.now() + 10**9, session.active)
-    assert pool.done.count(advise) == 2
+    session.certainty.look(
+        session.clock.now(), session.evaluator.margins, session.evaluator.payload
+    )
+    assert (pool.done.count(advise), pool.done.count(effects_of)) == (2, 2)
 
 
 def test_bounds_are_computed_again_when_the_robot_has_moved() -> None:

@@ -17,8 +17,6 @@ from ugv_acceptance.evaluation.effort.facts import JointMeaning
 from ugv_acceptance.evaluation.effort.live_rests import LiveRests, PayloadEstimate
 from ugv_acceptance.evaluation.effort.understanding import Understanding, understand
 from ugv_acceptance.evaluation.live import LiveEvaluator
-from ugv_acceptance.evaluation.sample_margins import Margins
-from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.sliding import slide_left
 from ugv_acceptance.model.stability import SIDES
 from ugv_acceptance.monitoring.background import Snapshot, one_thread, snapshot_of
@@ -53,7 +51,6 @@ class Advisory:
     pool: Executor = field(default_factory=one_thread)
     _asked: 'Future[tuple[Advice, ...]] | None' = None
     _at: Snapshot | None = None
-    _by: Settings | None = None
     _found: tuple[Advice, ...] = ()
     _judging: 'Future[Understanding] | None' = None
 
@@ -65,22 +62,14 @@ class Advisory:
         margins, evaluator = self.evaluator.margins, self.evaluator
         if margins is None or not any(alert.rule.code in COMPUTED for alert in active):
             self.advice = ()
-        elif self._asked is not None:
-            return
-        elif self._holds(margins):
-            self.advice = self._found
-        elif now - self._made >= FRESH:
-            at = self._at = snapshot_of(margins, evaluator.payload)
-            settings = self._by = evaluator.settings
-            case = settings, at.q, at.gravity, at.payload
-            self._asked, self._made = self.pool.submit(advise, *case), now
-
-    def _holds(self, margins: Margins) -> bool:
-        """Return whether the advice found last is that of the margins now, but for a little."""
-        evaluator, at = self.evaluator, self._at
-        if at is None or self._by is not evaluator.settings:
-            return False
-        return at.holds(margins, evaluator.payload, MOVED, TURNED)
+        elif self._asked is None:
+            at = snapshot_of(evaluator.settings, margins, evaluator.payload)
+            if self._at is not None and self._at.holds(at, MOVED, TURNED):
+                self.advice = self._found
+            elif now - self._made >= FRESH:
+                case = at.settings, at.q, at.gravity, at.payload
+                self._at, self._made = at, now
+                self._asked = self.pool.submit(advise, *case)
 
     def arrived(self) -> bool:
         """Collect advice whose computation has finished; return whether its subjects changed."""

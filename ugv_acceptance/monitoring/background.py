@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ugv_acceptance.evaluation.sample_margins import Margins
+from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.robot import Payload, Vector
 
 
@@ -39,23 +40,26 @@ class AtOnce(Executor):
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Joint positions `q` (rad, m), `gravity` (m/s2) and payload at one moment."""
+    """Settings, joint positions `q` (rad, m), `gravity` (m/s2) and payload at one moment."""
 
+    settings: Settings
     q: tuple[float, ...]
     gravity: Vector
     payload: Payload
 
-    def holds(self, margins: Margins, payload: Payload, moved: float, turned: float) -> bool:
-        """Return whether joints are within `moved` (rad, m) and gravity within `turned` (m/s2)."""
+    def holds(self, now: 'Snapshot', moved: float, turned: float) -> bool:
+        """Return whether what was found for this one is right for `now`.
+
+        Joints are within `moved` (rad, m), gravity within `turned` (m/s2), all else is the same.
+        """
         return (
-            payload == self.payload
-            and all(abs(x - y) <= moved for x, y in zip(self.q, margins.q, strict=True))
-            and all(
-                abs(x - y) <= turned for x, y in zip(self.gravity, margins.gravity, strict=True)
-            )
+            now.settings is self.settings
+            and now.payload == self.payload
+            and all(abs(x - y) <= moved for x, y in zip(self.q, now.q, strict=True))
+            and all(abs(x - y) <= turned for x, y in zip(self.gravity, now.gravity, strict=True))
         )
 
 
-def snapshot_of(margins: Margins, payload: Payload) -> Snapshot:
+def snapshot_of(settings: Settings, margins: Margins, payload: Payload) -> Snapshot:
     """Return the snapshot that margins belong to."""
-    return Snapshot(margins.q, margins.gravity, payload)
+    return Snapshot(settings, margins.q, margins.gravity, payload)

@@ -113,10 +113,11 @@ class Certainty:
         """
         at = self._at
         if self._asked is None:
-            if at is not None and at.holds(margins, payload, MOVED, TURNED):
+            now = snapshot_of(self.settings, margins, payload)
+            if at is not None and at.holds(now, MOVED, TURNED):
                 return True
-            at = self._at = snapshot_of(margins, payload)
-            case = self.settings, self.sources, at.q, at.gravity, at.payload
+            at = self._at = now
+            case = at.settings, self.sources, at.q, at.gravity, at.payload
             self._asked = self.pool.submit(effects_of, *case)
         if not self._asked.done():
             return False
