@@ -24,9 +24,9 @@ from ugv_acceptance.evaluation.inputs.imu_rates import (
     FEWEST,
     LATE,
     WINDOW,
+    RatesFound,
     _Pairs,
     rates_of,
-    rates_over,
 )
 from ugv_acceptance.type_aliases import Floats
 
@@ -40,6 +40,11 @@ AXES = {
     'stuck': 300.0 * np.eye(3),
     'opposite': -np.eye(3),
 }
+
+
+def rates_over(grid: ImuGrid, end: int) -> RatesFound:
+    """Return what one window alone shows, which ends at a row number of the grid."""
+    return rates_of(grid, (end,))[0]
 
 
 def made(seed: int, gyro: str, late: int, gaps: float) -> ImuGrid:

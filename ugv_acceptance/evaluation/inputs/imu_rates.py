@@ -76,11 +76,6 @@ class RatesFound(NamedTuple):
     cosine: float = math.nan
 
 
-def rates_over(grid: ImuGrid, end: int) -> RatesFound:
-    """Return what the window that ends at the row number `end` of the grid shows."""
-    return rates_of(grid, (end,))[0]
-
-
 def rates_of(grid: ImuGrid, ends: Sequence[int]) -> list[RatesFound]:
     """Return what the windows that end at these row numbers of the grid show."""
     looks = [_plainly(grid, end) for end in ends]
