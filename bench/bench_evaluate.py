@@ -29,6 +29,7 @@ from ugv_acceptance.offline.evaluate import evaluate
 
 Stage = Callable[[], object]
 LIVE_MESSAGES = 40_000
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def unpack(folder: Path) -> Stage:
@@ -101,7 +102,9 @@ def measure(name: str, folder: Path) -> None:
 def best_of(name: str, folder: Path, rounds: int) -> dict[str, float]:
     """Return the round with the least CPU time."""
     command = [sys.executable, __file__, '--stage', name, '--bag', str(folder)]
-    env = {**os.environ, 'OPENBLAS_NUM_THREADS': '1'}  # as the command line sets it
+    # A version named by PYTHONPATH comes before this one; threads as the command line sets them.
+    path = os.pathsep.join(filter(None, (os.environ.get('PYTHONPATH'), str(ROOT))))
+    env = {**os.environ, 'PYTHONPATH': path, 'OPENBLAS_NUM_THREADS': '1'}
     rows = [
         json.loads(subprocess.run(command, capture_output=True, check=True, env=env).stdout)
         for _ in range(rounds)
@@ -173,7 +176,7 @@ def main() -> None:
     if arguments.stage:
         measure(arguments.stage, arguments.bag)
     elif arguments.start:
-        short = Path(__file__).parents[1] / 'bags' / 'packbot_pass'
+        short = ROOT / 'bags' / 'packbot_pass'
         processes(arguments.bag or short, arguments.rounds)
     elif arguments.bag:
         table(arguments.bag, arguments.rounds)
