@@ -33,6 +33,12 @@ COMMANDS: dict[str, dict[str, str]] = {
     'payload': {'mass_kg': '1'},
     'hand_may_touch': {'allowed': 'true'},
 }
+# What the monitor has when it comes up.
+AT_FIRST: dict[str, dict[str, str]] = {
+    'ground': {'kind': ''},
+    'payload': {'mass_kg': '4'},
+    'hand_may_touch': {'allowed': 'false'},
+}
 
 
 class Hand(Node):
@@ -111,7 +117,7 @@ def guarded_file(folder: Path, repository: Path) -> str:
 
 
 @pytest.fixture(scope='module')
-def site(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Iterator[Guarded]:
+def running(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Iterator[Guarded]:
     """Return a monitor that has margins and operators."""
     config = guarded_file(tmp_path_factory.mktemp('operators'), repository)
     with live_nodes() as live:
@@ -128,6 +134,14 @@ def site(tmp_path_factory: pytest.TempPathFactory, repository: Path) -> Iterator
             made.driver.send,
         )
         yield made
+
+
+@pytest.fixture
+def site(running: Guarded) -> Guarded:
+    """Return it as it came up, whatever its operator told it before."""
+    for do, values in AT_FIRST.items():
+        assert running.answer(running.panel, do, **values)[1]['result'] == 'done'
+    return running
 
 
 @pytest.mark.parametrize('do', COMMANDS)
@@ -244,6 +258,8 @@ def test_diagnostics_say_who_may_command(site: Guarded) -> None:
 
 def test_the_alert_goes_when_the_stranger_is_quiet(site: Guarded) -> None:
     """Some seconds after the last command it cleared by itself."""
+    site.driver.alerts.clear()
+    site.answer(site.stranger, 'reset')
     site.alert('FOREIGN_OPERATOR', 'cleared')
 
 
