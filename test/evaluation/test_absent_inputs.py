@@ -15,6 +15,7 @@ from evaluation.streams import (
     Joints,
     Message,
     S,
+    give,
     live,
     recorded,
     robot,
@@ -31,8 +32,9 @@ from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.criteria.criteria import default_criteria
 from ugv_acceptance.evaluation.criteria.not_judged import not_judged, not_judged_joints
+from ugv_acceptance.evaluation.live import LiveEvaluator
 from ugv_acceptance.evaluation.settings import Delays, ImuInput, Limits, Settings
-from ugv_acceptance.model.robot import Joint, Link
+from ugv_acceptance.model.robot import Joint, Link, Payload
 
 NO_IMU = replace(settings(delays=Delays(off=0.1)), imu=ImuInput(attitude='level'))
 ROVER = Settings(
@@ -124,6 +126,22 @@ def test_a_rover_stands_by_the_load_it_was_told() -> None:
     rows, _ = recorded(ROVER, split(run, [150]), T0 + 3 * S)
     angles = np.concatenate([part.angle[:, 0] for part in rows])
     np.testing.assert_allclose(angles, list(front.values()), rtol=1e-12)
+
+
+def test_a_rover_stands_by_the_load_that_a_person_told() -> None:
+    """One set while the monitor runs counts from the next IMU message on, as if told before."""
+    loaded = replace(ROVER, robot=replace(ROVER.robot, payload=Payload(8.0)))
+    told, before = LiveEvaluator(ROVER), LiveEvaluator(loaded)
+    for evaluator in (told, before):
+        evaluator.start(T0)
+        for message in rolled(0.0)[:100]:
+            give(evaluator, message)
+    told.adopt(loaded)
+    for evaluator in (told, before):
+        give(evaluator, rolled(0.0)[100])
+    assert told.margins is not None
+    assert before.margins is not None
+    assert told.margins.angle == before.margins.angle
 
 
 def test_what_an_absent_input_would_tell_is_not_checked() -> None:

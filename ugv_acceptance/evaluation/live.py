@@ -255,6 +255,8 @@ class LiveEvaluator:
         self.watch.adopt(settings)
         for fresh in self.fresh:
             fresh.judge_by(settings.delays)
+        if not settings.hears_joints:
+            self._stand()
 
     def tick(self, now: int) -> None:
         """Let time pass to `now` (ns) without a message: judge silence, delays and predictions."""
