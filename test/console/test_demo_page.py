@@ -25,7 +25,7 @@ def test_the_demo_serves_the_console_of_its_run() -> None:
 def test_the_demo_works_in_a_terminal_and_without_a_page() -> None:
     """Where a person watches, a table of margins is drawn, and the alerts count: exit code 0."""
     ours, theirs = pty.openpty()
-    command = [*COMMAND, 'demo', '--rate', '30', '--no-console']
+    command = [*COMMAND, 'demo', '--rate', '6', '--no-console']
     environment = {**os.environ, 'TERM': 'xterm', 'COLUMNS': '120'}
     environment.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
     with subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment) as process:
