@@ -18,7 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 
 from ugv_acceptance.bag.encode import imu_cdr, joint_state_cdr
 from ugv_acceptance.monitoring.diagnostics import Status
-from ugv_acceptance.nodes.executor import end
+from ugv_acceptance.nodes.executor import end, take_one
 from ugv_acceptance.nodes.monitor.node import Monitor
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 
@@ -134,7 +134,7 @@ class Live:
             if now >= following:
                 meanwhile()
                 following = now + 0.01
-            self.executor.spin_once(timeout_sec=0.01)
+            take_one(self.executor, 0.01)
 
     def spin(self, seconds: float, meanwhile: Callable[[], Any] = lambda: None) -> None:
         """Spin for a while."""

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,13 @@ from ugv_acceptance.nodes.executor import (
     RANGE,
     TRANSPORT,
     UDP,
+    Stop,
     choose_transport,
+    spin,
     spun_by_thread,
     take_what_came,
 )
+from ugv_acceptance.nodes.monitor.node import Monitor
 
 # Says which files of shared memory a node's process holds open, and where its sockets listen.
 PROGRAM = """
@@ -116,6 +120,33 @@ def test_all_that_is_due_is_taken_in_one_go(live: Live) -> None:
     assert ran == [0, 1, 2]
     take_what_came(live.executor)
     assert ran == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_monitor_that_is_deactivated_while_a_driver_comes_goes_on(live: Live) -> None:
+    """What DDS said of an input waits for its turn when the input ends: the monitor spins on."""
+    monitor: Any = Monitor(lambda *_: None)
+    monitor.bring_up()
+    turns, drivers = 0, list[Any]()
+
+    def until() -> bool:
+        nonlocal turns
+        turns += 1
+        if turns == 2:
+            drivers.append(live.driver('late'))
+            while not drivers[0].connected() or not monitor.count_publishers('joint_states'):
+                time.sleep(0.01)
+            time.sleep(0.5)  # the executor, which waits for this callback, is told a little later
+            monitor.trigger_deactivate()
+        if turns == 4:
+            monitor.trigger_activate()
+        return turns == 6
+
+    try:
+        spin(monitor, Stop(), until)
+        assert monitor.session is not None
+        take_what_came(live.executor)
+    finally:
+        monitor.destroy_node()
 
 
 def test_a_thread_that_takes_messages_ends_with_its_block(live: Live) -> None:

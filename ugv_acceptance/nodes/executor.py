@@ -12,14 +12,14 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, MutableMapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.exceptions import InvalidParameterTypeException
+from rclpy.exceptions import InvalidHandle, InvalidParameterTypeException
 from rclpy.executors import Executor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -131,7 +131,24 @@ def take_what_came(executor: Executor) -> None:
     last = executor.create_task(_nothing)
     # Where ROS was shut down nothing has its turn any more.
     while not last.done() and ok():
-        executor.spin_once(timeout_sec=0.0)
+        take_one(executor, 0.0)
+
+
+def take_one(executor: Executor, seconds: float) -> None:
+    """Run one callback, of what is due within some seconds.
+
+    The turn of what was destroyed meanwhile is left out, as rclpy's other executors do: a driver
+    may come or go in the moment in which its subscription ends.
+    """
+    with suppress(InvalidHandle):
+        executor.spin_once(timeout_sec=seconds)
+
+
+def _take_until(executor: Executor, over: Future) -> None:
+    """Run callbacks until `over` is done, without those of what was destroyed meanwhile."""
+    while not over.done() and ok():
+        with suppress(InvalidHandle):
+            executor.spin_until_future_complete(over, timeout_sec=LONG)
 
 
 @contextmanager
@@ -140,11 +157,7 @@ def spun_by_thread(node: Node) -> Iterator[None]:
     executor, over = EventsExecutor(), Future()
     executor.add_node(node)
 
-    def take() -> None:
-        while not over.done() and ok():
-            executor.spin_until_future_complete(over, timeout_sec=LONG)
-
-    thread = threading.Thread(target=take, daemon=True)
+    thread = threading.Thread(target=_take_until, args=(executor, over), daemon=True)
     thread.start()
     try:
         yield
@@ -172,8 +185,7 @@ def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> N
     # A message must not wait the usual 5 ms for a thread that works out advice.
     sys.setswitchinterval(TURN)
     try:
-        while not over.done():
-            executor.spin_until_future_complete(over, timeout_sec=LONG)
+        _take_until(executor, over)
     finally:
         executor.remove_node(node)
         executor.shutdown()
