@@ -240,12 +240,10 @@ def test_a_load_on_its_topic_is_still_followed(site: Guarded) -> None:
     out = site.panel.create_publisher(InertiaStamped, 'payload', 10)
     load = InertiaStamped()
     load.header.frame_id, load.inertia.m = 'gripper_link', 1.5
-
-    def send() -> None:
-        site.driver.send()
-        out.publish(load)
-
-    site.live.until(lambda: site.value('payload.mass_kg') == 1.5, send)
+    site.live.until(out.get_subscription_count, site.driver.send)
+    out.publish(load)
+    site.live.until(lambda: site.value('payload.mass_kg') == 1.5, site.driver.send)
+    site.panel.destroy_publisher(out)
 
 
 def test_diagnostics_say_who_may_command(site: Guarded) -> None:
