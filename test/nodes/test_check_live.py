@@ -65,6 +65,7 @@ def site() -> Iterator[Site]:
     with begun() as made:
         made.tell('payload', mass_kg='1')
         made.tell('ground', kind='flat')
+        made.permitted(motion(0.05, 0.0))
         yield made
 
 
@@ -84,7 +85,7 @@ def ask(site: Site, tmp_path: Path) -> Ask:
 
 def test_the_exit_code_is_the_monitors_answer(site: Site, ask: Ask) -> None:
     """0 permitted, with what it rests on and until when; 1 refused, with the reason."""
-    site.permitted(motion(0.05, 0.0))
+    site.permitted(motion(0.05, 0.0))  # at rest for long enough
     code, out, errors = ask(motion(0.1, 0.0))
     text = ' '.join(out.split())
     assert (code, errors) == (0, '')

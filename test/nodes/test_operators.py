@@ -141,6 +141,8 @@ def site(running: Guarded) -> Guarded:
     """Return it as it came up, whatever its operator told it before."""
     for do, values in AT_FIRST.items():
         assert running.answer(running.panel, do, **values)[1]['result'] == 'done'
+    # The parameter follows a load a little later.
+    running.live.until(lambda: running.value('payload.mass_kg') == 4.0, running.driver.send)
     return running
 
 
@@ -244,6 +246,14 @@ def test_a_load_on_its_topic_is_still_followed(site: Guarded) -> None:
     out.publish(load)
     site.live.until(lambda: site.value('payload.mass_kg') == 1.5, site.driver.send)
     site.panel.destroy_publisher(out)
+
+
+def test_the_parameter_follows_a_load_whatever_else_is_told_at_once(site: Guarded) -> None:
+    """A load and something else told within a second: the load's parameter shows it too."""
+    site.panel.tell('payload', 'both a load', mass_kg='2')
+    site.panel.tell('hand_may_touch', 'and the hand', allowed='true')
+    assert site.heard(site.panel, 'and the hand')[1]['result'] == 'done'
+    site.live.until(lambda: site.value('payload.mass_kg') == 2.0, site.driver.send)
 
 
 def test_diagnostics_say_who_may_command(site: Guarded) -> None:

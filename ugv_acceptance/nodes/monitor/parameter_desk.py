@@ -23,6 +23,7 @@ from ugv_acceptance.nodes.monitor.parameters import (
     check_locked,
     declare_all,
     knobs_of,
+    list_of,
     unknown,
 )
 from ugv_acceptance.nodes.monitor.publishers import MarginOutput
@@ -84,14 +85,12 @@ class ParameterDesk:
         at = self.settings, session.evaluator.payload
         if at[0] is self._told[0] and at[1] is self._told[1]:
             return
-        self._told = at
-        if self._in_force(self.settings) == self.settings:
-            return
         self.settings = self._in_force(self.settings)
-        told = [
-            Parameter(k.name, value=k.get(self.settings)) for k in self.tunables if k.name in LOAD
-        ]
-        self._node.set_parameters_atomically(told)
+        self._told = self.settings, at[1]
+        loads = {k.name: k.get(self.settings) for k in self.tunables if k.name in LOAD}
+        if any(list_of(self.value(name)) != list_of(value) for name, value in loads.items()):
+            told = [Parameter(name, value=value) for name, value in loads.items()]
+            self._node.set_parameters_atomically(told)
 
     def declare(self, name: str, value: Any) -> None:  # noqa: ANN401 - a parameter's value
         """Set what an operator who may do so declares. Raises BadSample with the reason if not."""
