@@ -4,8 +4,8 @@ Makes (or takes) recordings of 6 joints at 200 Hz and an IMU at 400 Hz, then mea
 in a process of its own: unpacking alone (the floor), columns, margins and alerts, the whole of
 `evaluate`. One run prints all ratios. `python -m bench.bench_evaluate --minutes 10 60`
 
-`--start` measures whole processes instead: `ugv-acceptance evaluate` of a short recording beside a
-Python that does nothing, one that imports NumPy, and one that imports SciPy's special functions.
+`--start` measures whole processes instead: verbs with a short recording, beside a Python that does
+nothing and one that imports NumPy; with `--before CHECKOUT` an earlier version in the same rounds.
 """
 
 import argparse
@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from bench.bench_reading import floor, make
@@ -130,35 +130,59 @@ def table(folder: Path, rounds: int) -> None:
         )
 
 
-def processes(bag: Path, rounds: int) -> None:
+# Whole processes: what is measured -> Python's code, and the words after it.
+VERB = 'from ugv_acceptance.cli import main; main()'
+NODE = 'import ugv_acceptance.cli.node_programs, ugv_acceptance.nodes.monitor.node'
+PROCESSES: dict[str, tuple[str, str]] = {
+    'pass': ('pass', ''),
+    'import numpy': ('import numpy', ''),
+    '--version': (VERB, '--version'),
+    '--help': (VERB, '--help'),
+    'evaluate --help': (VERB, 'evaluate --help'),
+    'TAB after ev': (VERB, ''),
+    'model': (VERB, 'model'),
+    'check': (VERB, 'check test/cli/little_motion.yaml'),
+    'info': (VERB, 'info {bag}'),
+    'doctor': (VERB, 'doctor {bag}'),
+    'evaluate': (VERB, 'evaluate {bag}'),
+    'watch': (VERB, 'watch {bag}'),
+    'monitor, imported': (NODE, ''),
+}
+TAB = {
+    '_UGV_ACCEPTANCE_COMPLETE': 'complete_bash',
+    'COMP_WORDS': 'ugv-acceptance ev',
+    'COMP_CWORD': '1',
+}
+
+
+def processes(bag: Path, rounds: int, before: Path | None) -> None:
     """Print the CPU of whole processes, in turn, with compiled modules at hand."""
-    verb = 'from ugv_acceptance.cli import main; main()'
-    commands = {
-        'pass': ('pass',),
-        'import numpy': ('import numpy',),
-        'import scipy.special': ('import scipy.special',),
-        '--version': (verb, '--version'),
-        'evaluate': (verb, 'evaluate', str(bag)),
-    }
-    found: dict[str, list[float]] = {name: [] for name in commands}
+    versions = [ROOT, *([before.resolve()] if before else [])]
+    found: dict[tuple[Path, str], list[float]] = {}
     with tempfile.TemporaryDirectory() as cache:
-        env = {**os.environ, 'OPENBLAS_NUM_THREADS': '1', 'PYTHONPYCACHEPREFIX': cache}
-        env.pop('PYTHONDONTWRITEBYTECODE', None)
         for turn in range(rounds + 1):
-            for name, words in commands.items():
-                cpu = _cpu((sys.executable, '-c', *words), env)
-                if turn:  # the first one compiles
-                    found[name].append(cpu)
-    least = min(found['import numpy'])
+            for name in PROCESSES:
+                for version in versions:
+                    cpu = _cpu(name, bag.resolve(), version, cache)
+                    if turn:  # the first one compiles
+                        found.setdefault((version, name), []).append(cpu)
+    least = min(found[ROOT, 'import numpy'])
     print(f'{bag.name}, best of {rounds}')
-    print(f'{"process":20} {"CPU s":>8} {"x numpy":>8}')
-    for name, some in found.items():
-        print(f'{name:20} {min(some):8.3f} {min(some) / least:8.1f}')
+    print(f'{"process":20} {"CPU s":>8} {"x numpy":>8}', *(['before  x numpy'] if before else []))
+    for name in PROCESSES:
+        some = (min(found[version, name]) for version in versions)
+        print(f'{name:20}', *(f'{cpu:8.3f} {cpu / least:8.1f}' for cpu in some))
 
 
-def _cpu(command: Sequence[str], env: dict[str, str]) -> float:
-    """Return the CPU (s) of a process."""
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, env=env) as child:
+def _cpu(name: str, bag: Path, version: Path, cache: str) -> float:
+    """Return the CPU (s) of a process of a version, whose modules are found by its folder."""
+    code, words = PROCESSES[name]
+    env = {**os.environ, 'OPENBLAS_NUM_THREADS': '1', 'PYTHONPYCACHEPREFIX': cache}
+    env |= {'PYTHONPATH': str(version), **(TAB if name.startswith('TAB') else {})}
+    env.pop('PYTHONDONTWRITEBYTECODE', None)
+    command = [sys.executable, '-c', code, *words.format(bag=bag).split()]
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(command, stdout=quiet, stderr=quiet, env=env, cwd=version) as child:
         _, _, usage = os.wait4(child.pid, 0)
         child.returncode = 0
     return usage.ru_utime + usage.ru_stime
@@ -171,13 +195,16 @@ def main() -> None:
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--bag', type=Path, help='a recording made before')
     parser.add_argument('--start', action='store_true', help='measure whole processes')
+    parser.add_argument(
+        '--before', type=Path, help='with --start: the checkout of an earlier version'
+    )
     parser.add_argument('--stage', choices=STAGES, help='run one stage on --bag')
     arguments = parser.parse_args()
     if arguments.stage:
         measure(arguments.stage, arguments.bag)
     elif arguments.start:
         short = ROOT / 'bags' / 'packbot_pass'
-        processes(arguments.bag or short, arguments.rounds)
+        processes(arguments.bag or short, arguments.rounds, arguments.before)
     elif arguments.bag:
         table(arguments.bag, arguments.rounds)
     else:

@@ -9,7 +9,7 @@ from jsonschema import validate
 from ugv_acceptance import AcceptanceError, BadConfig
 from ugv_acceptance.cli.evidence import Papers, evaluate_files
 from ugv_acceptance.cli.ground_option import ground_from
-from ugv_acceptance.cli.model import print_tables
+from ugv_acceptance.cli.model_text import print_tables
 from ugv_acceptance.cli.result_text import print_result
 from ugv_acceptance.cli.robot_description import describe
 from ugv_acceptance.cli.verify import again, compare, ground_of

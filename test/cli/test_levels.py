@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cli.here import ugv as here_ugv
 
-from ugv_acceptance.cli.monitor import mark
+from ugv_acceptance.cli.monitor_text import mark
 from ugv_acceptance.evaluation.alerts.messages import (
     LEVELS_FOR_PEOPLE,
     level_words,

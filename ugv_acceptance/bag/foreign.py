@@ -11,16 +11,19 @@ from collections.abc import Collection, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
-from rosbags.rosbag1 import Reader as Ros1Reader
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.gather import HEAD, LEAD, SLACK, Bytes, Offsets, as_records
 from ugv_acceptance.bag.mcap_index import Channel
 from ugv_acceptance.bag.mcap_source import Piecework, Wanted
 from ugv_acceptance.type_aliases import Times
+
+if TYPE_CHECKING:
+    from rosbags.rosbag1 import Reader as Ros1Reader
 
 _BLOCK = 4096  # messages a batch
 _LAST_ID = (1 << 63) - 1
@@ -107,10 +110,16 @@ def _marks(wanted: Collection[int]) -> str:
     return f'({",".join("?" * len(wanted))})'
 
 
+def _ros1(path: Path) -> 'Ros1Reader':
+    from rosbags.rosbag1 import Reader  # noqa: PLC0415 - few recordings are of ROS 1
+
+    return Reader(path)
+
+
 def open_ros1(path: Path, name: str) -> ForeignIndex:
     """Read the index of a ROS 1 bag; BadBag if it is not readable. `name` is for errors."""
     try:
-        with Ros1Reader(path) as reader:
+        with _ros1(path) as reader:
             channels = {c.id: Channel(c.id, c.topic, c.msgtype, 'ros1') for c in reader.connections}
             counts = {c.id: c.msgcount for c in reader.connections}
             empty = not reader.message_count
@@ -121,7 +130,7 @@ def open_ros1(path: Path, name: str) -> ForeignIndex:
 
 
 def _ros1_messages(path: Path, wanted: Collection[int]) -> Iterator[_Message]:
-    with Ros1Reader(path) as reader:
+    with _ros1(path) as reader:
         connections = [c for c in reader.connections if c.id in wanted]
         for connection, log_time, data in reader.messages(connections):
             yield connection.id, log_time, bytes(data)
@@ -134,7 +143,7 @@ def foreign_times(storage: str, path: Path, name: str) -> Iterator[tuple[int, li
     """
     if storage == 'ros1':
         try:
-            with Ros1Reader(path) as reader:
+            with _ros1(path) as reader:
                 yield from ((i, [e.time for e in held]) for i, held in reader.indexes.items())
         except Exception as error:  # rosbags raises anything for a broken file
             raise BadBag(f'{name}: not a readable ROS 1 bag ({error})') from error

@@ -6,13 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
 from zstandard import FRAME_HEADER
 
 from ugv_acceptance import BadBag, BadSample
@@ -25,6 +23,9 @@ from ugv_acceptance.bag.metadata import NAME
 from ugv_acceptance.bag.packed import plain
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 # Most messages, and about as many bytes, of an SQLite or ROS 1 file that are held at a time.
 _MESSAGES, _BYTES = 4096, 1 << 20
@@ -166,7 +167,7 @@ def _indexed(data: Bytes, room: Bytes, piece: Piece) -> dict[int, Offsets] | Non
 def _foreign(member: Member, wanted: Sequence[Channel]) -> Iterator[Block]:
     channels = {c.id: c for c in wanted}
     # ROS 2's types: their headers have no sequence number, and ROS 1's is left out.
-    store = get_typestore(Stores.ROS2_JAZZY) if member.storage == 'ros1' else None
+    store = _ros2_types() if member.storage == 'ros1' else None
     if store is not None:
         channels = {k: c for k, c in channels.items() if normal_type(c.type) in store.types}
     found = foreign_messages(member.storage, member.content, str(member.path), channels)
@@ -191,7 +192,13 @@ def _foreign(member: Member, wanted: Sequence[Channel]) -> Iterator[Block]:
         raise broken
 
 
-def _cdr(store: Typestore, data: bytes, kind: str) -> bytes | None:
+def _ros2_types() -> 'Typestore':
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - for ROS 1 alone
+
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def _cdr(store: 'Typestore', data: bytes, kind: str) -> bytes | None:
     """Convert a ROS 1 message to CDR; None if it does not fit its type."""
     try:
         return bytes(store.ros1_to_cdr(data, kind))

@@ -3,14 +3,14 @@
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
-from typing import Any
-
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
+from typing import TYPE_CHECKING, Any
 
 from ugv_acceptance import BadBag
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import Bag
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
 
 TYPE = 'diagnostic_msgs/msg/DiagnosticArray'
 
@@ -40,5 +40,7 @@ def _values(data: bytes) -> Iterator[dict[str, str]]:
 
 
 @cache
-def _store() -> Typestore:
+def _store() -> 'Typestore':
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - few recordings have them
+
     return get_typestore(Stores.ROS2_JAZZY)

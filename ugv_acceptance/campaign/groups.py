@@ -4,12 +4,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
 
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.campaign.failures import Failure
 from ugv_acceptance.campaign.run_table import Row
-from ugv_acceptance.studies.two_groups import Compared, compare_mtbf, compare_success
 from ugv_acceptance.type_aliases import Json
+
+if TYPE_CHECKING:
+    from ugv_acceptance.studies.two_groups import Compared
 
 
 def comparison(
@@ -25,6 +28,9 @@ def comparison(
     """
     if not groups:
         return None
+    # SciPy's statistics take longer to load than a resumed campaign without groups.
+    from ugv_acceptance.studies.two_groups import compare_mtbf, compare_success  # noqa: PLC0415
+
     members = [[row for row in rows if _matches(row, pattern)] for _, pattern in groups]
     _check(groups, members)
     charged = [f.run for f in failures if f.chargeable]
@@ -74,7 +80,7 @@ def _check(groups: Sequence[tuple[str, str]], members: Sequence[Sequence[Row]]) 
         )
 
 
-def _json(found: Compared) -> Json:
+def _json(found: 'Compared') -> Json:
     return {
         k: None if v is not None and not math.isfinite(v) else v for k, v in asdict(found).items()
     }

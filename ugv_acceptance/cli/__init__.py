@@ -6,7 +6,9 @@ the other rooms. A verb's module imports what it needs inside its function, so t
 completion are quick. Read `evaluate.py` first, as the pattern of a verb.
 """
 
+import atexit
 import errno
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -57,6 +59,11 @@ VERBS = (
 # Read by NumPy when it is imported. Products here are of few columns: threads that share one wait
 # for each other longer than they work: up to a tenth of what judging a recording costs.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+# Read by pydantic, which else looks for plugins of its own in everything that is installed.
+os.environ.setdefault('PYDANTIC_DISABLE_PLUGINS', '__all__')
+# Objects that are made before the garbage collector looks for some to free. A start makes 80,000,
+# and all of them stay.
+COLLECT_AFTER = 100_000
 
 PROGRAM = 'ugv-acceptance'
 
@@ -88,6 +95,8 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error the user can act on gives one line and exit code 2."""
+    gc.set_threshold(COLLECT_AFTER)
+    atexit.register(gc.freeze)  # what is left goes with the process
     prepare()
     with ended_by_signals() as told:
         for verb in verbs_for(asked_words()):
@@ -127,6 +136,8 @@ def asked_words() -> list[str]:
 
 def verbs_for(words: Sequence[str]) -> Sequence[str]:
     """Return the verbs whose modules are needed: the one that is named, or all."""
+    if '--version' in words[:1]:
+        return ()
     first = next((word for word in words if not word.startswith('-')), '')
     return (first,) if first in VERBS else VERBS
 

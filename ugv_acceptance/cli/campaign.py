@@ -10,7 +10,6 @@ import typer
 from rich.markup import escape
 
 from ugv_acceptance import AcceptanceError
-from ugv_acceptance.cli.campaign_text import exit_code, print_campaign, print_effort
 from ugv_acceptance.cli.options import ConfigFile, CriteriaFile, Overwrite, UrdfFile
 from ugv_acceptance.cli.outputs import check_folder, inputs_of
 from ugv_acceptance.cli.terminal_output import (
@@ -101,6 +100,7 @@ def campaign(
     from ugv_acceptance.campaign.pool import cores
     from ugv_acceptance.campaign.sources import find_sources
     from ugv_acceptance.campaign.statement import Question, statement
+    from ugv_acceptance.cli.campaign_text import exit_code, print_campaign, print_effort
     from ugv_acceptance.cli.output_kinds import CAMPAIGN
 
     check_requirement(require_mtbf)

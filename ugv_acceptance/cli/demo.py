@@ -20,7 +20,7 @@ from ugv_acceptance.cli.plain_text import has_utf8
 from ugv_acceptance.cli.terminal_output import console_of, say
 
 if TYPE_CHECKING:
-    from ugv_acceptance.cli.monitor import Raised
+    from ugv_acceptance.cli.monitor_text import Raised
 
 
 BAG = 'packbot_fail'
@@ -80,7 +80,7 @@ def find(bag: Path | None) -> Path:
 
 def live(path: Path, rate: float, console: Console, *, page: bool) -> tuple['Raised', bool]:
     """Play the recording into the monitor; return its alerts and whether the player succeeded."""
-    from ugv_acceptance.cli.monitor import watch
+    from ugv_acceptance.cli.monitor_text import watch
 
     play = ('replay', str(path), '--rate', str(rate))
     with ExitStack() as stack:

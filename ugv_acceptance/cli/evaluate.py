@@ -16,12 +16,12 @@ from ugv_acceptance.cli.options import (
     dash,
 )
 from ugv_acceptance.cli.outputs import Input, Output, check_outputs, inputs_of
-from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
     from ugv_acceptance.cli.evidence import Papers
     from ugv_acceptance.config import Config
     from ugv_acceptance.offline.training import TrainingRecord
+    from ugv_acceptance.type_aliases import Json
 
 EXIT = {'PASS': 0, 'FAIL': 1, 'INCONCLUSIVE': 3}
 BAD_INPUT = 2
@@ -142,7 +142,7 @@ def _judged(
     papers: 'Papers',
     compare_effort: bool,
     identity: dict[str, str],
-) -> tuple[Json, int]:
+) -> 'tuple[Json, int]':
     """Return the result of one recording and its exit code; of one that cannot be read, why."""
     from ugv_acceptance.cli.evidence import evaluate_files
     from ugv_acceptance.cli.terminal_output import complain

@@ -4,8 +4,10 @@ What a node needs takes seconds to import on a robot's computer. A signal that c
 the program without a traceback, as it ends a verb; later the node's own handling counts.
 """
 
+import gc
 from importlib import import_module
 
+from ugv_acceptance.cli import COLLECT_AFTER
 from ugv_acceptance.cli.termination import ended_by_signals
 
 # The module of each program.
@@ -32,6 +34,7 @@ def packbot_simulator() -> None:
 
 
 def _run(program: str) -> None:
+    gc.set_threshold(COLLECT_AFTER)
     with ended_by_signals() as told:
         try:
             main = import_module(MODULES[program]).main

@@ -5,9 +5,8 @@ from typing import Annotated
 import typer
 
 from ugv_acceptance import BadConfig
+from ugv_acceptance.cli.completion import GROUNDS, codes_like
 from ugv_acceptance.cli.options import CONTEXT
-from ugv_acceptance.evaluation.alerts.messages import ALERTS
-from ugv_acceptance.evaluation.ground import KINDS
 
 __all__ = ['CONTEXT', 'tell']
 
@@ -20,7 +19,7 @@ WORDS: dict[str, tuple[int, int, str]] = {
     'unshelve': (1, 2, ALERT),
     'reset': (0, 2, f'[{ALERT}]'),
     'payload': (1, 1, 'MASS, such as 2.5kg'),
-    'ground': (1, 1, f'one of {", ".join(KINDS)}'),
+    'ground': (1, 1, f'one of {", ".join(GROUNDS)}'),
     'hand': (1, 1, 'allowed or not-allowed'),
 }
 HANDS = {'allowed': 'true', 'not-allowed': 'false'}
@@ -35,9 +34,10 @@ def _whats(incomplete: str) -> list[str]:
 def _values(context: typer.Context, incomplete: str) -> list[str]:
     """Return what may follow, for the shell's completion."""
     what = context.params.get('what')
-    values = {'ground': list(KINDS), 'hand': list(HANDS), 'payload': []}.get(str(what))
-    codes = sorted(ALERTS) if values is None else values
-    return [value for value in codes if value.startswith(incomplete)]
+    values = {'ground': GROUNDS, 'hand': HANDS, 'payload': ()}.get(str(what))
+    if values is None:
+        return sorted(codes_like(incomplete))
+    return [value for value in values if value.startswith(incomplete)]
 
 
 def tell(
@@ -123,11 +123,13 @@ def values_of(what: str, words: list[str], length: str = '', at: str = '') -> di
 
         return found | ({'cog_m': ','.join(map(repr, place_from(at, '--at')))} if at else {})
     if what == 'ground':
-        return {'kind': _one_of(KINDS, words[0], 'tell ground')}
+        return {'kind': _one_of(GROUNDS, words[0], 'tell ground')}
     if what == 'hand':
         return {'allowed': HANDS[_one_of(tuple(HANDS), words[0], 'tell hand')]}
     if not words:
         return {}
+    from ugv_acceptance.evaluation.alerts.messages import ALERTS
+
     found = {'code': _one_of(tuple(ALERTS), words[0].upper(), f'tell {what}')}
     found |= {'subject': words[1]} if len(words) > 1 else {}
     return found | ({'seconds': repr(seconds_of(length))} if length else {})

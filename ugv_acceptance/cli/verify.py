@@ -9,11 +9,11 @@ from rich.markup import escape
 from ugv_acceptance import AcceptanceError
 from ugv_acceptance.cli.completion import configs_like
 from ugv_acceptance.cli.terminal_output import COLOURS, console_of, say, say_list, while_read
-from ugv_acceptance.type_aliases import Json
 
 if TYPE_CHECKING:
     from ugv_acceptance.evaluation.ground import Ground
     from ugv_acceptance.model.robot import Payload
+    from ugv_acceptance.type_aliases import Json
 
 # Relative difference of numbers that is rounding of another machine's arithmetic.
 ROUNDING = 1e-9
@@ -73,7 +73,7 @@ def print_comparison(differences: list[str], path: Path, verdict: str) -> None:
     say(console, outcome)
 
 
-def read_result(path: Path) -> Json:
+def read_result(path: Path) -> 'Json':
     """Return a result of one recording. Raises AcceptanceError where the file is none of ours."""
     import json
 
@@ -113,14 +113,14 @@ def _near(path: str, folder: Path, option: str) -> Path:
 
 
 def again(
-    told: Json,
+    told: 'Json',
     folder: Path,
     bag: list[Path] | None,
     config: Path | None,
     urdf: Path | None,
     criteria: Path | None,
     drill: list[Path] | None = None,
-) -> Json:
+) -> 'Json':
     """Return the result computed again from the files it names, beside it, or as given."""
     import json
 
@@ -164,7 +164,7 @@ def again(
     return found
 
 
-def _without_later_keys(told: Json, found: Json) -> None:
+def _without_later_keys(told: 'Json', found: 'Json') -> None:
     """Take from the alerts of a result what older ones did not say."""
     alerts = told.get('alerts', ())
     if not all('worst_s' in alert for alert in alerts):
@@ -175,7 +175,7 @@ def _without_later_keys(told: Json, found: Json) -> None:
             alert.pop('acknowledged_from', None)
 
 
-def _drills(told: Json) -> list[str]:
+def _drills(told: 'Json') -> list[str]:
     """Return the files of the drills' records that a result names."""
     try:
         return [str(one['file']) for one in told.get('operator_training', {}).get('records', ())]
@@ -183,7 +183,7 @@ def _drills(told: Json) -> list[str]:
         raise AcceptanceError(f'operator_training: expected records with files: {error}') from None
 
 
-def _without_description(found: Json) -> None:
+def _without_description(found: 'Json') -> None:
     """Take from a result what older ones did not say of the robot's own description."""
     del found['robot']['urdf_sha256'], found['robot']['description']
     fine = [s for s in found['safeguards'] if s['name'] != SAFEGUARD or s['verdict'] != 'PASS']
@@ -194,7 +194,7 @@ def _without_description(found: Json) -> None:
 _LATER = {'limits_hash': 'limits_hash', 'limits_relaxed': 'limits_hash', 'ground': 'ground'}
 
 
-def payload_of(told: Json) -> 'Payload | None':
+def payload_of(told: 'Json') -> 'Payload | None':
     """Return the payload that was declared when a result was made, None if none was."""
     from ugv_acceptance.model.robot import Payload
 
@@ -205,7 +205,7 @@ def payload_of(told: Json) -> 'Payload | None':
         raise AcceptanceError(f'declared_payload: expected mass_kg and cog_m: {error}') from None
 
 
-def ground_of(told: Json) -> 'Ground | None':
+def ground_of(told: 'Json') -> 'Ground | None':
     """Return the ground that was entered when a result was made, None if none was."""
     from ugv_acceptance.evaluation.ground import KINDS, Ground, GroundWindow
 

@@ -23,18 +23,18 @@ def pick(values: Values, rows: Rows) -> Values:
     """
     if isinstance(rows, slice):
         return values
-    picked: dict[int, Values] = {}
+    return _taken(values, rows, {})
 
-    def take(x: Values) -> Values:
-        if isinstance(x, tuple):
-            return tuple([take(part) for part in x])
-        if not isinstance(x, np.ndarray):
-            return x
-        if id(x) not in picked:
-            picked[id(x)] = x.take(rows, axis=0)  # faster than x[rows]
-        return picked[id(x)]
 
-    return take(values)
+def _taken(x: Values, rows: NDArray[np.intp], picked: dict[int, Values]) -> Values:
+    """Return the rows as `pick` does; no closure, which would keep `picked` for the collector."""
+    if isinstance(x, tuple):
+        return tuple([_taken(part, rows, picked) for part in x])
+    if not isinstance(x, np.ndarray):
+        return x
+    if id(x) not in picked:
+        picked[id(x)] = x.take(rows, axis=0)  # faster than x[rows]
+    return picked[id(x)]
 
 
 def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:

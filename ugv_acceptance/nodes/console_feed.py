@@ -6,7 +6,6 @@ Messages are taken in bursts, just before a frame: a thread that wakes for each 
 twice as much and show it no sooner.
 """
 
-import gc
 import math
 import time
 from collections.abc import Iterator
@@ -39,7 +38,7 @@ from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, Alert
 from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.console_operator import ConsoleOperator
-from ugv_acceptance.nodes.executor import Stop, ros, take_what_came
+from ugv_acceptance.nodes.executor import Stop, keep_objects, ros, take_what_came
 from ugv_acceptance.nodes.monitor.publishers import LATCHED
 from ugv_acceptance.nodes.monitor.subscriptions import Inputs
 from ugv_acceptance.nodes.operator_client import MONITOR
@@ -271,9 +270,7 @@ def live_feed(config: Config, args: list[str] | None = None) -> Iterator[tuple[C
     """Run the console's node; yield it, and the object that says when to stop."""
     with ros(args) as stop:
         node = ConsoleNode(config)
-        # Objects made so far stay: the garbage collector need not check them between frames.
-        gc.collect()
-        gc.freeze()
+        keep_objects()
         try:
             yield node, stop
         finally:

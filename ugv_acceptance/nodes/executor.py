@@ -34,6 +34,8 @@ BAD_INPUT = 2
 PATIENCE = 0.5
 # Seconds that the executor is given; without a limit it never ends.
 LONG = 3600.0
+# New objects at which the garbage collector looks, as Python has it by itself.
+COLLECT_AFTER = 700
 # Seconds after which a thread gives the interpreter to one that waits.
 TURN = 0.0002
 # Fast DDS takes its transports from this, or from a file of profiles under its new or old name.
@@ -168,6 +170,16 @@ def spun_by_thread(node: Node) -> Iterator[None]:
         executor.shutdown()
 
 
+def keep_objects() -> None:
+    """Let the garbage collector look only at objects that come from now on, at few at a time.
+
+    Messages wait while it looks.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(COLLECT_AFTER)
+
+
 def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:
     """Spin until the process is asked to stop or `until` returns true (called twice a second)."""
     executor, over = EventsExecutor(), Future()
@@ -179,9 +191,7 @@ def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> N
     # Steady: a frozen /clock must not keep the process from ending.
     timer = node.create_timer(PATIENCE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
     executor.add_node(node)
-    # Objects made so far stay: the garbage collector need not check them between messages.
-    gc.collect()
-    gc.freeze()
+    keep_objects()
     # A message must not wait the usual 5 ms for a thread that works out advice.
     sys.setswitchinterval(TURN)
     try:

@@ -59,7 +59,11 @@ class Wanted:
     short: bool = False
 
 
-def derive(config: Config, wanted: Wanted = Wanted()) -> Plan:
+# What a plan is where nobody asks for anything else.
+FULL = Wanted()
+
+
+def derive(config: Config, wanted: Wanted = FULL) -> Plan:
     """Return the plan for a robot on wheels or tracks; without an arm, of ramps and driving.
 
     Raises BadConfig for a robot that stands on legs or on nothing.

@@ -90,7 +90,10 @@ class Vehicle:
     casters: tuple[int, ...] = ()
 
 
-def vehicle_of(robot: Robot, build: Build = Build()) -> Vehicle:
+PLAIN = Build()
+
+
+def vehicle_of(robot: Robot, build: Build = PLAIN) -> Vehicle:
     """Return the MuJoCo model of a robot, standing level on the lowest of its contacts."""
     model = mujoco.MjModel.from_xml_string(mjcf_of(robot, build))
     joints = [model.joint(name) for name in robot.joint_names]

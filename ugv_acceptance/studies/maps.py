@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import trapezoid
 
 from ugv_acceptance.model.edges import side_of
 from ugv_acceptance.model.mechanics import mechanics_of, posture_of
@@ -258,6 +257,12 @@ def stands(robot: Robot, grid: Grid, forms: TipForms, angle: float = 0.0) -> Mas
 
 def area_fraction(mask: Mask, grid: Grid) -> float:
     """Return the fraction of the map's area where `mask` (n, m) is True (trapezoidal rule)."""
-    rows = trapezoid(mask.astype(np.float64), grid.y, axis=1)
+    rows = _integral(mask.astype(np.float64), grid.y)
     area = (grid.x[-1] - grid.x[0]) * (grid.y[-1] - grid.y[0])
-    return float(trapezoid(rows, grid.x) / area)
+    return float(_integral(rows, grid.x) / area)
+
+
+def _integral(values: Floats, at: Floats) -> Floats:
+    """Integrate over the last axis by the trapezoidal rule."""
+    total: Floats = (np.diff(at) * (values[..., 1:] + values[..., :-1]) / 2.0).sum(axis=-1)
+    return total
