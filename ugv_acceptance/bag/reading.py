@@ -266,7 +266,7 @@ class Reading(Iterator[Batch]):
                 if isinstance(member.index, McapIndex):
                     wanted = member.wanted(self._topics)
                     source = McapSource(member.content, member.name, member.index, wanted)
-                    stack.callback(source.file.close)
+                    stack.callback(source.close)
                     sources.append(source)
             jobs = [(piece, source) for source in sources for piece in source.pieces]
             jobs.sort(key=lambda job: job[0].first)
