@@ -215,7 +215,7 @@ class _Block:
 
 def _block_of(messages: list[_Message], until: int) -> _Block:
     contents = (data for _, _, data in messages)
-    joined = bytearray(bytes(HEAD).join((bytes(LEAD), *contents, bytes(SLACK))))
+    joined = bytearray(HEAD).join((bytes(LEAD), *contents, bytes(SLACK)))
     numbers = [(channel, time, len(data)) for channel, time, data in messages]
     channels, times, lengths = np.array(numbers, np.int64).T
     return _Block(np.frombuffer(joined, np.uint8), channels, times, lengths, until)
