@@ -151,7 +151,7 @@ def open_bag(
         topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
     findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
-    salvaged = [f'{m.name}: {text}' for m in members if (text := _salvaged(m.index))]
+    salvaged = [f'{m.name}: {text}' for m in members if (text := m.index.salvaged)]
     return Bag(
         tuple(member.path for member in members),
         min((first for first, _ in ranges), default=0),
@@ -210,10 +210,6 @@ def _sha256(path: Path) -> bytes:
         while count := file.readinto(block):
             digest.update(block[:count])
     return digest.digest()
-
-
-def _salvaged(index: McapIndex | ForeignIndex) -> str | None:
-    return index.salvaged if isinstance(index, McapIndex) else None
 
 
 def _compared(metadata: Metadata, held: dict[str, Topic]) -> list[str]:
