@@ -36,8 +36,8 @@ _JOINED = f"""
 # The oldest of the rows behind an id. The index by time is left after about a block.
 _NEXT = """
     SELECT timestamp FROM messages WHERE timestamp >= ? AND +id > ? ORDER BY timestamp LIMIT 1"""
-# What a killed writer leaves beside its file, by the end of its name: how it begins, and the size up
-# to which it holds nothing.
+# What a killed writer leaves beside its file, by the end of its name: how that begins, and the size
+# up to which it holds nothing.
 _LEFT = {'-wal': (b'\x37\x7f\x06', 32), '-journal': (b'\xd9\xd5\x05', 0)}
 _Message = tuple[int, int, bytes]  # channel, log time in ns, content
 

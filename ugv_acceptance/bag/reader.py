@@ -144,6 +144,7 @@ def open_bag(
         findings += found + _compared(metadata, topics)
         promised.update(metadata.counts or {})
         members += part
+    _refuse_twice(members)
     kinds = sorted({member.storage for member in members})
     if len(kinds) > 1:
         raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
@@ -163,6 +164,17 @@ def open_bag(
         tuple(members),
         promised=dict(promised),
     )
+
+
+def _refuse_twice(members: Sequence[Member]) -> None:
+    """Raise BadBag if a file is there twice: each of its messages would be taken as two."""
+    known: dict[tuple[int, int], int] = {}
+    for k, member in enumerate(members):
+        found = member.path.stat()
+        same = known.setdefault((found.st_dev, found.st_ino), k)
+        if same != k:
+            names = ' and '.join(dict.fromkeys((str(members[same].path), str(member.path))))
+            raise BadBag(f'expected each file once, got {names} twice')
 
 
 def _member(path: Path, max_chunk_bytes: int) -> Member:
