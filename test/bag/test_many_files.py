@@ -56,6 +56,17 @@ def test_few_files_are_open_at_a_time(tmp_path: Path, reading: Reading, suffix: 
     assert open_files() == before
 
 
+@pytest.mark.parametrize('workers', [1, 2])
+def test_a_reading_that_is_given_up_leaves_no_file_open(tmp_path: Path, workers: int) -> None:
+    """Closed after its first batch, it has closed its files."""
+    bag, before = open_bag(write_mcap(tmp_path / 'run.mcap', run(2000))), open_files()
+    for _ in range(20):
+        reading = bag.batches(choose_topics(bag), workers=workers)
+        next(reading)
+        reading.close()
+        assert open_files() == before
+
+
 parts = st.lists(st.lists(st.integers(0, 30), min_size=1, max_size=5), min_size=1, max_size=6)
 
 

@@ -271,7 +271,10 @@ class Reading(Iterator[Batch]):
             jobs = [(piece, source) for source in sources for piece in source.pieces]
             jobs.sort(key=lambda job: job[0].first)
             firsts: list[int | None] = [piece.first for piece, _ in jobs[1:]]
-            results = _inline(jobs) if self._workers == 1 else _ahead(jobs)
+            # Ended before the files are closed, which its thread would open again.
+            results = stack.enter_context(
+                closing((_inline if self._workers == 1 else _ahead)(jobs))
+            )
             yield from zip(results, [*firsts, None], strict=False)
             if not jobs:
                 yield Piecework(), None
@@ -280,13 +283,13 @@ class Reading(Iterator[Batch]):
 _Job = tuple[Piece, McapSource]
 
 
-def _inline(jobs: list[_Job]) -> Iterator[Piecework]:
+def _inline(jobs: list[_Job]) -> Generator[Piecework, None, None]:
     buffers = Buffers()
     for piece, source in jobs:
         yield source.decode(source.unpack(piece, buffers))
 
 
-def _ahead(jobs: list[_Job]) -> Iterator[Piecework]:
+def _ahead(jobs: list[_Job]) -> Generator[Piecework, None, None]:
     """Unpack pieces in a thread while this one decodes the one before, in the order of the jobs.
 
     A thread that decoded as well would contend for the interpreter at every step of it.
