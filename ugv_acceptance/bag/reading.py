@@ -271,10 +271,9 @@ class Reading(Iterator[Batch]):
             jobs = [(piece, source) for source in sources for piece in source.pieces]
             jobs.sort(key=lambda job: job[0].first)
             firsts: list[int | None] = [piece.first for piece, _ in jobs[1:]]
-            # Ended before the files are closed, which its thread would open again.
-            results = stack.enter_context(
-                closing((_inline if self._workers == 1 else _ahead)(jobs))
-            )
+            results = _inline(jobs) if self._workers == 1 else _ahead(jobs)
+            # Ended before the files are closed: its thread would open them again.
+            stack.enter_context(closing(results))
             yield from zip(results, [*firsts, None], strict=False)
             if not jobs:
                 yield Piecework(), None
