@@ -253,6 +253,17 @@ def test_no_file_at_all_is_no_recording() -> None:
         open_bag([])
 
 
+@pytest.mark.parametrize('other', ['run.mcap', 'folder/../run.mcap', 'link.mcap', 'folder'])
+def test_a_file_given_twice_is_refused(tmp_path: Path, other: str) -> None:
+    """By whatever name: its rates and numbers of messages would be twice what was recorded."""
+    path = write_mcap(tmp_path / 'run.mcap', run(20))
+    (tmp_path / 'folder').mkdir()
+    (tmp_path / 'link.mcap').symlink_to(path)
+    (tmp_path / 'folder' / 'hard.mcap').hardlink_to(path)
+    with pytest.raises(BadBag, match='each file once'):
+        open_bag([path, tmp_path / other])
+
+
 def test_a_path_the_system_refuses_is_named() -> None:
     """A name longer than any file's is an error like another, not a trace."""
     with pytest.raises(BadBag, match='cannot be read'):

@@ -26,7 +26,7 @@ from ugv_acceptance.offline.evaluate import evaluate
 from ugv_acceptance.offline.evaluation import Evaluation
 from ugv_acceptance.offline.margins import margin_rows
 from ugv_acceptance.offline.replayed_advice import AdviceBook
-from ugv_acceptance.offline.replayed_session import Replay, _taken
+from ugv_acceptance.offline.replayed_session import Replay
 
 BAGS = Path(__file__).parents[2] / 'bags'
 GROUNDS = Ground(windows=(GroundWindow(STAIRS, 4.0, 9.0), GroundWindow(UNEVEN, 12.0, 20.0)))
@@ -41,8 +41,7 @@ class EveryRow(Replay):
     def part(self, rows: MarginRows, moments: Sequence[int]) -> None:  # noqa: ARG002 - as its base
         """Begin the next part."""
         self._take_until(FOREVER)
-        every = np.arange(len(rows.time))
-        self._waiting = list(_taken(rows, every, self.payload_at))[::-1]
+        self._wait(rows, np.arange(len(rows.time)))
 
 
 class EmptyBook(AdviceBook):

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from ugv_acceptance import BadBag, __version__
 from ugv_acceptance.bag.atomic_files import is_stream, naming, whole
 from ugv_acceptance.bag.blocks import Block, merged
 from ugv_acceptance.bag.mcap_writer import McapWriter
-from ugv_acceptance.bag.raw import blocks_of
+from ugv_acceptance.bag.raw import blocks_of, lanes
 from ugv_acceptance.bag.reader import Bag
 from ugv_acceptance.bag.reading import Member, normal_type
 from ugv_acceptance.bag.writer import definition_of
@@ -62,18 +63,24 @@ def _write(
     progress: Callable[[int], None],
 ) -> int:
     own = dict(enumerate(_new(writer, name, kind) for name, kind in types.items()))
-    streams = [_copied(writer, bag, member) for member in bag.members]
+    # Every file's channels are created now, at the new file's beginning.
+    channels = {id(member): _channels(writer, member) for member in bag.members}
+    streams = [
+        chain.from_iterable(_copied(bag, member, channels[id(member)]) for member in lane)
+        for lane in lanes(bag.members)
+    ]
     for block in merged([*streams, (_renumbered(part, own) for part in said)]):
         writer.messages(block, CHUNK)
         progress(int(block.log_time[-1]))
     return sum(count for channel, count in writer.counts.items() if channel not in own.values())
 
 
-def _copied(writer: McapWriter, bag: Bag, member: Member) -> Iterator[Block]:
-    """Return one file's messages; its channels are created now, at the new file's beginning."""
-    channels = _channels(writer, member)
-    found = _readable(blocks_of(member, set(bag.topics)))
-    return (_renumbered(block, channels) for block in found)
+def _copied(bag: Bag, member: Member, channels: Mapping[int, int]) -> Iterator[Block]:
+    """Yield one file's messages, with the numbers that its channels have in the new file."""
+    # The reader has reported already where a file breaks off.
+    with suppress(BadBag):
+        for block in blocks_of(member, set(bag.topics)):
+            yield _renumbered(block, channels)
 
 
 def _renumbered(block: Block, channels: Mapping[int, int]) -> Block:
@@ -86,12 +93,6 @@ def _renumbered(block: Block, channels: Mapping[int, int]) -> Block:
     known = old[place] == block.channel
     block = replace(block, channel=new)
     return block if known.all() else block.take(known)
-
-
-def _readable(blocks: Iterator[Block]) -> Iterator[Block]:
-    """Yield messages up to where their file breaks off, which the reader has reported already."""
-    with suppress(BadBag):
-        yield from blocks
 
 
 def _channels(writer: McapWriter, member: Member) -> dict[int, int]:

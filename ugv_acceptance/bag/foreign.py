@@ -39,6 +39,9 @@ _JOINED = f"""
 # The oldest of the rows behind an id. The index by time is left after about a block.
 _NEXT = """
     SELECT timestamp FROM messages WHERE timestamp >= ? AND +id > ? ORDER BY timestamp LIMIT 1"""
+# What a killed writer leaves beside its file, by the end of its name: how that begins, and the size
+# up to which it holds nothing.
+_LEFT = {'-wal': (b'\x37\x7f\x06', 32), '-journal': (b'\xd9\xd5\x05', 0)}
 _Message = tuple[int, int, bytes]  # channel, log time in ns, content
 
 
@@ -46,18 +49,20 @@ _Message = tuple[int, int, bytes]  # channel, log time in ns, content
 class ForeignIndex:
     """The index of an SQLite or ROS 1 file: channels, number of messages of each, time span.
 
-    `first` and `last` are log times in ns.
+    `first` and `last` are log times in ns; `salvaged` is a sentence if a part is not in the file.
     """
 
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
     first: int = 0
     last: int = 0
+    salvaged: str | None = None
 
 
 def open_sqlite(path: Path, name: str) -> ForeignIndex:
     """Read the index of an SQLite bag; BadBag if it is not readable. `name` is for errors."""
-    with _sqlite_errors(name), closing(_connect(path)) as db:
+    left = _left_beside(path)
+    with _sqlite_errors(name, left), closing(_connect(path)) as db:
         held = {str(row[1]) for row in db.execute('PRAGMA table_info(topics)')}
         qos = 'offered_qos_profiles' if 'offered_qos_profiles' in held else "''"
         topics = db.execute(f'SELECT id, name, type, serialization_format, {qos} FROM topics')  # noqa: S608 (one of two words)
@@ -68,7 +73,23 @@ def open_sqlite(path: Path, name: str) -> ForeignIndex:
         found = db.execute('SELECT topic_id, count(*) FROM messages GROUP BY topic_id')
         counts = {int(i): int(n) for i, n in found}
         first, last = db.execute(_SPAN).fetchone()
-    return ForeignIndex(channels, counts, int(first or 0), int(last or 0))
+    return ForeignIndex(channels, counts, int(first or 0), int(last or 0), left)
+
+
+def _left_beside(path: Path) -> str | None:
+    """Return in words what a killed writer has not written into its file, None if there is none."""
+    for end, (magic, empty) in _LEFT.items():
+        other = path.with_name(path.name + end)
+        if not other.is_file() or other.stat().st_size <= empty:
+            continue
+        with other.open('rb') as file:
+            if file.read(len(magic)) == magic:
+                return (
+                    f'{other.name} beside it was not read, with what its recorder had not yet '
+                    f'written into it; sqlite3 {path.name} '
+                    '"PRAGMA quick_check" puts the two together'
+                )
+    return None
 
 
 def _connect(path: Path) -> sqlite3.Connection:
@@ -79,15 +100,16 @@ def _connect(path: Path) -> sqlite3.Connection:
 class _sqlite_errors:  # noqa: N801 (used like a function)
     """Turns SQLite's errors, and values of an unexpected type, into BadBag."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, left: str | None = None) -> None:
         self.name = name
+        self.left = f'; {left}' if left else ''
 
     def __enter__(self) -> None:
         pass
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if isinstance(error, sqlite3.Error | TypeError | ValueError):
-            raise BadBag(f'{self.name}: not a readable SQLite bag ({error})') from error
+            raise BadBag(f'{self.name}: not a readable SQLite bag ({error}){self.left}') from error
 
 
 def _sqlite_messages(
@@ -224,7 +246,7 @@ class _Block:
 
 def _block_of(messages: list[_Message], until: int) -> _Block:
     contents = (data for _, _, data in messages)
-    joined = bytearray(bytes(HEAD).join((bytes(LEAD), *contents, bytes(SLACK))))
+    joined = bytearray(HEAD).join((bytes(LEAD), *contents, bytes(SLACK)))
     numbers = [(channel, time, len(data)) for channel, time, data in messages]
     channels, times, lengths = np.array(numbers, np.int64).T
     return _Block(np.frombuffer(joined, np.uint8), channels, times, lengths, until)

@@ -174,7 +174,10 @@ class Gather:
     def matching(
         self, buffer: Bytes, offsets: Offsets
     ) -> tuple[NDArray[np.bool_] | None, list[Words]]:
-        """Return which records have this layout (None: all), and the words of their sections."""
+        """Return which records have this layout (None: all), and the words of their sections.
+
+        Without words if it is none of them, which the first section tells of other messages.
+        """
         good: NDArray[np.bool_] | None = None
         held = []
         for section in self._sections:
@@ -184,6 +187,8 @@ class Gather:
                 if check.differs(words):
                     fits = check.fits(words)
                     good = fits if good is None else good & fits
+                    if not good.any():
+                        return good, []
         return good, held if good is None else [words[good] for words in held]
 
     def times(self, held: list[Words]) -> tuple[Times, Times]:

@@ -74,30 +74,44 @@ class Unpacked:
 
 
 class McapSource:
-    """An open MCAP file and its wanted channels; a thread may unpack while another decodes."""
+    """An MCAP file and its wanted channels; a thread may unpack while another decodes.
+
+    The file is open from the first to the last of its `pieces` that is unpacked, or until `close`:
+    a recording may have been split into more files than may be open.
+    """
 
     def __init__(self, path: Path, name: str, index: McapIndex, wanted: Wanted) -> None:
         self.name = name
         self.index = index
         self.wanted = wanted
-        self.file = path.open('rb')
-
-    @property
-    def pieces(self) -> list[Piece]:
-        """The pieces of the file that may hold a wanted message."""
-        return [
-            p
-            for p in self.index.pieces
-            if p.indexes is None or not self.wanted.keys().isdisjoint(p.indexes)
+        self._path = path
+        self._file: BinaryIO | None = None
+        # Those that may hold a wanted message.
+        self.pieces = [
+            piece
+            for piece in index.pieces
+            if piece.indexes is None or not wanted.keys().isdisjoint(piece.indexes)
         ]
+        self._left = len(self.pieces)
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
     def unpack(self, piece: Piece, buffers: Buffers) -> Unpacked:
         """Read one piece into `buffers` and unpack it; damage in it becomes a finding."""
+        file = self._file = self._file or self._path.open('rb')
         try:
-            return Unpacked(piece, *self._records(piece, buffers))
+            return Unpacked(piece, *self._records(file, piece, buffers))
         except BadBag as error:
             at = f'{self.name}: chunk at byte {piece.start}'
-            return Unpacked(piece, lost=f'{at} not used: {error}{self._lost(piece)}')
+            return Unpacked(piece, lost=f'{at} not used: {error}{self._lost(file, piece)}')
+        finally:
+            self._left -= 1
+            if not self._left:
+                self.close()
 
     def decode(self, unpacked: Unpacked) -> Piecework:
         """Decode one piece as long as the buffers that hold it are not used again."""
@@ -123,25 +137,20 @@ class McapSource:
         return work
 
     def _records(
-        self, piece: Piece, buffers: Buffers
+        self, file: BinaryIO, piece: Piece, buffers: Buffers
     ) -> tuple[Bytes, int, Callable[[int], Offsets | None]]:
         """Return a buffer with a piece's records, their size, and a channel's offsets function."""
         total = piece.length + piece.index_length
         if piece.head is None:
             packed = buffers.packed(LEAD + total)
-            self._read(packed[LEAD : LEAD + total], piece.start)
+            _read(file, packed[LEAD : LEAD + total], piece.start)
             return packed, total, _walked_offsets(packed, total)
         packed = buffers.packed(total)
-        self._read(packed[:total], piece.start)
+        _read(file, packed[:total], piece.start)
         records = buffers.records(piece.head, packed)
         if piece.indexes is None:
             return records, piece.head.size, _walked_offsets(records, piece.head.size)
         return records, piece.head.size, _index_offsets(packed[:total], piece)
-
-    def _read(self, target: Bytes, start: int) -> None:
-        got = os.preadv(self.file.fileno(), [target.data], start)
-        if got != target.size:
-            raise BadBag(f'expected {target.size} bytes of the file, got {got}')
 
     def _walked(
         self,
@@ -168,11 +177,11 @@ class McapSource:
             if channel in walked.messages
         ]
 
-    def _lost(self, piece: Piece) -> str:
+    def _lost(self, file: BinaryIO, piece: Piece) -> str:
         """Return a text on how many messages an unusable piece holds, '' if there is no index."""
         if piece.indexes is None:
             return ''
-        data = pread(self.file, piece.start + piece.length, piece.index_length)
+        data = pread(file, piece.start + piece.length, piece.index_length)
         counts = []
         for channel, at in piece.indexes.items():
             found = indexed(data[at - piece.start - piece.length :], channel)
@@ -180,6 +189,12 @@ class McapSource:
             if found is not None and known:
                 counts.append(f'{len(found)} of {known.topic}')
         return f'; lost with it: {", ".join(counts)}' if counts else ''
+
+
+def _read(file: BinaryIO, target: Bytes, start: int) -> None:
+    got = os.preadv(file.fileno(), [target.data], start)
+    if got != target.size:
+        raise BadBag(f'expected {target.size} bytes of the file, got {got}')
 
 
 def _walked_offsets(records: Bytes, size: int) -> Callable[[int], Offsets | None]:

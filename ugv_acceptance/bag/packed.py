@@ -69,7 +69,7 @@ def unpack(buffer: Bytes, starts: Offsets, lengths: Offsets) -> Unpacked | None:
         parts: Any = _decompressor().multi_decompress_to_buffer(source)
     except zstandard.ZstdError:
         return None
-    joined = bytearray(bytes(HEAD).join([bytes(LEAD), *parts, bytes(SLACK)]))
+    joined = bytearray(HEAD).join([bytes(LEAD), *parts, bytes(SLACK)])
     return Unpacked(np.frombuffer(joined, np.uint8), sizes[mask], mask)
 
 

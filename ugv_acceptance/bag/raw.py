@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -58,8 +58,30 @@ def messages(bag: Bag, topics: Iterable[str]) -> Iterator[Logged]:
     BadBag where an SQLite or ROS 1 file breaks off.
     """
     wanted = set(topics)
-    streams = [messages_of(member, wanted) for member in bag.members]
+    streams = [
+        chain.from_iterable(messages_of(member, wanted) for member in lane)
+        for lane in lanes(bag.members)
+    ]
     return heapq.merge(*streams, key=lambda message: message.log_time)
+
+
+def lanes(members: Sequence[Member]) -> list[list[Member]]:
+    """Group files so that in a group each begins when the one before it ends, or later.
+
+    Of a recording that was split this is one group, read with one file open at a time. Groups are
+    in the order of the first of their files; files without messages are left out.
+    """
+    spans = [(span, k) for k, member in enumerate(members) if (span := member.span())]
+    found: list[list[tuple[tuple[int, int], int]]] = []
+    for span, k in sorted(spans):
+        free = (lane for lane in found if lane[-1][0][1] <= span[0])
+        lane = next(free, None)
+        if lane is None:
+            found.append([(span, k)])
+        else:
+            lane.append((span, k))
+    numbers = sorted(([k for _, k in lane] for lane in found), key=min)
+    return [[members[k] for k in lane] for lane in numbers]
 
 
 def messages_of(member: Member, wanted: set[str]) -> Iterator[Logged]:

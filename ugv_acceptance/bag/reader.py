@@ -144,6 +144,7 @@ def open_bag(
         findings += found + _compared(metadata, topics)
         promised.update(metadata.counts or {})
         members += part
+    _refuse_twice(members)
     kinds = sorted({member.storage for member in members})
     if len(kinds) > 1:
         raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
@@ -151,7 +152,7 @@ def open_bag(
         topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
     findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
-    salvaged = [f'{m.name}: {text}' for m in members if (text := _salvaged(m.index))]
+    salvaged = [f'{m.name}: {text}' for m in members if (text := m.index.salvaged)]
     return Bag(
         tuple(member.path for member in members),
         min((first for first, _ in ranges), default=0),
@@ -163,6 +164,17 @@ def open_bag(
         tuple(members),
         promised=dict(promised),
     )
+
+
+def _refuse_twice(members: Sequence[Member]) -> None:
+    """Raise BadBag if a file is there twice: each of its messages would be taken as two."""
+    known: dict[tuple[int, int], int] = {}
+    for k, member in enumerate(members):
+        found = member.path.stat()
+        same = known.setdefault((found.st_dev, found.st_ino), k)
+        if same != k:
+            names = ' and '.join(dict.fromkeys((str(members[same].path), str(member.path))))
+            raise BadBag(f'expected each file once, got {names} twice')
 
 
 def _member(path: Path, max_chunk_bytes: int) -> Member:
@@ -210,10 +222,6 @@ def _sha256(path: Path) -> bytes:
         while count := file.readinto(block):
             digest.update(block[:count])
     return digest.digest()
-
-
-def _salvaged(index: McapIndex | ForeignIndex) -> str | None:
-    return index.salvaged if isinstance(index, McapIndex) else None
 
 
 def _compared(metadata: Metadata, held: dict[str, Topic]) -> list[str]:

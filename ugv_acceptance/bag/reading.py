@@ -266,12 +266,14 @@ class Reading(Iterator[Batch]):
                 if isinstance(member.index, McapIndex):
                     wanted = member.wanted(self._topics)
                     source = McapSource(member.content, member.name, member.index, wanted)
-                    stack.callback(source.file.close)
+                    stack.callback(source.close)
                     sources.append(source)
             jobs = [(piece, source) for source in sources for piece in source.pieces]
             jobs.sort(key=lambda job: job[0].first)
             firsts: list[int | None] = [piece.first for piece, _ in jobs[1:]]
             results = _inline(jobs) if self._workers == 1 else _ahead(jobs)
+            # Ended before the files are closed: its thread would open them again.
+            stack.enter_context(closing(results))
             yield from zip(results, [*firsts, None], strict=False)
             if not jobs:
                 yield Piecework(), None
@@ -280,13 +282,13 @@ class Reading(Iterator[Batch]):
 _Job = tuple[Piece, McapSource]
 
 
-def _inline(jobs: list[_Job]) -> Iterator[Piecework]:
+def _inline(jobs: list[_Job]) -> Generator[Piecework, None, None]:
     buffers = Buffers()
     for piece, source in jobs:
         yield source.decode(source.unpack(piece, buffers))
 
 
-def _ahead(jobs: list[_Job]) -> Iterator[Piecework]:
+def _ahead(jobs: list[_Job]) -> Generator[Piecework, None, None]:
     """Unpack pieces in a thread while this one decodes the one before, in the order of the jobs.
 
     A thread that decoded as well would contend for the interpreter at every step of it.

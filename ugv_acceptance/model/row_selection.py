@@ -23,18 +23,19 @@ def pick(values: Values, rows: Rows) -> Values:
     """
     if isinstance(rows, slice):
         return values
-    return _taken(values, rows, {})
+    return _picked(values, rows, {})
 
 
-def _taken(x: Values, rows: NDArray[np.intp], picked: dict[int, Values]) -> Values:
-    """Return the rows as `pick` does; no closure, which would keep `picked` for the collector."""
+def _picked(x: Values, rows: NDArray[np.intp], done: dict[int, Values]) -> Values:
+    """Return rows as `pick` does; `done` has what was picked of an array, by its id."""
+    # Not inside `pick`: a nested function that calls itself is a cycle, which holds the arrays.
     if isinstance(x, tuple):
-        return tuple([_taken(part, rows, picked) for part in x])
+        return tuple([_picked(part, rows, done) for part in x])
     if not isinstance(x, np.ndarray):
         return x
-    if id(x) not in picked:
-        picked[id(x)] = x.take(rows, axis=0)  # faster than x[rows]
-    return picked[id(x)]
+    if id(x) not in done:
+        done[id(x)] = x.take(rows, axis=0)  # faster than x[rows]
+    return done[id(x)]
 
 
 def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:

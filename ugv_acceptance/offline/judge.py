@@ -232,8 +232,6 @@ def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None
 
 
 def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
-    names = (topics.joint_states, topics.imu, topics.payload)
-    held = {name: bag.topics[name].count for name in names if name in bag.topics}
     return {
         'path': [str(path) for path in bag.paths],
         'sha256': bag.sha256(),
@@ -241,10 +239,22 @@ def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
         'messages': {name: topic.count for name, topic in bag.topics.items()},
         'protected': bag.protected,
         'salvaged': bag.salvaged,
-        # Only of the topics read here: losing a camera's messages does not affect the verdict.
-        'lost_messages': sum(max(0, bag.promised.get(n, 0) - k) for n, k in held.items()),
+        'lost_messages': _lost(bag, topics, facts),
         'findings': [*bag.findings, *facts.findings],
     }
+
+
+def _lost(bag: Bag, topics: Topics, facts: Facts) -> int:
+    """Return how many messages metadata.yaml or the index of the file counts that were not read.
+
+    Only of the topics read here: losing a camera's messages does not affect the verdict.
+    """
+    if bag.until_ns is not None:  # only the beginning was asked for
+        return 0
+    names = (topics.joint_states, topics.imu, topics.payload)
+    held = {name: bag.topics[name].count for name in names if name in bag.topics}
+    counted = {name: max(bag.promised.get(name, 0), count) for name, count in held.items()}
+    return sum(max(0, count - facts.counts.get(name, 0)) for name, count in counted.items())
 
 
 def _inputs_result(

@@ -112,10 +112,12 @@ class Replay:
     stamp: int = 0
     _settings: Settings = field(init=False)
     _trend: TippingWatch = field(init=False)
-    _waiting: list[_Taken] = field(default_factory=list)
+    _waiting: Iterator[_Taken] = field(init=False)
+    _next: _Taken | None = None
     _until: int = 0
 
     def __post_init__(self) -> None:
+        self._waiting = iter(())
         self._settings = self.session.settings
         self._trend = RuleSet(self._settings).trend
 
@@ -130,7 +132,12 @@ class Replay:
         kind = rows.ground.kind
         if len(kind):
             telling |= np.append(True, kind[1:] != kind[:-1])
-        self._waiting = list(_taken(rows, np.flatnonzero(telling), self.payload_at))[::-1]
+        self._wait(rows, np.flatnonzero(telling))
+
+    def _wait(self, rows: MarginRows, at: NDArray[np.intp]) -> None:
+        """Keep some rows of a part, to be taken when their time has come."""
+        self._waiting = _taken(rows, at, self.payload_at)
+        self._next = next(self._waiting, None)
 
     def to(self, now: int) -> None:
         """Take all rows of this part until `now` (ns); without margins where they have ended."""
@@ -139,8 +146,8 @@ class Replay:
             self.session.evaluator.margins = None
 
     def _take_until(self, now: int) -> None:
-        while self._waiting and self._waiting[-1].time <= now:
-            row = self._waiting.pop()
+        while (row := self._next) is not None and row.time <= now:
+            self._next = next(self._waiting, None)
             self._until, self.stamp = row.until, row.stamp
             self.session.take(row.margins, row.load, row.measured)
             if row.ground is not None:
@@ -202,7 +209,7 @@ def _taken(
     flat = not len(rows.ground.kind)
     grounds = repeat(None, len(at)) if flat else rows.ground.kind[at].tolist()
     numbers = zip(*(column[at].tolist() for column in alone), strict=True)
-    inputs, outputs = (zip(*map(_tuples, group), strict=True) for group in (felt, tables))
+    inputs, outputs = (zip(*map(_rows, group), strict=True) for group in (felt, tables))
     heard = joints.time[j].tolist()
     for one, (q, gravity, *measured), found, when, ground in zip(
         numbers, inputs, outputs, heard, grounds, strict=True
@@ -217,5 +224,7 @@ def _taken(
         yield _Taken(time, until, stamp, margins, payload_at(when), (rates, efforts), ground)
 
 
-def _tuples(table: Floats) -> list[tuple[float, ...]]:
-    return list(map(tuple, table.tolist()))
+def _rows(table: Floats) -> Iterator[tuple[float, ...]]:
+    """Yield the rows of a table: all at once, they would keep the garbage collector busy."""
+    columns = [column.tolist() for column in table.T]
+    return zip(*columns, strict=True) if columns else repeat((), len(table))

@@ -187,7 +187,7 @@ DATA = {
     ),
     'salvaged': Quantity(lambda r: float(r['bag']['salvaged'] is not None), 'truncated files'),
     'lost_messages': Quantity(
-        lambda r: float(r['bag']['lost_messages']), 'messages counted in metadata.yaml but missing'
+        lambda r: float(r['bag']['lost_messages']), 'messages counted but missing'
     ),
     'findings': Quantity(lambda r: float(len(r['bag']['findings'])), 'findings about the file'),
     'late_messages': Quantity(

@@ -364,7 +364,8 @@ def _unmet_words(
     if demand.quantity == 'salvaged':
         return f'the recording is truncated: {data["bag"]["salvaged"]}'
     if demand.quantity == 'lost_messages':
-        return f'{data["bag"]["lost_messages"]} messages counted in metadata.yaml are missing'
+        lost = data['bag']['lost_messages']
+        return f'{lost} messages are missing that metadata.yaml or the index of the file counts'
     unit = unit_of(demand.quantity)
     texts = {k: 'unknown' if x is None else f'{x:.4g} {unit}'.strip() for k, x in unmet.items()}
     numbers = ', '.join(f'{k} {text}'.removeprefix('run ') for k, text in texts.items())
