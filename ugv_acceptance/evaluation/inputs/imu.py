@@ -288,14 +288,14 @@ class ImuTracker:
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw[:, Q], raw[:, W], raw[:, A])
+        felt = (q, omega, acceleration) if raw is None else (raw.T[Q], raw.T[W], raw.T[A])
         table = samples(*felt, told)
         trusted = self._judge_motion(time, stamp, table, gravity)
         self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable, trusted)
 
     def _judge_motion(self, time: Times, stamp: Times, x: Floats, gravity: Floats) -> Mask:
-        """Give samples (n, WIDTH) to the checks in motion; set gravity to NaN while one says so.
+        """Give samples (WIDTH, n) to the checks in motion; set gravity to NaN while one says so.
 
         Return where the gyro is trusted (n,).
         """
