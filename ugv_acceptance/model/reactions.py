@@ -8,6 +8,7 @@ whose ends lie at three points around the plumb point each. Friction between the
 brace them against each other, comes on top.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -21,7 +22,7 @@ from ugv_acceptance.model.expressions import Number, Scalar
 from ugv_acceptance.model.hull import drawn_in
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.mechanics import Mechanics, Posture, Triple
-from ugv_acceptance.model.row_selection import Rows, pick
+from ugv_acceptance.model.row_selection import ALL, Rows, inner, pick
 from ugv_acceptance.model.statics import torque_of
 from ugv_acceptance.type_aliases import Floats
 
@@ -92,6 +93,8 @@ def standing_torque(
         for joint, place, k in felt:
             found[joint] = found[joint] - loads[place] * _along(posture.loads[k], gravity)
     if isinstance(pressed, bool):
+        return tuple(found)
+    if pressed.all():
         return tuple(found)
     known = zip(found, hanging, strict=True)
     return tuple([new if new is old else np.where(pressed, new, old) for new, old in known])
@@ -208,18 +211,9 @@ def _even_shares(count: int, flat: tuple[Number, ...]) -> Sequence[Number]:
         floats: Any = flat
         return _shares_once(count, floats)
     rows = np.broadcast_shapes(*(np.shape(x) for x in flat))
-    pushing: list[Any] = [1.0] * count
-    run = _shares_kernel(count).run
-    for _ in range(_TRIES):
-        shares = run(*flat, *pushing)
-        after = [(share > 0.0) * 1.0 for share in shares]
-        settled = _all(np.equal(a, b) for a, b in zip(after, pushing, strict=True))
-        if settled.all():
-            break
-        pushing = after
-    found = [np.array(np.broadcast_to(a * s, rows)) for a, s in zip(after, shares, strict=True)]
-    settled = settled & _balanced(found, flat)
-    left = np.flatnonzero(~np.broadcast_to(settled, rows))
+    found, settled = _settled_shares(count, flat, rows)
+    settled &= _balanced(found, flat)
+    left = np.flatnonzero(~settled)
     some = np.array([np.broadcast_to(x, rows)[left] for x in flat])
     known = np.isfinite(some).all(axis=0)
     left, some = left[known], some[:, known]
@@ -227,6 +221,32 @@ def _even_shares(count: int, flat: tuple[Number, ...]) -> Sequence[Number]:
         for column, share in zip(found, _searched_shares(some[::2].T, some[1::2].T).T, strict=True):
             column[left] = share
     return found
+
+
+def _settled_shares(
+    count: int, flat: tuple[Number, ...], shape: tuple[int, ...]
+) -> tuple[list[Floats], NDArray[np.bool_]]:
+    """Return the shares after _TRIES at most, and of which samples the points that push settled.
+
+    Samples that settled are not tried again: the same points would give the same shares.
+    """
+    found, settled = np.empty((count, *shape)), np.zeros(shape, np.bool_)
+    run, left = _shares_kernel(count).run, ALL
+    some, pushing = flat, (1.0,) * count
+    for _ in range(_TRIES):
+        shares = run(*some, *pushing)
+        after = tuple([(share > 0.0) * 1.0 for share in shares])
+        for line, push, share in zip(found, after, shares, strict=True):
+            line[left] = push * share
+        done = _all(np.equal(a, b) for a, b in zip(after, pushing, strict=True))
+        settled[left] = done
+        if done.all():
+            break
+        again = np.flatnonzero(~np.broadcast_to(done, shape))
+        left = inner(left, again)
+        some, pushing = pick(some, again), pick(after, again)
+        shape = again.shape
+    return list(found), settled
 
 
 def _balanced(shares: Sequence[Any], flat: Sequence[Any]) -> Any:  # noqa: ANN401 - both
@@ -381,7 +401,8 @@ def carry(
         return set()
     fields = (posture.mass, posture.cog, posture.contacts, posture.loads)
     one = Posture((), *pick(fields, rows))
-    hanging = tuple([table[j, place] for j in range(len(mechanics.robot.joint_names))])
+    count = len(mechanics.robot.joint_names)
+    hanging = tuple([table[j, place] if j in joints else math.nan for j in range(count)])
     standing = standing_torque(mechanics, one, points, gravity, hanging)
     for joint in joints:
         table[joint, place] = standing[joint]
