@@ -259,18 +259,15 @@ class ImuTracker:
         off, still = np.abs(size - g), spin <= imu.rest_rate
         given = covariance_0 != -1.0
         rotation = given & _is_rotation(q[0], q[1], q[2], q[3])
-        told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
+        told = rotation & (q[:3] != 0.0).any(axis=0) if imu.attitude == 'auto' else rotation
         self._count(told, given)
-        by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
-        oriented = np.array(by_orientation)
-        if not rotation.all():
-            oriented[:, ~rotation] = np.nan
-        up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
-        leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
+        oriented = np.array(up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting))
+        _blank(oriented, ~rotation)
+        leaning = np.array(up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting))
+        _blank(leaning, ~(off <= GRAVITY_SLACK * g))
         rest = still & (off <= imu.rest_acceleration)
-        rested = rested_messages(time, rest)
-        self.seen.rested += rested
-        apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
+        self.seen.rested += rested_messages(time, rest)
+        apart = _apart(oriented, leaning, rest)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
             force = np.array(_force(tuple(smooth), tuple(omega), imu))
@@ -278,11 +275,13 @@ class ImuTracker:
         else:
             use = told & (imu.attitude != 'accelerometer')
             gravity = -g * (oriented if use.all() else np.where(use, oriented, leaning))
-            if imu.attitude == 'auto' and not believable.all():
-                gravity[:, ~believable] = np.nan
+            if imu.attitude == 'auto':
+                _blank(gravity, ~believable)
         unknown = believable & np.isnan(gravity[0])
         nothing = np.where(unknown, off / g, 0.0) if unknown.any() else np.zeros(len(time))
-        faults = (foreign, np.zeros(len(time)), np.where(still, off / g, np.nan), apart)
+        strange = off / g
+        _blank(strange, ~still)
+        faults = (foreign, np.zeros(len(time)), strange, apart)
         feed(self.faults.nothing, time, nothing)
         if not told.all():
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
@@ -380,6 +379,22 @@ def _lines(tables: Sequence[Floats]) -> Floats:
     """Concatenate tables (n, k) and return them transposed, (k, sum of n), in contiguous rows."""
     out = np.empty((tables[0].shape[1], sum(map(len, tables))))
     return np.concatenate([table.T for table in tables], axis=1, out=out)
+
+
+def _blank(values: Floats, rows: Mask) -> None:
+    """Make some rows of values (n,) or (k, n) unknown, in place."""
+    if rows.any():
+        values[..., rows] = np.nan
+
+
+def _apart(oriented: Floats, leaning: Floats, rest: Mask) -> Floats:
+    """Return the angles (n,) in rad between directions (3, n) where at `rest`; elsewhere NaN."""
+    found, rows = np.full(len(rest), np.nan), np.flatnonzero(rest)
+    if len(rows) == len(rest):
+        return np.asarray(angle_between(oriented, leaning), np.float64)
+    if len(rows):
+        found[rows] = angle_between(oriented.take(rows, axis=1), leaning.take(rows, axis=1))
+    return found
 
 
 def _norms(v: Floats) -> Floats:
