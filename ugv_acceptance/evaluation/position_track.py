@@ -116,10 +116,10 @@ def _inside(n: int) -> NDArray[np.bool_]:
 
 def _changes(seconds: Floats, q: Floats) -> NDArray[np.bool_]:
     """Return which positions (n,) are new, and the last ones of those that stood still."""
-    new = np.append(True, np.diff(q) != 0.0)
-    since = seconds[np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))]
-    kept = new.copy()
-    kept[:-1] |= new[1:] & (seconds[:-1] - since[:-1] > STILL)
+    kept = np.append(True, q[1:] != q[:-1])
+    begins = np.flatnonzero(kept)
+    ends = begins[1:] - 1
+    kept[ends[seconds[ends] - seconds[begins[:-1]] > STILL]] = True
     kept[-1] = True
     return kept
 

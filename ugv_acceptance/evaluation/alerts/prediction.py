@@ -118,9 +118,12 @@ class Prediction:
 
     def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
         """Judge the next part of a recording; `limit` (j,) are torque limits (N m; N)."""
-        at = np.flatnonzero(rows.known)
-        cell = rows.time[at] // SPACING
-        at = at[np.diff(cell, prepend=self.due // SPACING - 1) > 0]
+        cell = rows.time // SPACING
+        if not rows.known.all():
+            cell = cell[rows.known]
+        at = np.flatnonzero(np.diff(cell, prepend=self.due // SPACING - 1) > 0)
+        if not rows.known.all():
+            at = np.flatnonzero(rows.known)[at]
         if not len(at):
             return
         time, joints, row = rows.time[at], rows.pairs.joints, rows.pairs.of_joints[at]

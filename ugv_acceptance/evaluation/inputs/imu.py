@@ -224,7 +224,7 @@ class ImuTracker:
             lengths = [len(s.log_time) for s in columns]
             foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
             self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
-        self.seen.take(columns)
+        self.seen.take(columns, omega)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
             told_by = q, covariance_0, omega, acceleration
