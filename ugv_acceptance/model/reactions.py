@@ -231,8 +231,8 @@ def _settled_shares(
     Samples that settled are not tried again: the same points would give the same shares.
     """
     found, settled = np.empty((count, *shape)), np.zeros(shape, np.bool_)
-    run, left = _shares_kernel(count).run, ALL
-    some, pushing = flat, (1.0,) * count
+    run, some, pushing = _shares_kernel(count).run, flat, (1.0,) * count
+    left: Rows = ALL
     for _ in range(_TRIES):
         shares = run(*some, *pushing)
         after = tuple([(share > 0.0) * 1.0 for share in shares])

@@ -391,9 +391,9 @@ def _apart(oriented: Floats, leaning: Floats, rest: Mask) -> Floats:
     """Return the angles (n,) in rad between directions (3, n) where at `rest`; elsewhere NaN."""
     found, rows = np.full(len(rest), np.nan), np.flatnonzero(rest)
     if len(rows) == len(rest):
-        return np.asarray(angle_between(oriented, leaning), np.float64)
+        return np.asarray(angle_between(tuple(oriented), tuple(leaning)), np.float64)
     if len(rows):
-        found[rows] = angle_between(oriented.take(rows, axis=1), leaning.take(rows, axis=1))
+        found[rows] = angle_between(*(tuple(v.take(rows, axis=1)) for v in (oriented, leaning)))
     return found
 
 

@@ -168,7 +168,8 @@ class _Pairs:
     def size(self) -> Floats:
         """Root of the product of both sums of squares (rad2): what a cosine is a share of."""
         turned, own, _ = self.products
-        return np.sqrt(turned * own + 1e-18)
+        size: Floats = np.sqrt(turned * own + 1e-18)
+        return size
 
     @property
     def error(self) -> Floats:
