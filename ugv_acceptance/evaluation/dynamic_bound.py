@@ -122,11 +122,10 @@ class DynamicBound:
         at = np.flatnonzero(np.diff(of, prepend=0))
         if not len(at):
             return
-        joints = rows.pairs.joints
+        joints, row = rows.pairs.joints, of[at]
         new = _Rows(
-            joints.time[of[at]], joints.stamp[of[at]], joints.q[of[at]], rows.torque[at],
-            rows.weighed[at],
-        )  # fmt: skip
+            joints.time[row], joints.stamp[row], joints.q[row], rows.torque[at], rows.weighed[at]
+        )
         held = new.after(self._before)
         self._before = held.since(int(held.time[-1]) - KEPT)
         if not self._any_fast(held):

@@ -37,6 +37,12 @@ def pick(values: Values, rows: Rows) -> Values:
     return take(values)
 
 
+def blank(values: NDArray[np.float64], rows: NDArray[np.bool_]) -> None:
+    """Make some rows of values (..., n) unknown, in place."""
+    if rows.any():
+        values[..., rows] = np.nan
+
+
 def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
     """Yield each distinct value of `codes` with its rows and their count."""
     if not codes.size:

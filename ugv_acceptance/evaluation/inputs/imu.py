@@ -27,14 +27,14 @@ from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.attitude import (
     UpKernels,
-    angle_between,
+    angles_where,
     up_from_acceleration,
     up_from_orientation,
     up_kernels,
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
 from ugv_acceptance.model.robot import Vector
-from ugv_acceptance.model.row_selection import Values
+from ugv_acceptance.model.row_selection import Values, blank
 from ugv_acceptance.type_aliases import Floats, Times
 
 Mask = NDArray[np.bool_]
@@ -262,12 +262,13 @@ class ImuTracker:
         told = rotation & (q[:3] != 0.0).any(axis=0) if imu.attitude == 'auto' else rotation
         self._count(told, given)
         oriented = np.array(up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting))
-        _blank(oriented, ~rotation)
+        blank(oriented, ~rotation)
         leaning = np.array(up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting))
-        _blank(leaning, ~(off <= GRAVITY_SLACK * g))
+        blank(leaning, ~(off <= GRAVITY_SLACK * g))
         rest = still & (off <= imu.rest_acceleration)
-        self.seen.rested += rested_messages(time, rest)
-        apart = _apart(oriented, leaning, rest)
+        rested = rested_messages(time, rest)
+        self.seen.rested += rested
+        apart = angles_where(rest, oriented, leaning)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
             force = np.array(_force(tuple(smooth), tuple(omega), imu))
@@ -276,11 +277,11 @@ class ImuTracker:
             use = told & (imu.attitude != 'accelerometer')
             gravity = -g * (oriented if use.all() else np.where(use, oriented, leaning))
             if imu.attitude == 'auto':
-                _blank(gravity, ~believable)
+                blank(gravity, ~believable)
         unknown = believable & np.isnan(gravity[0])
         nothing = np.where(unknown, off / g, 0.0) if unknown.any() else np.zeros(len(time))
         strange = off / g
-        _blank(strange, ~still)
+        blank(strange, ~still)
         faults = (foreign, np.zeros(len(time)), strange, apart)
         feed(self.faults.nothing, time, nothing)
         if not told.all():
@@ -379,22 +380,6 @@ def _lines(tables: Sequence[Floats]) -> Floats:
     """Concatenate tables (n, k) and return them transposed, (k, sum of n), in contiguous rows."""
     out = np.empty((tables[0].shape[1], sum(map(len, tables))))
     return np.concatenate([table.T for table in tables], axis=1, out=out)
-
-
-def _blank(values: Floats, rows: Mask) -> None:
-    """Make some rows of values (n,) or (k, n) unknown, in place."""
-    if rows.any():
-        values[..., rows] = np.nan
-
-
-def _apart(oriented: Floats, leaning: Floats, rest: Mask) -> Floats:
-    """Return the angles (n,) in rad between directions (3, n) where at `rest`; elsewhere NaN."""
-    found, rows = np.full(len(rest), np.nan), np.flatnonzero(rest)
-    if len(rows) == len(rest):
-        return np.asarray(angle_between(tuple(oriented), tuple(leaning)), np.float64)
-    if len(rows):
-        found[rows] = angle_between(*(tuple(v.take(rows, axis=1)) for v in (oriented, leaning)))
-    return found
 
 
 def _norms(v: Floats) -> Floats:
