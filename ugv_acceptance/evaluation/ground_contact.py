@@ -114,11 +114,11 @@ class GroundContact:
         payload (mass, x, y, z) of joint rows, and each message's row.
         """
         found = np.full(len(time), FREE, np.int8)
-        quiet = not self.touching and self.signal.quiet
-        if quiet and not ((-height >= self._limits.on) & known).any():
-            return found
         rows = np.flatnonzero(known)
         values = -height[rows]
+        quiet = not self.touching and self.signal.quiet
+        if quiet and not (values >= self._limits.on).any():
+            return found
         down = np.zeros(len(rows), np.bool_)
         for first, last, bad in runs(self._limits, values, raw=self.touching):
             down[first:last] = bad

@@ -143,15 +143,12 @@ class Summary:
         limits = self.settings.limits
         load = np.abs(rows.torque.T)
         over = load >= limits.torque_error * np.array(limits.torque)[:, None]
-        front, left, rear, right = limits.tip_error >= rows.angle.T
-        tipping = np.asarray(front | left | rear | right)
-        held = rows.until - rows.time
-        held[~known] = 0
+        tipping = np.asarray((rows.angle <= limits.tip_error).any(axis=1))
+        held = np.where(known, rows.until - rows.time, 0)
         held[-1] = 0
         self.messages += len(known)
         self.evaluated += int(held.sum())
-        if tipping.any():
-            self.tip_violation += int((held * tipping).sum())
+        self.tip_violation += int((held * tipping).sum())
         for j, extreme in enumerate(self.load):
             extreme.see(load[j], rows.time)
             if over[j].any():
@@ -160,8 +157,7 @@ class Summary:
             extreme.see(-rows.angle[:, side], rows.time)
         if len(rows.clearance):
             self.lowest.see(-rows.clearance, rows.time)
-        state = rows.state if known.all() else rows.state[known]
-        counts = np.bincount(state, minlength=len(STATES))
+        counts = np.bincount(rows.state[known], minlength=len(STATES))
         for name, count in zip(STATES, counts.tolist(), strict=True):
             if count:
                 self.states[name] = self.states.get(name, 0) + count

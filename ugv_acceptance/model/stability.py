@@ -158,11 +158,10 @@ def _state(standing: int, gravity: Triple) -> State:
     state = np.full(len(square), standing, dtype=np.int8)
     if standing == UNKNOWN:
         return state
-    inverted = np.greater_equal(gz, 0.0) & (standing < NO_CONTACT)
-    others = (FREE_FALL, square < WEIGHTLESS**2), (UNKNOWN, ~(square < math.inf))
-    for other, rows in ((INVERTED, inverted), *others):
-        if rows.any():
-            state[rows] = other
+    if standing < NO_CONTACT:
+        state[np.greater_equal(gz, 0.0)] = INVERTED
+    state[square < WEIGHTLESS**2] = FREE_FALL
+    state[~(square < math.inf)] = UNKNOWN
     return state
 
 

@@ -294,25 +294,13 @@ def _table(points: Sequence[Any], feet: Feet, count: int) -> tuple[NDArray[Any],
     least = np.full(count, np.inf)
     np.minimum.at(least, row, rocking)
     matters = np.flatnonzero(rocking <= np.maximum(least, np.nextafter(MOST, 0.0))[row])
-    order = _first_cheapest(row[matters], bits[matters], rocking[matters], count)
-    row, bits, rocking, of = (column[matters[order]] for column in (row, bits, rocking, of))
+    order = matters[np.lexsort((of[matters], rocking[matters], row[matters], bits[matters]))]
+    row, bits, rocking, of = (column[order] for column in (row, bits, rocking, of))
+    kept = np.ones(len(row), np.bool_)
+    kept[1:] = (row[1:] != row[:-1]) | (bits[1:] != bits[:-1])
+    row, bits, rocking, of = (column[kept] for column in (row, bits, rocking, of))
     kept = _undominated(row, bits, rocking, count)
     return row[kept], bits[kept], rocking[kept], of[kept]
-
-
-def _first_cheapest(
-    row: NDArray[Any], bits: NDArray[Any], rocking: Floats, count: int
-) -> NDArray[np.intp]:
-    """Return where each set first has its least rocking in each row, ordered by set and row."""
-    found = [np.empty(0, np.intp)]
-    for _, at, _ in groups(bits):
-        rows, prices = row[at], rocking[at]
-        least, first = np.full(count, np.inf), np.full(count, -1)
-        np.minimum.at(least, rows, prices)
-        places = np.arange(len(row))[at][prices == least[rows]][::-1]
-        first[row[places]] = places  # of several the last that is written counts
-        found.append(first[first >= 0])
-    return np.concatenate(found)
 
 
 def _undominated(

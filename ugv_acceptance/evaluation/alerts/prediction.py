@@ -118,12 +118,9 @@ class Prediction:
 
     def rows(self, rows: MarginRows, limit: Sequence[float]) -> None:
         """Judge the next part of a recording; `limit` (j,) are torque limits (N m; N)."""
-        cell = rows.time // SPACING
-        if not rows.known.all():
-            cell = cell[rows.known]
-        at = np.flatnonzero(np.diff(cell, prepend=self.due // SPACING - 1) > 0)
-        if not rows.known.all():
-            at = np.flatnonzero(rows.known)[at]
+        at = np.flatnonzero(rows.known)
+        cell = rows.time[at] // SPACING
+        at = at[np.diff(cell, prepend=self.due // SPACING - 1) > 0]
         if not len(at):
             return
         time, joints, row = rows.time[at], rows.pairs.joints, rows.pairs.of_joints[at]

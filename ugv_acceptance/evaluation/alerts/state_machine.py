@@ -154,11 +154,8 @@ def runs(rule: Rule, values: NDArray[Any], *, raw: bool) -> Iterator[tuple[int, 
 
     `raw` is the state before the first row; rows inside the deadband, and NaN, extend a run.
     """
-    bad, good = values >= rule.on, values < rule.off
-    if len(values) and not (good if raw else bad).any():  # as it mostly is: nothing changes
-        yield 0, len(values), raw
-        return
-    decided = np.flatnonzero(bad | good)
+    bad = values >= rule.on
+    decided = np.flatnonzero(bad | (values < rule.off))
     side = bad[decided]
     changes = np.flatnonzero(np.diff(side, prepend=raw))
     starts = [0, *decided[changes].tolist()]

@@ -129,7 +129,7 @@ class ValueMeasure:
         """Add up the time from `start` to `end` (n,) in ns for which `values` (n,) held."""
         start, end = np.maximum(start, self.span[0]), np.minimum(end, self.span[1])
         seen = (end > start) & ~np.isnan(values)
-        self.evaluated += int(((end - start) * seen).sum())
+        self.evaluated += int((end - start)[seen].sum())
         bad = self._bad(values)
         some = seen & bad
         if some.any():
@@ -151,11 +151,11 @@ class ValueMeasure:
         if not inside.all():
             values = np.where(inside, values, np.nan)
         sign = -1.0 if self.demand.below else 1.0
-        order, unknown = sign * values, np.isnan(values)
-        order[unknown] = np.inf
+        order = sign * values
+        order = np.where(np.isnan(order), np.inf, order)
         k = int(order.argmin())
-        self.samples += len(values) - int(np.count_nonzero(unknown))
-        if unknown[k]:
+        self.samples += int(np.count_nonzero(~np.isnan(values)))
+        if np.isnan(values[k]):
             return
         if self.first is None and self._bad(values[[k]])[0]:
             at = int(self._bad(values).argmax())

@@ -6,7 +6,6 @@ makes them count.
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
 
 import numpy as np
 
@@ -83,7 +82,7 @@ class MeasuredLimits:
             return
         left = limit - load
         judged = (left > 0.0) & np.isfinite(left) & rows.weighed
-        judged &= ~(reduce(np.minimum, rows.angle.T) <= 0.0)
+        judged &= ~(rows.angle.min(axis=1) <= 0.0)
         effort = rows.pairs.joints.effort[rows.pairs.of_joints, j]
         for sign, lasting in spells.items():
             apart = np.abs(sign * effort - torque)

@@ -92,10 +92,8 @@ class JointRate:
         firsts = np.flatnonzero(np.diff(time // CELL, prepend=self.cell))
         slopes, trusts = self._cells(time[firsts], stamp[firsts], q[firsts], reported[firsts])
         times = np.diff(np.concatenate(([0], firsts, [len(time)])))
-        slope, told = np.repeat(slopes, times), ~np.isnan(reported)
-        if (trusts == PROVEN).all() and told.all():
-            return reported, reported, slope
-        trust = np.repeat(trusts, times)
+        slope, trust = np.repeat(slopes, times), np.repeat(trusts, times)
+        told = ~np.isnan(reported)
         return (
             np.where(told & (trust != DOUBTED), reported, slope),
             np.where(told & (trust == PROVEN), reported, slope),
