@@ -9,6 +9,7 @@ needed more than the joint can hold: it is not known.
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +80,9 @@ class _Rows:
 
     def since(self, time: int) -> '_Rows':
         """Return the rows received at `time` (ns) or later."""
-        late = self.time >= time
+        late: Any = self.time >= time
+        if late[late.argmax() :].all():
+            late = slice(late.argmax(), None)  # which copies nothing
         return _Rows(
             self.time[late], self.stamp[late], self.q[late], self.torque[late], self.known[late]
         )
@@ -119,11 +122,10 @@ class DynamicBound:
         at = np.flatnonzero(np.diff(of, prepend=0))
         if not len(at):
             return
-        joints = rows.pairs.joints
+        joints, row = rows.pairs.joints, of[at]
         new = _Rows(
-            joints.time[of[at]], joints.stamp[of[at]], joints.q[of[at]], rows.torque[at],
-            rows.weighed[at],
-        )  # fmt: skip
+            joints.time[row], joints.stamp[row], joints.q[row], rows.torque[at], rows.weighed[at]
+        )
         held = new.after(self._before)
         self._before = held.since(int(held.time[-1]) - KEPT)
         if not self._any_fast(held):
@@ -160,7 +162,7 @@ class DynamicBound:
         cells = np.flatnonzero(quick)
         if not len(cells):
             return
-        acceleration = np.where(self._moves, track.acceleration, 0.0)
+        acceleration = np.where(self._moves, track.acceleration(), 0.0)
         static = rows.torque[track.row[cells]]
         added = np.empty_like(static)
         for some, payload in self._payloads(rows.time[track.row[cells]]):

@@ -26,7 +26,7 @@ SIGMAS = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Positions (n, j), rates and accelerations on an even grid of times (n,) in s.
+    """Positions (n, j) and rates on an even grid of times (n,) in s.
 
     `row` (n,) is the message nearest before each, `sure` says where messages were dense enough.
     """
@@ -34,9 +34,22 @@ class Track:
     time: Floats
     q: Floats
     rate: Floats
-    acceleration: Floats
     row: NDArray[np.intp]
     sure: NDArray[np.bool_]
+
+    def acceleration(self) -> Floats:
+        """Return the accelerations (n, j) of the parabolas, 0 at the grid's ends and in noise."""
+        cells = np.arange(-HALF, HALF + 1)
+        t = cells * STEP
+        square = t * t - (t * t).mean()
+        bend = 2.0 * square / (square @ square)
+        found, inner = np.zeros_like(self.q), slice(HALF, len(self.q) - HALF)
+        for j, q in enumerate(self.q.T):
+            bent = np.convolve(q, bend[::-1], 'valid')
+            noise = _noise(q, np.abs(self.rate[:, j]))
+            spread = SIGMAS * noise * float(np.sqrt(bend @ bend))
+            found[inner, j] = np.where(np.abs(bent) > spread, bent, 0.0)
+        return found
 
 
 def track_of(time: Times, stamp: Times, q: Floats, turns: Sequence[float]) -> Iterator[Track]:
@@ -45,24 +58,31 @@ def track_of(time: Times, stamp: Times, q: Floats, turns: Sequence[float]) -> It
     `time` of receipt and `stamp` in ns; `turns` (j,) is the angle (rad) after which a joint may be
     wrapped, 0: it is not.
     """
-    good = np.flatnonzero(np.isfinite(q).all(axis=1))
+    known = np.isfinite(q).all(axis=1)
+    good = np.flatnonzero(known)
     if len(good) < 2 * HALF:
         return
-    seconds, order = _clock(time[good], stamp[good], q[good])
+    if len(good) < len(q):
+        time, stamp, q = time[good], stamp[good], q[good]
+    seconds, order = _clock(time, stamp, q)
     rows = good[order]
     parts = np.split(np.arange(len(rows)), np.flatnonzero(np.diff(seconds) > BREAK) + 1)
     for part in parts:
         span = seconds[part[-1]] - seconds[part[0]]
         if span > 2 * HALF * STEP:
-            yield _track(seconds[part], q[rows[part]], rows[part], turns)
+            yield _track(seconds[part], q[order[part]], rows[part], turns)
 
 
 def _clock(time: Times, stamp: Times, q: Floats) -> tuple[Floats, NDArray[np.intp]]:
     """Return increasing times (s) of messages and their order: by stamps, if these are better."""
-    received = np.arange(len(time))
-    by_stamp = np.argsort(stamp, kind='stable')
-    distinct = np.count_nonzero(np.diff(stamp[by_stamp])) >= 0.9 * (len(stamp) - 1)
-    if distinct and _roughness(q[by_stamp]) <= 1.001 * _roughness(q):
+    received = by_stamp = np.arange(len(time))
+    steps = np.diff(stamp)
+    ordered = bool((steps >= 0).all())
+    if not ordered:
+        by_stamp = np.argsort(stamp, kind='stable')
+        steps = np.diff(stamp[by_stamp])
+    distinct = np.count_nonzero(steps) >= 0.9 * (len(stamp) - 1)
+    if distinct and (ordered or _roughness(q[by_stamp]) <= 1.001 * _roughness(q)):
         shift = int(np.median(time - stamp))
         return (stamp[by_stamp] + shift) / 1e9, by_stamp
     return time / 1e9, received
@@ -77,14 +97,15 @@ def _track(seconds: Floats, q: Floats, rows: NDArray[np.intp], turns: Sequence[f
     grid = start + STEP * np.arange(int((seconds[-1] - start) / STEP) + 1)
     table = np.empty((len(grid), q.shape[1]))
     for j, turn in enumerate(turns):
-        column = np.unwrap(q[:, j], period=turn) if turn else q[:, j]
+        column = q[:, j]
+        if turn and (np.abs(np.diff(column)) >= turn / 2.0).any():
+            column = np.unwrap(column, period=turn)
         kept = _changes(seconds, column)
         table[:, j] = np.interp(grid, seconds[kept], column[kept])
     place = np.searchsorted(seconds, grid, side='right') - 1
     gaps = np.append(np.diff(seconds), 0.0)[place] > GAP
     near = np.convolve(gaps, np.ones(2 * HALF + 1), 'same') > 0.0
-    rate, acceleration = _fit(table)
-    return Track(grid, table, rate, acceleration, rows[place], ~near & _inside(len(grid)))
+    return Track(grid, table, _rates(table), rows[place], ~near & _inside(len(grid)))
 
 
 def _inside(n: int) -> NDArray[np.bool_]:
@@ -95,29 +116,21 @@ def _inside(n: int) -> NDArray[np.bool_]:
 
 def _changes(seconds: Floats, q: Floats) -> NDArray[np.bool_]:
     """Return which positions (n,) are new, and the last ones of those that stood still."""
-    new = np.append(True, np.diff(q) != 0.0)
-    since = seconds[np.maximum.accumulate(np.where(new, np.arange(len(q)), 0))]
-    kept = new.copy()
-    kept[:-1] |= new[1:] & (seconds[:-1] - since[:-1] > STILL)
+    kept = np.append(True, q[1:] != q[:-1])
+    begins = np.flatnonzero(kept)
+    ends = begins[1:] - 1
+    kept[ends[seconds[ends] - seconds[begins[:-1]] > STILL]] = True
     kept[-1] = True
     return kept
 
 
-def _fit(table: Floats) -> tuple[Floats, Floats]:
-    """Return rates and accelerations (n, j) of positions on the grid, 0 at its ends."""
-    cells = np.arange(-HALF, HALF + 1)
-    t = cells * STEP
-    square = t * t - (t * t).mean()
-    slope, bend = t / (t @ t), 2.0 * square / (square @ square)
-    rate, acceleration = np.zeros_like(table), np.zeros_like(table)
-    inner = slice(HALF, len(table) - HALF)
+def _rates(table: Floats) -> Floats:
+    """Return the rates (n, j) of positions on the grid, 0 at its ends."""
+    t = np.arange(-HALF, HALF + 1) * STEP
+    slope, rate = t / (t @ t), np.zeros_like(table)
     for j, q in enumerate(table.T):
-        rate[inner, j] = np.convolve(q, slope[::-1], 'valid')
-        bent = np.convolve(q, bend[::-1], 'valid')
-        noise = _noise(q, np.abs(rate[:, j]))
-        spread = SIGMAS * noise * float(np.sqrt(bend @ bend))
-        acceleration[inner, j] = np.where(np.abs(bent) > spread, bent, 0.0)
-    return rate, acceleration
+        rate[HALF : len(table) - HALF, j] = np.convolve(q, slope[::-1], 'valid')
+    return rate
 
 
 def _noise(q: Floats, rate: Floats) -> float:

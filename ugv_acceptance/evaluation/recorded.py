@@ -270,7 +270,7 @@ class RecordedEvaluator:
         order = np.argsort(time, kind='stable')
         from_joints = order < len(joints.time) - 1
         of_joints = np.cumsum(from_joints, dtype=np.intp)
-        of_imu = np.cumsum(~from_joints, dtype=np.intp)
+        of_imu = np.arange(1, len(order) + 1) - of_joints
         if not self.settings.hears_joints:  # only IMU messages bring margins
             order, of_joints = order[~from_joints], of_joints[~from_joints]
             of_imu = of_imu[~from_joints]
@@ -278,7 +278,7 @@ class RecordedEvaluator:
         pairs = Pairs(joints, imu, of_joints, of_imu)
         j, i = pairs.of_joints, pairs.of_imu
         fresh_until = np.minimum(newest.joints_until[j], newest.imu_until[i])
-        whole = np.isfinite(joints.q).all(axis=1) & np.isfinite(load[0])
+        whole = np.isfinite(joints.q.T).all(axis=0) & np.isfinite(load[0])
         known = (time <= fresh_until) & whole[j] & np.isfinite(imu.gravity[:, 0])[i]
         table, state, height = self._table(pairs, load, whole, known)
         n = len(self.settings.robot.joint_names)

@@ -9,6 +9,9 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ugv_acceptance.model.expressions import (
     Scalar,
     Vec,
@@ -23,6 +26,7 @@ from ugv_acceptance.model.expressions import (
 from ugv_acceptance.model.kernels import Kernel, compile_kernel
 from ugv_acceptance.model.robot import Matrix
 from ugv_acceptance.model.row_selection import Values
+from ugv_acceptance.type_aliases import Floats
 
 # A unit quaternion's norm may be this far from 1 (single precision, rounding).
 NORM_SLACK = 0.01
@@ -122,6 +126,16 @@ def angle_between(a: Sequence[Any], b: Sequence[Any]) -> Values:
     """Return the angle (rad) between two vectors, exact for small and for flat angles."""
     (angle,) = _angle_kernel().run(*a, *b)
     return angle
+
+
+def angles_where(some: NDArray[np.bool_], a: Floats, b: Floats) -> Floats:
+    """Return the angles (n,) in rad between directions (3, n), NaN but for `some` rows."""
+    found, rows = np.full(len(some), np.nan), np.flatnonzero(some)
+    if len(rows) == len(some):
+        return np.asarray(angle_between(tuple(a), tuple(b)), np.float64)
+    if len(rows):
+        found[rows] = angle_between(*(tuple(v.take(rows, axis=1)) for v in (a, b)))
+    return found
 
 
 def roll_pitch(up: Sequence[Any]) -> tuple[Any, Any]:

@@ -8,9 +8,9 @@ constants of the compiled code.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, partial, reduce
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ class Corners:
     outward: Kernel
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Edges:
     """Compiled tip-over margins of one polygon, given on which side of the robot each edge lies.
 
@@ -68,8 +68,13 @@ class Edges:
     """
 
     angles: Kernel
-    margins: Kernel
     rocks: bool
+    of_margins: Callable[[], Kernel]
+
+    @cached_property
+    def margins(self) -> Kernel:
+        """All margins, compiled when first asked for: most messages need only the angles."""
+        return self.of_margins()
 
 
 @lru_cache(maxsize=256)
@@ -120,7 +125,7 @@ def edges_of(
         return least_by_side(sides, angle), *held, reduce(minimum, zmp)
 
     names = [f'x{k}' for k in range(3 + 3 * len(corners.moving) + 4 + rocks)]
-    return Edges(compile_kernel(angles, names), compile_kernel(margins, names), rocks)
+    return Edges(compile_kernel(angles, names), rocks, partial(compile_kernel, margins, names))
 
 
 def least_by_side(sides: Sequence[int], values: Sequence[Scalar]) -> tuple[Scalar, ...]:

@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,17 +23,32 @@ from ugv_acceptance.model.expressions import Expr, Number, Scalar, minimum
 Outputs = Sequence[Any]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Kernel:
     """A compiled formula: `one` takes floats, `many` takes arrays (or floats) that broadcast.
 
     Both return tuples nested as the formula's; an output that is constant for this robot is a
-    float in either. `source` is the generated code.
+    float in either. Each is compiled when first asked for: most kernels are used in one form.
+    `source` is the generated code, of `lines` that return something for `arguments`.
     """
 
-    source: str
-    one: Callable[..., tuple[Any, ...]]
-    many: Callable[..., tuple[Any, ...]]
+    arguments: str
+    lines: tuple[str, ...]
+
+    @property
+    def source(self) -> str:
+        """The generated code of `many`."""
+        return '\n    '.join([f'def kernel({self.arguments}):', *self.lines, ''])
+
+    @cached_property
+    def one(self) -> Callable[..., tuple[Any, ...]]:
+        """The function of floats."""
+        return _float_function(self)
+
+    @cached_property
+    def many(self) -> Callable[..., tuple[Any, ...]]:
+        """The function of arrays."""
+        return _function(self.source, _ARRAY)
 
     def run(self, *inputs: Number) -> tuple[Any, ...]:
         """Call `many` if any input is an array, else `one`."""
@@ -57,24 +73,19 @@ def compile_kernel(formula: Callable[..., Outputs], inputs: Sequence[str]) -> Ke
         elif x.op != 'input':
             emitter.assign(x)
     arguments = ', '.join(f'x{i}' for i in range(len(symbols)))
-    lines = [*emitter.lines, f'return {emitter.result(outputs)}']
-    source = '\n    '.join([f'def kernel({arguments}):', *lines, ''])
-    many = _function(source, _ARRAY)
-    return Kernel(source, _float_function(arguments, lines, many), many)
+    return Kernel(arguments, (*emitter.lines, f'return {emitter.result(outputs)}'))
 
 
-def _float_function(
-    arguments: str, lines: Sequence[str], many: Callable[..., tuple[Any, ...]]
-) -> Callable[..., tuple[float, ...]]:
+def _float_function(kernel: Kernel) -> Callable[..., tuple[float, ...]]:
     """Return the compiled function of floats; where Python would raise, it asks numpy instead."""
 
     def ieee(*values: float) -> tuple[Any, ...]:
         with np.errstate(all='ignore'):
-            return many(*map(np.float64, values))
+            return kernel.many(*map(np.float64, values))
 
-    body = '\n        '.join(['    try:', *lines])
-    rescue = f'    except (ValueError, ZeroDivisionError):\n        return ieee({arguments})'
-    source = f'def kernel({arguments}):\n{body}\n{rescue}\n'
+    body = '\n        '.join(['    try:', *kernel.lines])
+    rescue = f'    except (ValueError, ZeroDivisionError):\n        return ieee({kernel.arguments})'
+    source = f'def kernel({kernel.arguments}):\n{body}\n{rescue}\n'
     source = re.sub(r'sincos\((\w+)\)', r'sin(\1), cos(\1)', source)
     return _function(source, {**_FLOAT, 'ieee': ieee})
 

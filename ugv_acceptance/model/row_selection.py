@@ -38,6 +38,12 @@ def _picked(x: Values, rows: NDArray[np.intp], done: dict[int, Values]) -> Value
     return done[id(x)]
 
 
+def blank(values: NDArray[np.float64], rows: NDArray[np.bool_]) -> None:
+    """Make some rows of values (..., n) unknown, in place."""
+    if rows.any():
+        values[..., rows] = np.nan
+
+
 def groups(codes: NDArray[np.integer[Any]]) -> Iterator[tuple[int, Rows, int]]:
     """Yield each distinct value of `codes` with its rows and their count."""
     if not codes.size:

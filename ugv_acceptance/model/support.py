@@ -281,7 +281,9 @@ def _table(points: Sequence[Any], feet: Feet, count: int) -> tuple[NDArray[Any],
     columns: list[tuple[NDArray[Any], ...]] = []
     radius = np.maximum(radius_of(points), THIN)
     charge = np.broadcast_to(ROCKING / radius, count)
-    drops = [np.broadcast_to(price, count) for price in drops_of(points, feet, radius)]
+    drops = np.empty((len(points), count))
+    for line, price in zip(drops, drops_of(points, feet, radius), strict=True):
+        line[:] = price
     for number, (face, others) in enumerate(_faces(len(points))):
         found = _near_face(points, (face, others), (charge, drops), count)
         columns += [(*some, np.full(len(some[0]), number)) for some in found]
@@ -319,7 +321,7 @@ def _undominated(
 def _near_face(
     points: Sequence[Any],
     of: tuple[tuple[int, int, int], Cycle],
-    measures: tuple[Floats, Sequence[Floats]],
+    measures: tuple[Floats, Floats],
     count: int,
 ) -> list[tuple[NDArray[Any], NDArray[Any], Floats]]:
     """Return row, set of points and rocking of the sets near one triple, where it is a face."""
@@ -330,11 +332,12 @@ def _near_face(
     rows = np.flatnonzero(np.broadcast_to((area > THIN**2) & (lowest >= -LEVEL), count))
     if not len(rows):
         return []
-    charge, drops = measures[0][rows], np.array(measures[1])[:, rows]
-    lean = leaning(np.arccos(np.minimum(np.broadcast_to(upright, count)[rows], 1.0)))
-    price = drops[list(face)].max(axis=0)
-    table = np.array([np.broadcast_to(h, count)[rows] for h in heights]).reshape(-1, len(rows))
-    table = np.maximum(charge * table, drops[list(others)])
+    charge, drops = measures[0][rows], measures[1].take(rows, axis=1)
+    lean = leaning(np.arccos(np.minimum(pick(upright, rows), 1.0)))
+    price = reduce(np.maximum, [drops[k] for k in face])
+    table = np.empty((len(others), len(rows)))
+    for line, height, k in zip(table, heights, others, strict=True):
+        np.maximum(charge * pick(height, rows), drops[k], out=line)
     order = np.argsort(table, axis=0, kind='stable')
     table = np.take_along_axis(table, order, 0)
     bits, found = np.full(len(rows), _bits(face)), []

@@ -65,6 +65,17 @@ def test_an_orientation_alone_may_stand_still() -> None:
     assert 'IMU_FROZEN' not in codes(recorded(replace(run, q=run.q[:1].repeat(len(run.q), 0)))[1])
 
 
+@pytest.mark.parametrize('number', range(10))
+def test_one_number_that_changes_is_enough(number: int) -> None:
+    """An IMU is not frozen while any of its ten numbers goes on changing, live and recorded."""
+    run = frozen(good_run(2, 12.0), 4.0, 3.0)
+    table = np.hstack((run.q, run.w, run.a))
+    table[400:700, number] += 1e-6 * np.arange(300)
+    run = replace(run, q=table[:, :4], w=table[:, 4:7], a=table[:, 7:])
+    assert 'IMU_FROZEN' not in codes(recorded(run)[1])
+    assert 'IMU_FROZEN' not in codes(live(run)[2])
+
+
 def test_an_orientation_that_is_not_a_number_freezes_with_the_rest() -> None:
     """NaN in the orientation counts as the same as NaN."""
     run = frozen(good_run(2, 12.0), 4.0, 3.0)

@@ -36,20 +36,20 @@ def test_a_cell_turns_as_scipy_does(
 def filled(x: Floats) -> tuple[ImuGrid, ImuGrid]:
     """Return the grid of samples taken cell by cell, and of the same taken at once."""
     one, many = ImuGrid(9.81), ImuGrid(9.81)
-    at = x[:, TAU] // GRID
+    at = x[TAU] // GRID
     ends = [0, *(np.flatnonzero(np.diff(at)) + 1).tolist()]
     for a, b in pairwise(ends):
-        one.close(x[a:b].ravel().tolist(), x[b].tolist())
-    many.extend(x[: ends[-1] + 1])
+        one.close(x[:, a:b].T.ravel().tolist(), x[:, b].tolist())
+    many.extend(x[:, : ends[-1] + 1])
     return one, many
 
 
 def table_of(hz: float, seconds: float, q: Floats, w: Floats, a: Floats) -> Floats:
     """Return samples at a constant rate."""
     n = int(hz * seconds)
-    q, w, a = (np.broadcast_to(v, (n, len(v))) for v in (q, w, a))
+    q, w, a = (np.broadcast_to(v[:, None], (len(v), n)) for v in (q, w, a))
     x = samples(q, w, a, np.ones(n, np.bool_))
-    x[:, TAU] = np.round(np.arange(n) * 1e9 / hz)
+    x[TAU] = np.round(np.arange(n) * 1e9 / hz)
     return x
 
 
@@ -89,8 +89,8 @@ def test_cell_by_cell_is_the_same_as_all_at_once(
     a[rng.random(n) < broken / 4] = np.nan
     w[rng.random(n) < broken / 4, 1] = 1e12
     a[rng.random(n) < 0.01] *= 5.0
-    x = samples(run.q, w, a, told)
-    x[:, TAU] = run.time - run.time[0]
+    x = samples(run.q.T, w.T, a.T, told)
+    x[TAU] = run.time - run.time[0]
     one, many = filled(x)
     assert one.row == many.row
     last = min(len(one.rows), len(many.rows))
@@ -104,8 +104,8 @@ def test_messages_in_bursts_weigh_as_much_as_even_ones() -> None:
     run = good_run(3, 20.0)
     means = []
     for form in (run, bursty(run)):
-        x = samples(form.q, form.w, form.a, np.ones(len(form.q), np.bool_))
-        x[:, TAU] = form.time - form.time[0]
+        x = samples(form.q.T, form.w.T, form.a.T, np.ones(len(form.q), np.bool_))
+        x[TAU] = form.time - form.time[0]
         grid, _ = filled(x)
         d = grid.over(100, 20)
         means.append(np.array(d[WORLD]) / d[SECONDS])

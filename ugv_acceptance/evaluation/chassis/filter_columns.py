@@ -148,16 +148,17 @@ class RawColumns:
         """Return `true` and `fast` of Blocks at each row."""
         number = elapsed // BLOCK
         first = np.flatnonzero(fresh | (number != np.concatenate(([self._block], number[:-1]))))
-        starts = np.unique(np.concatenate(([0], first)))
+        goes_on = not len(first) or first[0] > 0  # with the block before
+        starts = np.concatenate(([0], first)) if goes_on else first
         sums = np.add.reduceat(push, starts, axis=1).T.tolist()
         counts = np.diff(starts, append=len(elapsed)).tolist()
         true, fast = np.zeros(len(starts), np.bool_), np.zeros(len(starts), np.bool_)
-        new, usable, begins = np.isin(starts, first), good[starts], fresh[starts]
+        usable, begins = good[starts].tolist(), fresh[starts].tolist()
         for k, ((x, y, z), count) in enumerate(zip(sums, counts, strict=True)):
             if begins[k]:
                 self.blocks.forget()
                 self._sums = (x, y, z, count) if usable[k] else (0.0, 0.0, 0.0, 0)
-            elif new[k]:
+            elif k or not goes_on:
                 self.blocks.add(self._sums)
                 self._sums = x, y, z, count
             else:

@@ -17,7 +17,7 @@ from ugv_acceptance.evaluation.criteria.measurement import CriteriaMeasurement, 
 from ugv_acceptance.evaluation.criteria.quantities import shown
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.model.edges import corners_of, edges_of
-from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_once
+from ugv_acceptance.model.mechanics import Posture, mechanics_of, posture_at, posture_once
 from ugv_acceptance.model.reactions import standing_torque
 from ugv_acceptance.model.robot import Contact, Joint, Link, Payload, Robot, Vector
 from ugv_acceptance.model.stability import SIDES, stances_of, standing, tip_angles_of
@@ -177,8 +177,11 @@ def _margins_near(point: _Point) -> Callable[[_Point], Floats]:
     edges = edges_of(mechanics, corners, stance.sides, rocks=True)
 
     def margins(at: _Point) -> Floats:
-        same = at.robot is point.robot and at.q is point.q and at.payload is point.payload
-        posture: Any = nominal if same else _posture(at)
+        posture: Any = nominal
+        if at.robot is not point.robot:
+            posture = _posture(at)
+        elif at.q is not point.q or at.payload is not point.payload:
+            posture = posture_at(mechanics, at.q, at.payload.mass, at.payload.cog)
         hanging = torque_of(posture, at.gravity)
         torque = standing_torque(mechanics, posture, footing.points, at.gravity, hanging)
         terms = [*posture.cog, *(x for k in footing.polygon for x in posture.contacts[k])]

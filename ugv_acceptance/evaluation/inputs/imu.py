@@ -27,14 +27,14 @@ from ugv_acceptance.evaluation.samples import ImuColumns
 from ugv_acceptance.evaluation.settings import ImuInput, Settings
 from ugv_acceptance.model.attitude import (
     UpKernels,
-    angle_between,
+    angles_where,
     up_from_acceleration,
     up_from_orientation,
     up_kernels,
 )
 from ugv_acceptance.model.expressions import add, cross, rotate, scale
 from ugv_acceptance.model.robot import Vector
-from ugv_acceptance.model.row_selection import Values
+from ugv_acceptance.model.row_selection import Values, blank
 from ugv_acceptance.type_aliases import Floats, Times
 
 Mask = NDArray[np.bool_]
@@ -224,7 +224,7 @@ class ImuTracker:
             lengths = [len(s.log_time) for s in columns]
             foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
             self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
-        self.seen.take(columns)
+        self.seen.take(columns, omega)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
             told_by = q, covariance_0, omega, acceleration
@@ -259,18 +259,16 @@ class ImuTracker:
         off, still = np.abs(size - g), spin <= imu.rest_rate
         given = covariance_0 != -1.0
         rotation = given & _is_rotation(q[0], q[1], q[2], q[3])
-        told = rotation & q[:3].any(axis=0) if imu.attitude == 'auto' else rotation
+        told = rotation & (q[:3] != 0.0).any(axis=0) if imu.attitude == 'auto' else rotation
         self._count(told, given)
-        by_orientation = up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting)
-        oriented = np.array(by_orientation)
-        if not rotation.all():
-            oriented[:, ~rotation] = np.nan
-        up = up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting)
-        leaning = np.where(off <= GRAVITY_SLACK * g, up, np.nan)
+        oriented = np.array(up_from_orientation(q[0], q[1], q[2], q[3], imu.mounting))
+        blank(oriented, ~rotation)
+        leaning = np.array(up_from_acceleration(smooth[0], smooth[1], smooth[2], imu.mounting))
+        blank(leaning, ~(off <= GRAVITY_SLACK * g))
         rest = still & (off <= imu.rest_acceleration)
         rested = rested_messages(time, rest)
         self.seen.rested += rested
-        apart = np.where(rest, angle_between(tuple(oriented), tuple(leaning)), np.nan)
+        apart = angles_where(rest, oriented, leaning)
         believable = (off == off) & (spin <= BELIEVABLE)  # noqa: PLR0124 - not NaN
         if imu.specific_force:
             force = np.array(_force(tuple(smooth), tuple(omega), imu))
@@ -278,24 +276,26 @@ class ImuTracker:
         else:
             use = told & (imu.attitude != 'accelerometer')
             gravity = -g * (oriented if use.all() else np.where(use, oriented, leaning))
-            if imu.attitude == 'auto' and not believable.all():
-                gravity[:, ~believable] = np.nan
+            if imu.attitude == 'auto':
+                blank(gravity, ~believable)
         unknown = believable & np.isnan(gravity[0])
         nothing = np.where(unknown, off / g, 0.0) if unknown.any() else np.zeros(len(time))
-        faults = (foreign, np.zeros(len(time)), np.where(still, off / g, np.nan), apart)
+        strange = off / g
+        blank(strange, ~still)
+        faults = (foreign, np.zeros(len(time)), strange, apart)
         feed(self.faults.nothing, time, nothing)
         if not told.all():
             faults[1][:] = np.where(told | ~given, 0.0, _empty_rows(rotation, apart, imu))
             faults[3][~told] = np.nan
         self._judge_rows(time, faults, gravity)
-        felt = (q.T, omega.T, acceleration.T) if raw is None else (raw[:, Q], raw[:, W], raw[:, A])
+        felt = (q, omega, acceleration) if raw is None else (raw.T[Q], raw.T[W], raw.T[A])
         table = samples(*felt, told)
         trusted = self._judge_motion(time, stamp, table, gravity)
         self._busy = True
         return ImuRows(time, stamp, gravity.T, ~believable, trusted)
 
     def _judge_motion(self, time: Times, stamp: Times, x: Floats, gravity: Floats) -> Mask:
-        """Give samples (n, WIDTH) to the checks in motion; set gravity to NaN while one says so.
+        """Give samples (WIDTH, n) to the checks in motion; set gravity to NaN while one says so.
 
         Return where the gyro is trusted (n,).
         """

@@ -138,8 +138,8 @@ def jumps(x: Sequence[float], y: Sequence[float]) -> tuple[float, float]:
     return float(force), float(turn)
 
 
-def jump_rows(x: Floats, y: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return `jumps` of many samples (n, WIDTH)."""
-    d = y[:, :OK] - x[:, :OK]
-    force, turn = (np.einsum('ij,ij->i', d[:, of], d[:, of]) for of in (A, Q))
+def jump_columns(x: Floats, y: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return `jumps` of many samples (WIDTH, n)."""
+    d = y[:OK] - x[:OK]
+    force, turn = (np.einsum('ji,ji->i', d[of], d[of]) for of in (A, Q))
     return force > (JUMP * APART_FORCE) ** 2, turn > (JUMP * APART_TURN) ** 2

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import Signal
+from ugv_acceptance.evaluation.inputs.imu_cell import Q
 from ugv_acceptance.type_aliases import Floats, Times
 
 # Values that stay identical for so long (ns) and so many messages are frozen.
@@ -62,10 +63,10 @@ class FrozenCheck:
         self.signal.step(now, 0.0)
 
     def columns(self, time: Times, x: Floats) -> None:
-        """Take messages in order: `x` (n, 10) is orientation, rate and acceleration."""
+        """Take messages in order: `x` (10, n) is orientation, rate and acceleration."""
         places = np.flatnonzero(self._changed(x))
         self.varied += len(places)
-        ends = np.append(places, len(x))
+        ends = np.append(places, len(time))
         if self.changes:
             if not self._frozen:
                 self._still(time, 0, int(ends[0]), self.changes[-1][0])
@@ -80,7 +81,7 @@ class FrozenCheck:
             if self._frozen and k + 1 < len(places):
                 self._thaw(int(time[places[k + 1]]))
         self._remember(time, x, places[taken:])
-        self.count = len(x) - int(places[-1]) if len(places) else self.count
+        self.count = len(time) - int(places[-1]) if len(places) else self.count
 
     def _still(self, time: Times, first: int, end: int, since: int) -> None:
         """Take that the messages from `first` to before `end` have the values of `since` (ns)."""
@@ -94,24 +95,28 @@ class FrozenCheck:
 
     def _remember(self, time: Times, x: Floats, places: NDArray[np.intp]) -> None:
         """Take the changes of the values at `places`."""
-        for k in places[-REMEMBERED:].tolist():
-            row = x[k].tolist()
+        newest = places[-REMEMBERED:]
+        for now, row in zip(time[newest].tolist(), x[:, newest].T.tolist(), strict=True):
             self.last = tuple(row[:4]), tuple(row[4:7]), tuple(row[7:])
-            self.changes.append((int(time[k]), *self.last))
+            self.changes.append((now, *self.last))
 
     def _changed(self, x: Floats) -> NDArray[np.bool_]:
-        """Return which messages (n,) differ from the one before; a rate of NaN always does."""
-        before = np.empty_like(x)
-        before[1:] = x[:-1]
+        """Return which messages (n,) differ from the one before; a rate of NaN always does.
+
+        Columns that are left once all messages differ are not looked at.
+        """
         old_q, old_w, old_a = self.last
-        before[0] = (*old_q, *old_w, *old_a) if old_q is not None else np.nan
-        differs = x != before
-        unknown = differs[:, :4].any() and np.isnan(x[:, :4]).any()
-        if unknown:
-            differs[:, :4] &= ~(np.isnan(x[:, :4]) & np.isnan(before[:, :4]))
-        changed: NDArray[np.bool_] = differs.any(axis=1)
-        if old_q is None:
-            changed[0] = True
+        before = (*old_q, *old_w, *old_a) if old_q is not None else (np.nan,) * len(x)
+        changed = np.zeros(x.shape[1], np.bool_)
+        changed[0] = old_q is None
+        for k, (line, old) in enumerate(zip(x, before, strict=True)):
+            shifted = np.concatenate(([old], line[:-1]))
+            differs = line != shifted
+            if k < Q.stop and np.isnan(line).any():
+                differs &= ~(np.isnan(line) & np.isnan(shifted))
+            changed |= differs
+            if changed.all():
+                break
         return changed
 
     def _lively(self) -> bool:

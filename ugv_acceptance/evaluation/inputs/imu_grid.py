@@ -38,7 +38,7 @@ from ugv_acceptance.evaluation.inputs.imu_cell import (
     grown,
     grown_once,
     in_the_world,
-    jump_rows,
+    jump_columns,
     jumps,
 )
 from ugv_acceptance.type_aliases import Floats, Times
@@ -162,8 +162,8 @@ class ImuGrid:
         return (end[0] - time) * 1e-9 / (end[1] - number)
 
     def extend(self, x: Floats) -> None:
-        """Take samples (n, WIDTH) from that of the last row on; the last of them begins a row."""
-        tau = x[:, TAU].astype(np.int64)
+        """Take samples (WIDTH, n) from that of the last row on; the last of them begins a row."""
+        tau = x[TAU].astype(np.int64)
         at = tau // GRID
         ends = np.flatnonzero(at[1:] != at[:-1]) + 1
         edges = np.concatenate(([0], ends))
@@ -172,7 +172,7 @@ class ImuGrid:
         added[0] += old[-1, :SUMS]
         new = np.empty((len(ends), TIME + 1))
         np.add.accumulate(added, axis=0, out=new[:, :SUMS])
-        new[:, QUATERNION], new[:, TIME] = x[ends, Q], tau[ends] * 1e-9
+        new[:, QUATERNION], new[:, TIME] = x[Q, ends].T, tau[ends] * 1e-9
         steps = np.diff(at[edges])
         if len(new) != steps.sum():
             new = np.repeat(new, steps, axis=0)
@@ -230,35 +230,31 @@ def _forget(out: list[float]) -> None:
 def _added(x: Floats, edges: NDArray[np.intp], weight: Floats, g: float) -> Floats:
     """Return what each cell adds to the sums (m, SUMS): the counterpart of `ImuGrid.close`."""
     starts, ends = edges[:-1], edges[1:]
-    cells = x[: edges[-1]]
+    cells = x[:, : edges[-1]]
     count = ends - starts
-    total = np.add.reduceat(cells, starts, axis=0)
-    good = total[:, GOOD]
-    known = (good == count) & (total[:, OK] == count) & (x[ends, OK] != 0.0)
-    q = (
-        np.where(known[:, None], x[starts, Q], UNTURNED),
-        np.where(known[:, None], x[ends, Q], UNTURNED),
-    )
-    before, after = (list(v.T) for v in q)
-    sums = [total[:, k] for k in (7, 8, 9, A2, 4, 5, 6, W2)]
+    *rate, ax, ay, az, told, w2, a2, good = np.add.reduceat(cells[W.start : TAU], starts, axis=1)
+    known = (good == count) & (told == count) & (x[OK, ends] != 0.0)
+    none = np.array(UNTURNED)[:, None]
+    before, after = (list(np.where(known, x[Q, at], none)) for at in (starts, ends))
     out = np.zeros((len(starts), SUMS))
-    columns = grown(weight, (np.maximum(good, 1.0), *sums), before, after)
+    sums = (np.maximum(good, 1.0), ax, ay, az, a2, *rate, w2)
+    columns = grown(weight, sums, before, after)
     for k, column in enumerate(columns):
         out[:, k] = column
     out[:, ORIENTED], out[:, KNOWN] = out[:, 0], 1.0
-    none = good == 0.0
-    out[none, 0] = out[none, 8] = 0.0
+    empty = good == 0.0
+    out[empty, 0] = out[empty, 8] = 0.0
     for part in (WORLD, OWN, ORIENTED, KNOWN):
         out[~known, part] = 0.0
-    shock = cells[:, A2] > (g + SHOCK) ** 2
+    shock = cells[A2] > (g + SHOCK) ** 2
     if shock.any():
-        force = np.add.reduceat(cells[:, A] * shock[:, None], starts, axis=0) * weight[:, None]
-        turned = np.stack(in_the_world(list(force.T), before, after), axis=1)
+        force = np.add.reduceat(cells[A] * shock, starts, axis=1) * weight
+        turned = np.stack(in_the_world(list(force), before, after), axis=1)
         out[:, SHOCKS] = np.where(known[:, None], turned, 0.0)
         out[:, SHOCKED] = np.add.reduceat(shock, starts, dtype=np.float64) * weight * known
     for k in range(2):
         some = np.flatnonzero(count > k + 1)
-        pair = jump_rows(x[starts[some] + k], x[starts[some] + k + 1])
+        pair = jump_columns(x[:OK, starts[some] + k], x[:OK, starts[some] + k + 1])
         out[some, PAIRS] += 1.0
         out[some, FORCE_JUMPS] += pair[0]
         out[some, TURN_JUMPS] += pair[1]
@@ -266,16 +262,16 @@ def _added(x: Floats, edges: NDArray[np.intp], weight: Floats, g: float) -> Floa
 
 
 def samples(q: Floats, w: Floats, a: Floats, told: NDArray[np.bool_]) -> Floats:
-    """Return samples (n, WIDTH) of orientation (n, 4), rate, acceleration (n, 3) and OK (n,).
+    """Return samples (WIDTH, n) of orientation (4, n), rate, acceleration (3, n) and OK (n,).
 
     What cannot be summed is 0, and not GOOD. The time is left for the caller.
     """
-    table = np.zeros((len(q), WIDTH))
-    table[:, Q], table[:, W], table[:, A], table[:, OK] = q, w, a, told
-    table[:, W2], table[:, A2] = (np.einsum('ij,ij->i', v, v) for v in (w, a))
-    good = (table[:, W2] < LARGEST) & (table[:, A2] < LARGEST)
-    table[:, GOOD] = good
+    table = np.empty((WIDTH, len(told)))
+    table[Q], table[W], table[A], table[OK] = q, w, a, told
+    table[W2], table[A2] = (np.einsum('ji,ji->i', v, v) for v in (w, a))
+    good = (table[W2] < LARGEST) & (table[A2] < LARGEST)
+    table[GOOD] = good
     if not good.all():
         for part in (W, A, W2, A2):
-            table[~good, part] = 0.0
+            table[part, ~good] = 0.0
     return table

@@ -128,7 +128,7 @@ class MotionChecks:
     _grid: ImuGrid = field(init=False)
     _window: list[Sequence[float]] = field(default_factory=list)
     _cell: list[float] = field(default_factory=list)
-    _kept: Floats = field(default_factory=lambda: np.empty((0, WIDTH)))
+    _kept: Floats = field(default_factory=lambda: np.empty((WIDTH, 0)))
     _row_at: int = 0
     _tau: int = 0
     _due: int = GRID
@@ -219,12 +219,12 @@ class MotionChecks:
     def columns(self, time: Times, stamp: Times, x: Floats) -> None:
         """Take many messages in order of receipt, as `step` one at a time.
 
-        `x` (n, WIDTH) are samples of imu_grid.py; their time is filled in here.
+        `x` (WIDTH, n) are samples of imu_grid.py; their time is filled in here.
         """
         if self.tally is None:
             self.tally = Tally()
         if self._varies:
-            self.frozen.columns(time, x[:, :OK])
+            self.frozen.columns(time, x[:OK])
         passed = np.diff(stamp, prepend=self._stamp)
         received = np.diff(time, prepend=self._time)
         passed = np.where((passed > 0) & (passed <= LONGEST), passed, received)
@@ -234,24 +234,24 @@ class MotionChecks:
             if a in starts:
                 self._restart(int(time[a]))
                 passed[a] = 0
-            self._part(time[a:b], passed[a:b], x[a:b])
+            self._part(time[a:b], passed[a:b], x[:, a:b])
         self._stamp, self._time = int(stamp[-1]), int(time[-1])
         self._look(self._time)
 
     def _part(self, time: Times, passed: Times, x: Floats) -> None:
         """Take samples of one grid: judge all hops that end with one of them, keep the rest."""
         tau = self._tau + np.cumsum(passed)
-        x[:, TAU] = tau
+        x[TAU] = tau
         self._tau = int(tau[-1])
         grid, at = self._grid, tau // GRID
-        self._kept = np.concatenate((self._kept, x))
+        self._kept = np.concatenate((self._kept, x), axis=1)
         if at[-1] == grid.row:
             return
         last = grid.row
         # Up to the message that begins the newest row.
-        end = len(self._kept) - len(tau) + int(np.searchsorted(at, at[-1]))
-        grid.extend(self._kept[self._row_at : end + 1])
-        times = self._kept[:, TAU]
+        end = self._kept.shape[1] - len(tau) + int(np.searchsorted(at, at[-1]))
+        grid.extend(self._kept[:, self._row_at : end + 1])
+        times = self._kept[TAU]
         rows = range(last // HOP * HOP + HOP, grid.row + 1, HOP)
         closed = time[np.searchsorted(tau, np.array(rows) * GRID)].tolist()
         for hop, now in zip(hops_of(grid, rows), closed, strict=True):
@@ -259,14 +259,14 @@ class MotionChecks:
         grid.trim()
         self._due = (grid.row + 1) * GRID
         begins = np.searchsorted(times, grid.row // SOURCES * SOURCES * GRID)
-        self._kept, self._row_at = self._kept[begins:], end - int(begins)
+        self._kept, self._row_at = self._kept[:, begins:], end - int(begins)
 
     def _restart(self, now: int) -> None:
         """Begin a grid anew, at a message after a gap at `now` (ns)."""
         if self._began == LONG_AGO:
             self._began = now
         self._grid = ImuGrid(self.settings.robot.gravity)
-        self._kept, self._row_at = self._kept[:0], 0
+        self._kept, self._row_at = self._kept[:, :0], 0
         self._window.clear()
         self._cell.clear()
         self._tau, self._due = 0, GRID
@@ -362,7 +362,9 @@ class MotionChecks:
 
 
 def _part_of(x: Floats, times: Floats, row: int) -> Floats:
-    """Return the samples of the window of two sources that ends at a row of the grid."""
+    """Return the samples (n, WIDTH) of the window of two sources that ends at a row of the grid.
+
+    `x` (WIDTH, n) are samples at `times` (n,).
+    """
     start, end = np.searchsorted(times, ((row - SOURCES) * GRID, row * GRID))
-    part: Floats = x[start:end]
-    return part
+    return np.ascontiguousarray(x[:, start:end].T)

@@ -146,6 +146,9 @@ class _Pairs:
 
     def late(self, late: int, known: NDArray[np.bool_]) -> '_Pairs':
         """Return the rotations with an orientation that comes `late` rows late, where `known`."""
+        if known.all():
+            n = len(known) - late
+            return _Pairs(self.turned[:, :n], self.own[:, late:], self.up[:, late:])
         of = np.flatnonzero(known[late:])
         return _Pairs(*(x.take(at, axis=1) for x, at in zip(
             (self.turned, self.own, self.up), (of, of + late, of + late), strict=True,
@@ -156,13 +159,17 @@ class _Pairs:
         return _Pairs(self.turned[some], self.own[some], self.up[some])
 
     @property
-    def cosine(self) -> Floats:
-        return _cosines(self.turned, self.own)
+    def products(self) -> Floats:
+        """Sums of squares of the gyro's, of the orientation's, and of products of both (3, m)."""
+        of = ((self.turned, self.turned), (self.own, self.own), (self.turned, self.own))
+        return np.array([_dots(a, b) for a, b in of])
 
     @property
-    def ratio(self) -> Floats:
-        ratio: Floats = np.sqrt(_dots(self.turned, self.turned) / (self._own + 1e-12))
-        return ratio
+    def size(self) -> Floats:
+        """Root of the product of both sums of squares (rad2): what a cosine is a share of."""
+        turned, own, _ = self.products
+        size: Floats = np.sqrt(turned * own + 1e-18)
+        return size
 
     @property
     def error(self) -> Floats:
@@ -179,39 +186,16 @@ class _Pairs:
     @property
     def explained(self) -> tuple[Floats, Floats]:
         """Cosine after the best rotation of the axes, and after the best that may mirror."""
-        u, sizes, v = np.linalg.svd(self._product)
-        whole = self._whole
+        u, sizes, v = np.linalg.svd(self.product)
         hand = np.where(np.linalg.det(u @ v) > 0.0, 1.0, -1.0)
-        turns = (sizes[:, 0] + sizes[:, 1] + hand * sizes[:, 2]) / whole
-        return turns, sizes.sum(axis=1) / whole
+        turns = (sizes[:, 0] + sizes[:, 1] + hand * sizes[:, 2]) / self.size
+        return turns, sizes.sum(axis=1) / self.size
 
     @property
-    def most_explained(self) -> Floats:
-        """No less than both of `explained`, without singular values.
-
-        The square of the sum of three numbers is the sum of their squares, and twice that of their
-        products: at most the square root of three times the sum of the products' squares, which is
-        that of the squares of all cofactors.
-        """
-        rows = self._product
-        cofactors = np.cross(rows, rows[:, [1, 2, 0]])
-        square = _dots(rows, rows) + 2.0 * np.sqrt(3.0 * _dots(cofactors, cofactors))
-        most: Floats = np.sqrt(square) / self._whole
-        return most
-
-    @property
-    def _product(self) -> Floats:
+    def product(self) -> Floats:
+        """Sums of the products of each axis of the gyro with each of the orientation (m, 3, 3)."""
         found: Floats = np.matmul(self.turned.transpose(0, 2, 1), self.own)
         return found
-
-    @property
-    def _whole(self) -> Floats:
-        whole: Floats = np.sqrt(_dots(self.turned, self.turned) * self._own + 1e-18)
-        return whole
-
-    @property
-    def _own(self) -> Floats:
-        return _dots(self.own, self.own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,17 +216,16 @@ class Windows:
         if not lates:
             return [RatesFound()] * len(self.noise)
         pairs = [self.pairs.late(late, self.known) for late in lates]
-        cosines = np.array([of.cosine for of in pairs])
+        turned, own, both = np.stack([of.products for of in pairs], axis=1)
+        whole = np.sqrt(turned * own + 1e-18)
+        cosines = both / whole
         best = cosines.argmax(axis=0)
-        ratio, error, kind = (np.zeros(len(best)) for _ in range(3))
-        for late in np.unique(best):
-            at = np.flatnonzero(best == late)
-            found = pairs[late].of(at)
-            ratio[at], error[at] = found.ratio, found.error
-        cosine = cosines[best, np.arange(len(best))]
+        each = best, np.arange(len(best))
+        cosine, ratio = cosines[each], np.sqrt(turned[each] / (own[each] + 1e-12))
+        error, kind = np.array([of.error for of in pairs])[each], np.zeros(len(best))
         agree = (cosine >= AGREES) & (ratio >= ALIKE[0]) & (ratio <= ALIKE[1])
         small = error <= EXCITED + self.noise
-        gyro = _gyro_kinds(ratio, cosine, pairs, ~(agree | small))
+        gyro = _gyro_kinds((ratio, cosine, whole[::2]), pairs[::2], ~(agree | small))
         left = ~(agree | small) & (gyro == 0.0)
         for late in np.unique(best[left]):
             at = np.flatnonzero(left & (best == late))
@@ -266,23 +249,41 @@ class Windows:
 
 
 def _gyro_kinds(
-    ratio: Floats, cosine: Floats, pairs: Sequence[_Pairs], wanted: NDArray[np.bool_]
+    sizes: tuple[Floats, Floats, Floats], pairs: Sequence[_Pairs], wanted: NDArray[np.bool_]
 ) -> Floats:
-    """Return what is wrong with the gyro alone, of GYRO_KINDS, 0 for nothing known or `wanted`."""
+    """Return what is wrong with the gyro alone, of GYRO_KINDS, 0 for nothing known or `wanted`.
+
+    `sizes` are ratio and cosine (m,) at the best delay, and the size (d, m) at each of `pairs`.
+    """
+    ratio, cosine, whole = sizes
     large = (ratio > DEGREES[0]) & (ratio < DEGREES[1])
     tiny = ratio < 1.0 / DEGREES[0]
     alike = (ratio > ALIKE[0]) & (ratio < ALIKE[1]) & (cosine < DIFFERS)
     kind = np.zeros(len(ratio))
     at = np.flatnonzero(wanted & (large | tiny | alike))
-    most = np.max([of.of(at).most_explained for of in pairs[::2]], axis=0)
-    at = at[most > CERTAIN * min(EXPLAINED, EXPLAINED_UNIT)]
+    if len(at):
+        most = _most_explained(np.concatenate([of.product[at] for of in pairs]))
+        most = (most.reshape(-1, len(at)) / whole[:, at]).max(axis=0)
+        at = at[most > CERTAIN * min(EXPLAINED, EXPLAINED_UNIT)]
     if not len(at):
         return kind
-    turns, mirrors = np.max([of.of(at).explained for of in pairs[::2]], axis=0)
+    turns, mirrors = np.max([of.of(at).explained for of in pairs], axis=0)
     axes = np.where(turns > EXPLAINED, 3.0, np.where(mirrors > EXPLAINED, 4.0, 0.0))
     unit = np.where(large[at], 1.0, 2.0) * (turns > EXPLAINED_UNIT)
     kind[at] = np.where(alike[at], axes, unit)
     return kind
+
+
+def _most_explained(rows: Floats) -> Floats:
+    """Return no less than both of `explained` times the size, of products (m, 3, 3).
+
+    The square of the sum of three numbers, here the singular values, is the sum of their squares,
+    and twice that of their products: at most the square root of three times the sum of the
+    products' squares, which is that of the squares of all cofactors.
+    """
+    cofactors = np.cross(rows, rows[:, [1, 2, 0]])
+    most: Floats = np.sqrt(_dots(rows, rows) + 2.0 * np.sqrt(3.0 * _dots(cofactors, cofactors)))
+    return most
 
 
 def _dots(a: Floats, b: Floats) -> Floats:

@@ -105,7 +105,9 @@ class RestChecks:
 
     def columns(self, time: Times, strange: Floats, apart: Floats, delay: int) -> None:
         """Take many values (n,), and feed the signals with those to be believed."""
-        explained = self.g * np.sin(np.minimum(apart, math.pi / 2.0))
+        explained = apart
+        if (apart >= self.apart.on).any():
+            explained = self.g * np.sin(np.minimum(apart, math.pi / 2.0))
         for signal, lasting, values, push in (
             (self.strange, self._strange, strange, np.zeros(len(time))),
             (self.apart, self._apart, apart, explained),

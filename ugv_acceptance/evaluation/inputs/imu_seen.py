@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.samples import ImuColumns
-from ugv_acceptance.type_aliases import Times
+from ugv_acceptance.type_aliases import Floats, Times
 
 # A stretch at rest (ns) in which the accelerometer can be verified.
 RESTED = 500_000_000
@@ -29,14 +29,14 @@ class ImuSeen:
     no_force: int = 0
     turned: int = 0
 
-    def take(self, columns: Sequence[ImuColumns]) -> None:
-        """Take messages."""
+    def take(self, columns: Sequence[ImuColumns], omega: Floats) -> None:
+        """Take messages, with the rates (3, n) of all of them."""
         for s in columns:
             self.messages += len(s.log_time)
-            self.no_rate += int((s.angular_velocity_covariance_0 == -1.0).sum())
-            self.no_force += int((s.linear_acceleration_covariance_0 == -1.0).sum())
-            x, y, z = s.angular_velocity.T != 0.0
-            self.turned += int(np.count_nonzero(x | y | z))
+            self.no_rate += int(np.count_nonzero(s.angular_velocity_covariance_0 == -1.0))
+            self.no_force += int(np.count_nonzero(s.linear_acceleration_covariance_0 == -1.0))
+        x, y, z = omega != 0.0
+        self.turned += int(np.count_nonzero(x | y | z))
 
 
 def rested_messages(time: Times, rest: NDArray[np.bool_]) -> int:

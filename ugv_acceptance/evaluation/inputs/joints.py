@@ -387,9 +387,9 @@ class JointMerger:
 
 def _believe(values: Floats, limits: tuple[float, float]) -> None:
     """Replace values outside `limits` by NaN, in place."""
-    inside = (values >= limits[0]) & (values <= limits[1])
-    if not inside.all():
-        values[~inside] = np.nan
+    if not values.size or (values.min() >= limits[0] and values.max() <= limits[1]):
+        return
+    values[~((values >= limits[0]) & (values <= limits[1]))] = np.nan
 
 
 def _believable(joint: Joint) -> tuple[float, float]:
