@@ -116,6 +116,21 @@ def test_columns_give_the_alerts_of_single_samples(
     assert fed(told, *case, cuts) == stepped(told, *case)
 
 
+@given(
+    st.lists(st.sampled_from([0.0, 1e-10, 4e-10, 9e-10, 2e-9, 1e-6, -3e-9]), max_size=30),
+    st.sampled_from([1.5, 0.0, -1.0, 1e3, math.inf]),
+    st.lists(st.integers(0, 30), max_size=4),
+)
+def test_a_worst_value_that_is_crept_up_to_has_one_time(
+    steps: list[float], first: float, cuts: list[int]
+) -> None:
+    """A value that settles by less and less: its worst came at the same time in columns."""
+    told = Rule('TEST', 'it', ERROR, -2.0, -3.0, 0, 0)
+    values = (first + np.cumsum([0.0, *steps]) * (1.0 + min(abs(first), 1e9))).tolist()
+    times = list(range(10, 10 + len(values)))
+    assert fed(told, times, values, 100, cuts) == stepped(told, times, values, 100)
+
+
 @given(samples(), _delays, _delays, st.lists(st.integers(0, 300), max_size=20))
 def test_the_passing_of_time_changes_no_dates(
     case: tuple[list[int], list[float], int], on_delay: int, off_delay: int, ticks: list[int]

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 OK, WARN, ERROR, STALE = range(4)
-# Values this close, of 1 and of themselves, are one: what is computed one by one and in columns
-# differs in the last bits, and the first of equal values is when the worst came.
-_SAME = 1e-9
+# Values in one cell of a grid are one: what is computed one by one and in columns differs in the
+# last bits, and the first of equal values is when the worst came. Cells are this wide for small
+# values, and so much of large ones; the shift keeps their borders away from round numbers.
+_CELL, _SHIFT = 1e-9, 0.37
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
 
@@ -62,7 +63,7 @@ class Signal:
 
     `raw` says whether the value is bad (before delays), `alert` is the active alert, `due` (ns) is
     when the state changes unless the value does first. `peak` is the worst value since it was good,
-    `peak_at` (ns) when that came first, but for rounding. While `quiet`, only a value of `on` or
+    `peak_at` (ns) when one in its cell came first. While `quiet`, only a value of `on` or
     more can change anything, so callers may skip smaller ones. `detail` is what an alert raised
     next says in words: set it before a value that is bad while `raw` is not.
     """
@@ -112,7 +113,7 @@ class Signal:
             self.raw = True
             if self.alert is None:
                 self.due = now + self.rule.on_delay
-                self.peak, self.peak_at, self._dated = peak, at, peak
+                self.peak, self.peak_at, self._dated = peak, at, _cell(peak)
             else:
                 self.due = None
         if peak > self.peak:
@@ -142,9 +143,8 @@ class Signal:
 
     def _rise(self, peak: float, at: int) -> None:
         self.peak = peak
-        # Of infinities the difference is NaN, which is no small one.
-        if not abs(peak - self._dated) <= _SAME * (1.0 + abs(peak)):
-            self.peak_at, self._dated = at, peak
+        if (cell := _cell(peak)) > self._dated:
+            self.peak_at, self._dated = at, cell
         if self.alert is not None:
             self.alert.peak, self.alert.worst_at = peak, self.peak_at
 
@@ -192,7 +192,14 @@ def feed(
 
 
 def _worst(times: NDArray[np.int64], values: NDArray[Any]) -> tuple[float, int]:
-    """Return the largest value (NaN: all are) and when it came first (ns), but for rounding."""
+    """Return the largest value (NaN: all are) and when one in its cell came first (ns)."""
     worst = float(np.fmax.reduce(values))
-    near = worst - _SAME * (1.0 + abs(worst)) if math.isfinite(worst) else worst
-    return worst, int(times[np.argmax(values >= near)])
+    near = worst - 2.0 * _CELL * (1.0 + abs(worst)) if math.isfinite(worst) else worst
+    cell = _cell(worst)
+    rows = np.flatnonzero(values >= near).tolist()
+    return worst, int(times[next((k for k in rows if _cell(float(values[k])) == cell), 0)])
+
+
+def _cell(value: float) -> float:
+    """Return the number of the grid's cell that a value is in; infinities and NaN are their own."""
+    return math.floor(math.asinh(value) / _CELL + _SHIFT) if math.isfinite(value) else value
