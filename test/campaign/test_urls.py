@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from bag.test_sqlite_killed import killed
 from campaign.fleet import brief, campaign, said
 from campaign.s3_server import BUCKET, s3_server
 
-from ugv_acceptance.campaign.sources import Source, find_sources
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.campaign.sources import Source, find_sources, local_paths
 from ugv_acceptance.campaign.work import judge_source
 
 
@@ -78,3 +80,14 @@ def test_file_urls_are_read(fleet: Path, tmp_path: Path) -> None:
     pytest.importorskip('fsspec', reason='extra cluster is not installed')
     code, text = campaign(tmp_path, f'file://{fleet}/good_a', '--workers', '1')
     assert code == 0, text
+
+
+def test_what_a_killed_recorder_left_is_fetched_too(tmp_path: Path) -> None:
+    """A recording without its end is told as one, wherever it is kept."""
+    pytest.importorskip('fsspec', reason='extra cluster is not installed')
+    path = killed(tmp_path, 'WAL')
+    (source,) = [s for s in find_sources([f'file://{tmp_path}']) if s.name.endswith(path.name)]
+    with local_paths(source) as copies:
+        bag = open_bag(copies)
+        assert bag.salvaged is not None
+        assert 'run.db3-wal' in bag.salvaged

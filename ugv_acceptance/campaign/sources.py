@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag, pip_install
+from ugv_acceptance.bag.foreign import LEFT
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.metadata import SUFFIXES, numbered
 from ugv_acceptance.campaign.marks import listed_mark, local_mark
@@ -177,6 +178,8 @@ def _copied(source: Source, folder: Path) -> list[Path]:
         copy = run / posixpath.basename(url)
         try:
             system.get_file(path, str(copy))
+            if url.lower().endswith('.db3'):
+                _copy_beside(system, path, copy)
         except FileNotFoundError as error:
             if run.is_dir():
                 raise BadBag(f'{url}: cannot be read ({words(error)})') from None
@@ -185,6 +188,13 @@ def _copied(source: Source, folder: Path) -> list[Path]:
             raise AcceptanceError(f'{url}: cannot be fetched ({words(error)})') from None
         copies.append(copy)
     return copies
+
+
+def _copy_beside(system: Any, path: str, copy: Path) -> None:  # noqa: ANN401 - of fsspec
+    """Fetch what a killed recorder left beside an SQLite file: without it no end is missing."""
+    for end in LEFT:
+        if system.exists(path + end):
+            system.get_file(path + end, f'{copy}{end}')
 
 
 def _openable(source: Source, files: list[Path]) -> Path | list[Path]:
