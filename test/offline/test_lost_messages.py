@@ -1,6 +1,7 @@
 """Messages that are counted somewhere but could not be read: nobody can say what they held."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from bag.recordings import chunk_starts
 
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.recording import open_recording
 from ugv_acceptance.offline.evaluate import evaluate
 
 RUN = Path(__file__).parents[2] / 'bags' / 'packbot_pass'
@@ -39,3 +41,14 @@ def test_a_damaged_chunk_is_no_pass(small: Path, tmp_path: Path, which: Sequence
     found = evaluate(tmp_path / 'run.mcap')
     assert found.verdict == 'INCONCLUSIVE'
     assert any('messages are missing' in reason for reason in found.reasons)
+
+
+def test_what_metadata_counts_is_missed_where_only_the_beginning_is_read(small: Path) -> None:
+    """`info` reads no more of a long recording; what comes later is not called missing."""
+    recording = open_recording(small)
+    bag = recording.bag.beginning(recording.bag.start_ns + 5_000_000_000)
+    for more in (0, 7):
+        counts = {name: topic.count + more for name, topic in bag.topics.items()}
+        found = evaluate(replace(recording, bag=replace(bag, promised=counts)))
+        assert found.result['bag']['lost_messages'] == more * 3  # of each input
+        assert (found.verdict == 'PASS') is (more == 0)

@@ -247,14 +247,14 @@ def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
 def _lost(bag: Bag, topics: Topics, facts: Facts) -> int:
     """Return how many messages metadata.yaml or the index of the file counts that were not read.
 
-    Only of the topics read here: losing a camera's messages does not affect the verdict.
+    Only of the topics read here: losing a camera's messages does not affect the verdict. Where only
+    the beginning was asked for, those that metadata.yaml counts and the index does not.
     """
-    if bag.until_ns is not None:  # only the beginning was asked for
-        return 0
     names = (topics.joint_states, topics.imu, topics.payload)
     held = {name: bag.topics[name].count for name in names if name in bag.topics}
     counted = {name: max(bag.promised.get(name, 0), count) for name, count in held.items()}
-    return sum(max(0, count - facts.counts.get(name, 0)) for name, count in counted.items())
+    read = facts.counts if bag.until_ns is None else held
+    return sum(max(0, count - read.get(name, 0)) for name, count in counted.items())
 
 
 def _inputs_result(
