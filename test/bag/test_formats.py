@@ -253,13 +253,19 @@ def test_no_file_at_all_is_no_recording() -> None:
         open_bag([])
 
 
-@pytest.mark.parametrize('other', ['run.mcap', 'folder/../run.mcap', 'link.mcap', 'folder'])
+@pytest.mark.parametrize(
+    'other',
+    ['run.mcap', 'folder/../run.mcap', 'link.mcap', 'folder', 'copy.mcap', 'run.mcap.zstd'],
+)
 def test_a_file_given_twice_is_refused(tmp_path: Path, other: str) -> None:
     """By whatever name: its rates and numbers of messages would be twice what was recorded."""
     path = write_mcap(tmp_path / 'run.mcap', run(20))
     (tmp_path / 'folder').mkdir()
     (tmp_path / 'link.mcap').symlink_to(path)
     (tmp_path / 'folder' / 'hard.mcap').hardlink_to(path)
+    (tmp_path / 'copy.mcap').write_bytes(path.read_bytes())
+    packed = zstandard.ZstdCompressor().compress(path.read_bytes())
+    (tmp_path / 'run.mcap.zstd').write_bytes(packed)
     with pytest.raises(BadBag, match='each file once'):
         open_bag([path, tmp_path / other])
 

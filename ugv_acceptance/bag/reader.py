@@ -3,6 +3,7 @@
 `Bag.batches` (reading.py) then reads its messages.
 """
 
+import filecmp
 import hashlib
 import tempfile
 from collections import Counter
@@ -167,14 +168,15 @@ def open_bag(
 
 
 def _refuse_twice(members: Sequence[Member]) -> None:
-    """Raise BadBag if a file is there twice: each of its messages would be taken as two."""
-    known: dict[tuple[int, int], int] = {}
-    for k, member in enumerate(members):
-        found = member.path.stat()
-        same = known.setdefault((found.st_dev, found.st_ino), k)
-        if same != k:
-            names = ' and '.join(dict.fromkeys((str(members[same].path), str(member.path))))
-            raise BadBag(f'expected each file once, got {names} twice')
+    """Raise BadBag if two files hold the same: each of their messages would be taken as two."""
+    known: dict[int, list[Member]] = {}
+    for member in filter(Member.span, members):  # those with messages
+        alike = known.setdefault(member.content.stat().st_size, [])
+        for other in alike:
+            if filecmp.cmp(other.content, member.content, shallow=False):
+                names = ' and '.join(dict.fromkeys((str(other.path), str(member.path))))
+                raise BadBag(f'expected each file once, got the same twice: {names}')
+        alike.append(member)
 
 
 def _member(path: Path, max_chunk_bytes: int) -> Member:
