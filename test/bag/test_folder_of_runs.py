@@ -47,8 +47,8 @@ def test_files_of_two_runs_are_not_one(tmp_path: Path) -> None:
 
 def test_parts_without_metadata_are_one_recording(tmp_path: Path) -> None:
     """The parts of a split recording are read together as ever."""
-    for name in ('run_0.mcap', 'run_1.mcap'):
-        write_mcap(tmp_path / name, run(20))
+    for name, count in (('run_0.mcap', 20), ('run_1.mcap', 30)):
+        write_mcap(tmp_path / name, run(count))
     assert len(open_bag(tmp_path).paths) == 2
 
 
