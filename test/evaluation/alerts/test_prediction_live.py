@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from evaluation.streams import settings
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ugv_acceptance.evaluation.alerts.prediction import foresight_of
@@ -39,6 +39,14 @@ def looks(draw: st.DrawFn) -> list[tuple[int, list[float]]]:
     return found
 
 
+# A tilt that was not known, and then is past any limit.
+LOST = [
+    (10**18 + SPACING * k, [told, *[0.1] * (SIDES + 3 * JOINTS - 1)])
+    for k, told in enumerate([0.1, math.nan, math.nan, math.nan, math.nan, 0.1, -math.inf])
+]
+
+
+@example(LOST, (20.0, 20.0))
 @given(looks(), LIMITS)
 def test_one_at_a_time_says_what_arrays_say(
     rows: list[tuple[int, list[float]]], limit: tuple[float, ...]

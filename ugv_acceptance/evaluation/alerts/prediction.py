@@ -215,7 +215,7 @@ def _ahead(time: Times, left: Floats, slowest: Any) -> Floats:  # noqa: ANN401 -
         shrinks = rate <= -slowest
         if shrinks.any():
             shrinks &= _steady(-left, OVER)
-        seconds = time_to(0.0, -now, -now - np.where(shrinks, rate, np.inf), 1.0)
+        seconds = time_to(0.0, -now, np.where(shrinks, -now - rate, -np.inf), 1.0)
         found[OVER:] = np.where(step <= LONGEST, -seconds, np.nan)
     return found
 
