@@ -41,7 +41,7 @@ _NEXT = """
     SELECT timestamp FROM messages WHERE timestamp >= ? AND +id > ? ORDER BY timestamp LIMIT 1"""
 # What a killed writer leaves beside its file, by the end of its name: how that begins, and the size
 # up to which it holds nothing.
-LEFT = {'-wal': (b'\x37\x7f\x06', 32), '-journal': (b'\xd9\xd5\x05', 0)}
+LEFT_BESIDE = {'-wal': (b'\x37\x7f\x06', 32), '-journal': (b'\xd9\xd5\x05', 0)}
 _Message = tuple[int, int, bytes]  # channel, log time in ns, content
 
 
@@ -78,7 +78,7 @@ def open_sqlite(path: Path, name: str) -> ForeignIndex:
 
 def _left_beside(path: Path) -> str | None:
     """Return in words what a killed writer has not written into its file, None if there is none."""
-    for end, (magic, empty) in LEFT.items():
+    for end, (magic, empty) in LEFT_BESIDE.items():
         other = path.with_name(path.name + end)
         if not other.is_file() or other.stat().st_size <= empty:
             continue

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ugv_acceptance import AcceptanceError, BadBag, pip_install
-from ugv_acceptance.bag.foreign import LEFT
+from ugv_acceptance.bag.foreign import LEFT_BESIDE
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.metadata import SUFFIXES, numbered
 from ugv_acceptance.campaign.marks import listed_mark, local_mark
@@ -191,8 +191,8 @@ def _copied(source: Source, folder: Path) -> list[Path]:
 
 
 def _copy_beside(system: Any, path: str, copy: Path) -> None:  # noqa: ANN401 - of fsspec
-    """Fetch what a killed recorder left beside an SQLite file: without it no end is missing."""
-    for end in LEFT:
+    """Fetch what a killed recorder left beside an SQLite file, as its end is in that."""
+    for end in LEFT_BESIDE:
         if system.exists(path + end):
             system.get_file(path + end, f'{copy}{end}')
 

@@ -63,7 +63,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 os.environ.setdefault('PYDANTIC_DISABLE_PLUGINS', '__all__')
 # Objects that are made before the garbage collector looks for some to free. A start makes 80,000,
 # and all of them stay.
-COLLECT_AFTER = 100_000
+COLLECT_SELDOM = 100_000
 
 PROGRAM = 'ugv-acceptance'
 
@@ -95,7 +95,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error the user can act on gives one line and exit code 2."""
-    gc.set_threshold(COLLECT_AFTER)
+    gc.set_threshold(COLLECT_SELDOM)
     atexit.register(gc.freeze)  # what is left goes with the process
     prepare()
     with ended_by_signals() as told:

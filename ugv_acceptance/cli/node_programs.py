@@ -7,7 +7,7 @@ the program without a traceback, as it ends a verb; later the node's own handlin
 import gc
 from importlib import import_module
 
-from ugv_acceptance.cli import COLLECT_AFTER
+from ugv_acceptance.cli import COLLECT_SELDOM
 from ugv_acceptance.cli.termination import ended_by_signals
 
 # The module of each program.
@@ -34,7 +34,7 @@ def packbot_simulator() -> None:
 
 
 def _run(program: str) -> None:
-    gc.set_threshold(COLLECT_AFTER)
+    gc.set_threshold(COLLECT_SELDOM)
     with ended_by_signals() as told:
         try:
             main = import_module(MODULES[program]).main

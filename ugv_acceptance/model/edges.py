@@ -65,6 +65,7 @@ class Edges:
     the footing `rocks` its rocking (rad).
     `angles` returns the tip angle (rad) to each of SIDES; `margins` returns these angles, then the
     moments (N m), the energies (J), and the ZMP distance (m). Infinite on a side without an edge.
+    `of_margins` compiles `margins`.
     """
 
     angles: Kernel

@@ -1,7 +1,8 @@
 """Which share of a load each of several points carries in the even spread.
 
-That is the one of all balanced spreads, none pulling, that is least as a sum of squares. Which
-points push at all is tried a few times, and searched step by step where that does not settle.
+Points have x and y from the plumb point. The even spread is the one of all balanced spreads, none
+pulling, that is least as a sum of squares. Which points push at all is tried a few times, and
+searched step by step where that does not settle.
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ _SOFT, _STEPS = 1e-11, 6
 def _shares_kernel(count: int) -> Kernel:
     """Return the kernel of the least-norm shares of the points that push, not asking for a sign.
 
-    Inputs: x and y of each point as `_seen`, then 1 for each point that pushes, 0 for the others.
+    Inputs: x and y of each point, then 1 for each point that pushes, 0 for the others.
     A share is an affine function of the place (the points that push settle it); that of a point
     that does not push says whether it would have to pull: then leaving it out was right.
     """
@@ -58,7 +59,10 @@ def _total(values: Sequence[Scalar]) -> Scalar:
 
 @np.errstate(divide='ignore', invalid='ignore', over='ignore')
 def even_shares(count: int, flat: tuple[Number, ...]) -> Sequence[Number]:
-    """Return the share (of 1) that each of `count` points carries, evenly spread."""
+    """Return the share (of 1) that each of `count` points carries, evenly spread.
+
+    `flat` is x and y of each point from the plumb point, in any unit: numbers or arrays (n,).
+    """
     if not any(isinstance(x, np.ndarray) for x in flat):
         floats: Any = flat
         return _shares_once(count, floats)
@@ -134,7 +138,7 @@ def _shares_once(count: int, flat: tuple[float, ...]) -> Sequence[float]:
 
 
 def _searched_shares(x: Floats, y: Floats) -> Floats:
-    """Return the even shares (m, n) of points at x, y (m, n) as `_seen`, for any plumb point.
+    """Return the even shares (m, n) of points at x, y (m, n), for any plumb point.
 
     Follows them while the plumb point moves from the points' middle, where all carry the same, to
     its place: on the way one point after the other stops pushing (or pushes again), and in between

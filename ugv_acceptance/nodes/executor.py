@@ -34,8 +34,8 @@ BAD_INPUT = 2
 PATIENCE = 0.5
 # Seconds that the executor is given; without a limit it never ends.
 LONG = 3600.0
-# New objects at which the garbage collector looks, as Python has it by itself.
-COLLECT_AFTER = 700
+# New objects after which the garbage collector looks while messages come: Python's own number.
+_COLLECT_OFTEN = 700
 # Seconds after which a thread gives the interpreter to one that waits.
 TURN = 0.0002
 # Fast DDS takes its transports from this, or from a file of profiles under its new or old name.
@@ -177,7 +177,7 @@ def keep_objects() -> None:
     """
     gc.collect()
     gc.freeze()
-    gc.set_threshold(COLLECT_AFTER)
+    gc.set_threshold(_COLLECT_OFTEN)
 
 
 def spin(node: Node, stop: Stop, until: Callable[[], bool] = lambda: False) -> None:

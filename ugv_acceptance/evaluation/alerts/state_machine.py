@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 OK, WARN, ERROR, STALE = range(4)
 # Values in one cell of a grid are one: what is computed one by one and in columns differs in the
-# last bits, and the first of equal values is when the worst came. Cells are this wide for small
-# values, and so much of large ones; the shift keeps their borders away from round numbers.
+# last bits, and the first of equal values is when the worst came. A cell is this wide for small
+# values, and this share of large ones; the shift keeps its borders away from round numbers.
 _CELL, _SHIFT = 1e-9, 0.37
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 
@@ -78,7 +78,7 @@ class Signal:
     quiet: bool = True
     detail: str = ''
     on: float = field(init=False)
-    _dated: float = field(default=-np.inf)
+    _cell_dated: float = field(default=-np.inf)
 
     def __post_init__(self) -> None:
         self.on = self.rule.on
@@ -113,7 +113,7 @@ class Signal:
             self.raw = True
             if self.alert is None:
                 self.due = now + self.rule.on_delay
-                self.peak, self.peak_at, self._dated = peak, at, _cell(peak)
+                self.peak, self.peak_at, self._cell_dated = peak, at, _cell(peak)
             else:
                 self.due = None
         if peak > self.peak:
@@ -143,8 +143,8 @@ class Signal:
 
     def _rise(self, peak: float, at: int) -> None:
         self.peak = peak
-        if (cell := _cell(peak)) > self._dated:
-            self.peak_at, self._dated = at, cell
+        if (cell := _cell(peak)) > self._cell_dated:
+            self.peak_at, self._cell_dated = at, cell
         if self.alert is not None:
             self.alert.peak, self.alert.worst_at = peak, self.peak_at
 
