@@ -122,6 +122,22 @@ def test_a_campaign_without_groups_needs_no_statistics() -> None:
     assert done.stdout.split() == ['False']
 
 
+def test_the_simulator_is_loaded_without_a_process_of_its_own() -> None:
+    """A window library would start one to ask for its version; ended just then, it complains."""
+    code = """
+import sys
+begun = []
+sys.addaudithook(lambda event, told: begun.append(told) if event == 'subprocess.Popen' else None)
+import ugv_acceptance.simulation.engine
+print('mujoco' in sys.modules, begun)
+"""
+    known = {name: value for name, value in os.environ.items() if name != 'MUJOCO_GL'}
+    done = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, check=True, env=known
+    )
+    assert done.stdout == 'True []\n'
+
+
 def test_the_garbage_collector_does_not_look_through_a_start(repository: Path) -> None:
     """All that a start makes stays: the collector looks seldom, and not at the end."""
     done = subprocess.run(
