@@ -204,8 +204,8 @@ def delays(what: str, robot: Live) -> None:
 def listening(robot: Live) -> Iterator[list[float]]:
     """Run a second monitor beside; the list holds its latencies (ns) afterwards."""
     heard: list[float] = []
-    program = str(ROOT / 'bench' / 'live_listener.py')
-    with running(sys.executable, program, 'monitor', domain=robot.domain) as process:
+    words = (str(ROOT / 'bench' / 'live_listener.py'), 'monitor', str(ROOT))
+    with running(sys.executable, *words, domain=robot.domain) as process:
         yield heard
         process.send_signal(signal.SIGINT)
         said, _ = process.communicate(timeout=20)
