@@ -1,6 +1,7 @@
 """The values that criteria are about: each from a row made by hand, with its unit and subjects."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,9 +26,9 @@ ROW = made(
 @pytest.mark.parametrize(
     ('signal', 'expected'),
     [
-        ('torque_utilisation', (0.75, 0.0)),
+        ('torque_utilisation', (0.75, math.nan)),
         ('torque', (30.0, 8.0)),
-        ('torque_margin', (10.0, math.inf)),
+        ('torque_margin', (10.0, math.nan)),
         ('effort', (12.0, 7.0)),
         ('position', (0.3, -0.2)),
         ('speed', (0.5, 0.1)),
@@ -40,22 +41,37 @@ ROW = made(
     ],
 )
 def test_a_signal_is_taken_from_its_column(signal: str, expected: tuple[float, ...]) -> None:
-    """One number a subject; the tilt is the angle between gravity and straight down."""
+    """One number a subject, none of a joint without limit; tilt is gravity's from straight down."""
     kind = SIGNALS[signal]
-    assert kind.of(ROW, TOLD)[0].tolist() == pytest.approx(expected)
+    assert kind.of(ROW, TOLD)[0].tolist() == pytest.approx(expected, nan_ok=True)
     subjects = subjects_of(kind, TOLD)
     assert len(subjects) == len(expected)
     for name, number in zip(subjects, expected, strict=True):
-        assert columns_of(signal, name, ROW, TOLD, largest=True).tolist() == pytest.approx([number])
+        found = columns_of(signal, name, ROW, TOLD, largest=True)
+        assert found.tolist() == pytest.approx([number], nan_ok=True)
     for largest, pick in ((True, max), (False, min)):
         found = columns_of(signal, ANY, ROW, TOLD, largest=largest)
-        assert found.tolist() == pytest.approx([pick(expected)])
+        known = [number for number in expected if not math.isnan(number)]
+        assert found.tolist() == pytest.approx([pick(known)])
 
 
 def test_every_signal_is_tried_and_three_need_what_is_computed_on_demand() -> None:
     """Moments, energies and the ZMP cost time that no other signal has to pay."""
     assert len(SIGNALS) == 12
     assert {name for name, k in SIGNALS.items() if k.detail} == {'tip_moment', 'tip_energy', 'zmp'}
+
+
+def test_nothing_is_known_of_no_joint_no_limit_and_no_arm() -> None:
+    """A robot without joints, limits or an arm keeps no limit of them: there is no value."""
+    bare = replace(ROW, torque=np.zeros((1, 0)))
+    unlimited = settings(limits=Limits((math.inf, math.inf)))
+    tried = [
+        columns_of('torque', ANY, bare, TOLD, largest=True),
+        columns_of('torque_utilisation', ANY, ROW, unlimited, largest=True),
+        columns_of('torque_margin', ANY, ROW, unlimited, largest=False),
+        columns_of('clearance', ANY, made([0], clearance=[math.inf]), TOLD, largest=False),
+    ]
+    np.testing.assert_equal(tried, np.full((4, 1), np.nan))
 
 
 def test_a_value_is_unknown_where_the_row_is() -> None:

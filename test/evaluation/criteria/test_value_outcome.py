@@ -1,5 +1,6 @@
 """A criterion on a value, over hand-made rows: its numbers, and allowances at their end."""
 
+import json
 import math
 from dataclasses import replace
 from typing import Any
@@ -127,6 +128,22 @@ def test_what_is_never_known_or_never_holds_decides_nothing() -> None:
     assert judged(replace(BELOW, share_in_violation=0.5), last).verdict == 'INCONCLUSIVE'
     none = judged(BELOW, made(seconds(0), torque=[(9.0, 0.0)]), end=0.0)
     assert (none.verdict, none.measured['evaluated_share']) == ('INCONCLUSIVE', 0.0)
+
+
+def test_a_side_without_an_edge_keeps_what_must_stay_above() -> None:
+    """Its tilt is infinite, also where other rows are not known, and is told in words."""
+    rear = [(0.4, 0.5, math.inf, 0.7)] * 2
+    angle = [(math.nan,) * 4, *rear]
+    rows = made(seconds(0, 1, 2), angle=angle, until=seconds(1, 2, 10))
+    kept = judged(Value('tip_angle', 'rear', below=False, limit=0.1), rows, coverage=0.5)
+    assert kept.verdict == 'PASS'
+    assert (kept.measured['worst'], kept.measured['worst_of']) == (None, 'rear')
+    broken = judged(Value('tip_angle', 'rear', below=True, limit=0.1), rows, coverage=0.5)
+    assert (broken.verdict, broken.reason) == (
+        'FAIL',
+        'tilt left of rear was infinite at 1.00 s; must stay below 5.73 deg (9.00 s in violation)',
+    )
+    json.dumps(broken.measured, allow_nan=False)
 
 
 HEAVY = Source('arm.mass_kg', 'arm', 'mass', 0.5)

@@ -150,13 +150,14 @@ class ValueMeasure:
         inside = (rows.time >= self.span[0]) & (rows.time <= self.span[1])
         if not inside.all():
             values = np.where(inside, values, np.nan)
+        known = np.flatnonzero(~np.isnan(values))
+        self.samples += known.size
+        if not known.size:
+            return
         sign = -1.0 if self.demand.below else 1.0
         order = sign * values
-        order = np.where(np.isnan(order), np.inf, order)
-        k = int(order.argmin())
-        self.samples += int(np.count_nonzero(~np.isnan(values)))
-        if np.isnan(values[k]):
-            return
+        # Infinite is a value too, as on a side without an edge.
+        k = int(known[order[known].argmin()])
         if self.first is None and self._bad(values[[k]])[0]:
             at = int(self._bad(values).argmax())
             self.first = self._moment(rows, at, float(values[at]))

@@ -102,7 +102,8 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
     must = f'must stay {measured["must_be"]} {number(demand.limit, demand, settings)}'
     spent = f'{measured["time_in_violation_s"]:.2f} s in violation'
     at = f'at {measured["at_s"]:.2f} s'
-    if demand.signal == 'torque_utilisation':
+    finite = math.isfinite(worst.value)
+    if finite and demand.signal == 'torque_utilisation':
         limit = settings.limits.torque[settings.robot.joint_names.index(worst.subject)]
         _, unit = shown('torque', worst.subject, settings)
         share = number_beside(100.0 * worst.value, 100.0 * demand.limit, 0)
@@ -111,12 +112,12 @@ def violation_words(measure: ValueMeasure, settings: Settings, measured: dict[st
             f'{worst.subject} {share} % of its limit {at}: it needs {need} of {limit:.1f} {unit}; '
             f'{must} ({spent})'
         )
-    if demand.signal == 'tip_angle':
+    if finite and demand.signal == 'tip_angle':
         return f'{tipping_words(worst.subject, worst.value)} {at}; {must} ({spent})'
     subject = '' if worst.subject == 'robot' else f' of {worst.subject}'
     words, (scale, unit) = SIGNALS[demand.signal].words, shown(demand.signal, demand.of, settings)
-    value = value_beside(worst.value * scale, demand.limit * scale)
-    return f'{words}{subject} was {value} {unit} {at}; {must} ({spent})'
+    value = f'{value_beside(worst.value * scale, demand.limit * scale)} {unit}'
+    return f'{words}{subject} was {value if finite else "infinite"} {at}; {must} ({spent})'
 
 
 # Why a criterion on a value is not judged where there is none.

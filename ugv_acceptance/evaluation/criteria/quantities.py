@@ -34,13 +34,19 @@ class SignalKind:
     detail: bool = False
 
 
+def _limits(settings: Settings) -> Floats:
+    """Return the torque limits; NaN for a joint without one, which has no margin."""
+    limits = np.array(settings.limits.torque)
+    return np.where(np.isfinite(limits), limits, np.nan)
+
+
 def _utilisation(rows: MarginRows, settings: Settings) -> Floats:
-    share: Floats = np.abs(rows.torque) / np.array(settings.limits.torque)
+    share: Floats = np.abs(rows.torque) / _limits(settings)
     return share
 
 
 def _margin(rows: MarginRows, settings: Settings) -> Floats:
-    return np.array(settings.limits.torque) - np.abs(rows.torque)
+    return _limits(settings) - np.abs(rows.torque)
 
 
 def _tilt(rows: MarginRows, _: Settings) -> Floats:
@@ -51,7 +57,8 @@ def _tilt(rows: MarginRows, _: Settings) -> Floats:
 
 def _clearance(rows: MarginRows, _: Settings) -> Floats:
     height = rows.clearance if len(rows.clearance) else np.full(len(rows.time), np.nan)
-    return height[:, None]
+    # Infinite: there is no arm.
+    return np.where(np.isfinite(height), height, np.nan)[:, None]
 
 
 SIGNALS = {
@@ -147,9 +154,9 @@ def columns_of(
 
 
 def _extreme(table: Floats, *, largest: bool) -> Floats:
-    """Return the extreme over the columns (n,); NaN is skipped."""
+    """Return the extreme over the columns (n,); NaN is skipped, and what comes of no column."""
     pick = np.fmax if largest else np.fmin
-    found: Floats = pick.reduce(table, axis=1)
+    found: Floats = pick.reduce(table, axis=1, initial=np.nan)
     return found
 
 

@@ -291,7 +291,7 @@ class Bounds:
 
     def _one(self, demand: Value, moment: Moment, method: str) -> dict[str, Any] | None:
         effects = self.of(demand.signal, moment)
-        if effects is None or not np.isfinite(effects).all():
+        if effects is None or not (np.isfinite(effects).all() and np.isfinite(moment.value)):
             return None
         used = RSS if method == IGNORED else method
         scale, unit = shown(demand.signal, moment.subject, self.settings)

@@ -156,21 +156,23 @@ def _measured(measure: ValueMeasure, findings: Findings) -> Json:
     demand, violation = measure.demand, measure.violation
     scale, unit = shown(demand.signal, demand.of, findings.settings)
     method = findings.measurement.criteria.uncertainty_of(measure.criterion)
-    worst = measure.worst[0] if measure.worst and isfinite(measure.worst[0].value) else None
+    worst = measure.worst[0] if measure.worst else None
+    # JSON has no infinite number.
+    finite = worst if worst and isfinite(worst.value) else None
     bound, first = findings.bounds.worst(measure, method), measure.first
     start, end = measure.span
-    distance = demand.distance(worst.value) * scale if worst else None
+    distance = demand.distance(finite.value) * scale if finite else None
     return {
         'signal': demand.signal,
         'of': demand.of,
         'unit': unit,
         'limit': demand.limit * scale,
         'must_be': 'below' if demand.below else 'above',
-        'worst': worst.value * scale if worst else None,
+        'worst': finite.value * scale if finite else None,
         'worst_of': worst.subject if worst else None,
         'at_s': findings.seconds(worst.time) if worst else None,
         'distance': distance,
-        'moment': moment_json(worst, findings.settings) if worst else None,
+        'moment': moment_json(finite, findings.settings) if finite else None,
         'first_violation': moment_json(first, findings.settings) if first else None,
         'uncertainty': bound,
         'inside_bound': bool(bound and distance and distance > 0.0 >= bound['excess']),
