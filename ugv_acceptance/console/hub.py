@@ -27,8 +27,8 @@ def number_in(values: Mapping[str, object], name: str) -> float:
 
 
 # Seconds between frames and, at least, between two maps.
-FRAME = 0.05
-MAP = 0.2
+FRAME = 1 / 15
+MAP = 1 / 3
 # A client that takes nothing for this long (s) is disconnected; most clients at a time.
 PATIENCE = 10.0
 MOST_CLIENTS = 32
@@ -64,7 +64,7 @@ class Client:
 
 @dataclass(slots=True, eq=False)
 class Hub:
-    """Makes frames at 20 Hz while a client is connected, and carries out clients' commands."""
+    """Makes frames at 15 Hz while a client is connected, and carries out clients' commands."""
 
     feed: Feed
     clients: set[Client] = field(default_factory=set)

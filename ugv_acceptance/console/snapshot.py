@@ -141,7 +141,7 @@ class Memory:
 class Feed(Protocol):
     """A source of snapshots: a live robot or a recording.
 
-    Its methods are called from one thread, 20 times a second.
+    Its methods are called from one thread, 15 times a second.
     """
 
     settings: Settings
