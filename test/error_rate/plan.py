@@ -20,7 +20,7 @@ FAULTED, GOOD = 'faulted', 'good'
 # What is not a bound.
 OWN = ('row', 'robots', 'must')
 # Draws until a run is what its kind says; beyond them the bounds do not fit the robot.
-TRIES = 300
+TRIES = 3000
 
 
 @dataclass(frozen=True, slots=True)
