@@ -362,7 +362,7 @@ def _unmet_words(
             f'evaluated ({percent_words(demand.least)} needed)'
         )
     if demand.quantity == 'salvaged':
-        return f'the recording is truncated: {data["bag"]["salvaged"]}'
+        return f'the recording is not whole: {data["bag"]["salvaged"]}'
     if demand.quantity == 'lost_messages':
         lost = data['bag']['lost_messages']
         return f'{lost} messages are missing that metadata.yaml or the index of the file counts'
