@@ -162,17 +162,13 @@ def open_bag(
         except OSError as error:
             raise BadBag(f'{path}: cannot be read ({error})') from error
         topics, odd = _topics(part)
-        told = _not_there(Path(path), found, topics)
-        missing += told
-        findings += [*found.findings, *_compared(found.metadata, topics)]
-        findings += [text for text in found.missing if text not in told]
+        gone = _not_there(Path(path), found, topics)
+        missing += gone
+        findings += _told(found, topics, gone)
         promised.update(found.metadata.counts or {})
         members += part
-    _refuse_twice(members)
+    _refuse_unfit(members)
     missing += missing_parts(single)
-    kinds = sorted({member.storage for member in members})
-    if len(kinds) > 1:
-        raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
     if len(given) > 1:
         topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
@@ -191,6 +187,12 @@ def open_bag(
     )
 
 
+def _told(found: Found, held: dict[str, Topic], gone: Sequence[str]) -> list[str]:
+    """Return the findings about a part's files, but for what is `gone`."""
+    rest = [text for text in found.missing if text not in gone]
+    return [*found.findings, *_compared(found.metadata, held), *rest]
+
+
 def _not_there(path: Path, found: Found, held: dict[str, Topic]) -> list[str]:
     """Return sentences about parts of the recording at `path` that are not there.
 
@@ -206,8 +208,11 @@ def _not_there(path: Path, found: Found, held: dict[str, Topic]) -> list[str]:
     return found.missing if short or not counts else []
 
 
-def _refuse_twice(members: Sequence[Member]) -> None:
-    """Raise BadBag if two files hold the same: each of their messages would be taken as two."""
+def _refuse_unfit(members: Sequence[Member]) -> None:
+    """Raise BadBag if files have other formats, or two hold the same: it would count twice."""
+    kinds = sorted({member.storage for member in members})
+    if len(kinds) > 1:
+        raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
     known: dict[int, list[Member]] = {}
     for member in filter(Member.span, members):  # those with messages
         alike = known.setdefault(member.content.stat().st_size, [])

@@ -61,7 +61,8 @@ def _held(bag: Bag) -> Counter[_Kind]:
     for member in bag.members:
         for number, channel in member.index.channels.items():
             kind = channel.topic, normal_type(channel.type), channel.encoding
-            held[kind] += member.index.counts.get(number, 0)
+            count = member.index.counts.get(number, 0)
+            held[kind] += count
     return +held
 
 
