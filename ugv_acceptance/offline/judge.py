@@ -143,7 +143,7 @@ def _examinations(
         InputTimes(),
         CarryingJoints(settings, limits.payloads.at, lambda: evaluator.carrying),
         TouchExamination(),
-        ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
+        ReportedRates(settings.robot, lambda: evaluator.rates),
         GroundExamination(settings, criteria, evaluator.watch.trend, evaluator.watch.log),
     )
 
