@@ -55,7 +55,7 @@ class ReportedRates:
         return (
             f'the position of {name} stands still to the last digit until '
             f'{(rate.stuck_at - start) / 1e9:.2f} s, while its velocity, which agreed with it '
-            f'before, tells of a motion by {by}'
+            f'before, shows a motion of {by}'
         )
 
 
