@@ -146,6 +146,21 @@ def test_an_alert_that_is_an_objection_is_one() -> None:
     assert [r for r in found['reasons'] if 'lift' in r] == found['reasons'][:1]
 
 
+@pytest.mark.parametrize(
+    ('code', 'subject', 'words'),
+    [('TIP_AHEAD', 'left', 'it tips within'), ('TORQUE_AHEAD', 'lift', 'lift')],
+)
+def test_a_recording_does_not_end_on_the_way_to_a_limit(
+    code: str, subject: str, words: str
+) -> None:
+    """A limit is passed within a second of the last message, or not: nobody saw which."""
+    assert judged(GOOD, alerts=[alert(code, subject, 8.0, 9.0)])['verdict'] == 'PASS'
+    found = judged(GOOD, alerts=[alert(code, subject, 9.8, None)])
+    assert found['verdict'] == 'INCONCLUSIVE'
+    assert found['reasons'][0].startswith('the recording ends too early: ')
+    assert words in found['reasons'][0]
+
+
 def test_what_an_examination_states_counts() -> None:
     """Its objections decide, and what it did not check is passed on."""
     objection = Objection('residual', 'INCONCLUSIVE', 'lift differs by 9 N m', ('at 4 s',))
