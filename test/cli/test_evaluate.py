@@ -122,7 +122,7 @@ def test_a_recording_that_breaks_off_is_no_pass(repository: Path, tmp_path: Path
     file.write_bytes(file.read_bytes()[:60_000])
     for place in (run, file):
         done = evaluate(place)
-        assert (done.returncode, 'the recording is truncated' in done.stdout) == (3, True)
+        assert (done.returncode, 'the recording is not whole' in done.stdout) == (3, True)
     assert '7374 messages are missing' in evaluate(run).stdout
 
 

@@ -19,7 +19,9 @@ from mcap.stream_reader import StreamReader
 
 from ugv_acceptance import BadBag, __version__
 from ugv_acceptance.bag.atomic_files import is_stream, naming, whole
+from ugv_acceptance.bag.beside_messages import extras
 from ugv_acceptance.bag.blocks import Block, merged
+from ugv_acceptance.bag.mcap_index import pread
 from ugv_acceptance.bag.mcap_writer import McapWriter
 from ugv_acceptance.bag.raw import blocks_of, lanes
 from ugv_acceptance.bag.reader import Bag
@@ -42,8 +44,9 @@ def write_annotated(
 
     `types` gives the ROS 2 type of each added topic, whose place in it (0, 1, ...) is the channel
     of a message in `said`. They are in order of log time, except for messages that are late on
-    purpose; `progress` is called with the log time reached (ns). Every chunk has a checksum. The
-    file gets its name only when it is complete. Raises AcceptanceError if it cannot be written.
+    purpose; `progress` is called with the log time reached (ns). Attachments and metadata records
+    are copied as well. Every chunk has a checksum. The file gets its name only when it is complete.
+    Raises AcceptanceError if it cannot be written.
     """
     with naming(path), whole(path) as file:
         writer = McapWriter(file, f'ugv_acceptance {__version__}', level=1)
@@ -65,6 +68,8 @@ def _write(
     own = dict(enumerate(_new(writer, name, kind) for name, kind in types.items()))
     # Every file's channels are created now, at the new file's beginning.
     channels = {id(member): _channels(writer, member) for member in bag.members}
+    for member in bag.members:
+        _copy_beside(writer, member)
     streams = [
         chain.from_iterable(_copied(bag, member, channels[id(member)]) for member in lane)
         for lane in lanes(bag.members)
@@ -73,6 +78,17 @@ def _write(
         writer.messages(block, CHUNK)
         progress(int(block.log_time[-1]))
     return sum(count for channel, count in writer.counts.items() if channel not in own.values())
+
+
+def _copy_beside(writer: McapWriter, member: Member) -> None:
+    """Copy the attachments and metadata records of a file, byte by byte."""
+    if member.storage != 'mcap':
+        return
+    with member.content.open('rb') as file:
+        for extra in extras(file):
+            end = extra.start + extra.index.length
+            places = range(extra.start, end, CHUNK)
+            writer.beside(extra.index, (pread(file, at, min(CHUNK, end - at)) for at in places))
 
 
 def _copied(bag: Bag, member: Member, channels: Mapping[int, int]) -> Iterator[Block]:

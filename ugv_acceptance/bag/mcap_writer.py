@@ -5,7 +5,8 @@ lose minutes of a slow recording; here the caller ends chunks. Records are those
 """
 
 import struct
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO, Literal
 
 import numpy as np
@@ -58,6 +59,8 @@ class McapWriter:
         self._channels: list[records.Channel] = []
         self._chunks: list[records.ChunkIndex] = []
         self._counts: dict[int, int] = {}
+        self._attachments: list[records.McapRecord] = []
+        self._metadata: list[records.McapRecord] = []
         self._open = _Open()
         self._pos = 0
         self._put(MAGIC + _record(records.Header('ros2', library)))
@@ -186,6 +189,18 @@ class McapWriter:
         )
         self._file.flush()
 
+    def beside(
+        self, index: records.AttachmentIndex | records.MetadataIndex, parts: Iterable[bytes]
+    ) -> None:
+        """Add an attachment or a metadata record: all of its bytes, in parts.
+
+        `index` is what the index says of it; its place in this file is filled in.
+        """
+        held = self._attachments if isinstance(index, records.AttachmentIndex) else self._metadata
+        held.append(replace(index, offset=self._pos))
+        for part in parts:
+            self._put(part)
+
     def span(self) -> tuple[int, int]:
         """Return the first and last log time of the chunks written; (0, 0) without messages."""
         held = [c for c in self._chunks if c.message_index_offsets]
@@ -205,6 +220,8 @@ class McapWriter:
             (Opcode.CHANNEL, list(self._channels)),
             (Opcode.STATISTICS, [self._statistics()]),
             (Opcode.CHUNK_INDEX, list(self._chunks)),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
         ]
         for opcode, group in groups:
             content = b''.join(_record(record) for record in group)
@@ -220,14 +237,14 @@ class McapWriter:
     def _statistics(self) -> records.Statistics:
         first, last = self.span()
         return records.Statistics(
-            attachment_count=0,
+            attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
             message_end_time=last,
             message_start_time=first,
-            metadata_count=0,
+            metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
 

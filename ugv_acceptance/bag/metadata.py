@@ -5,7 +5,7 @@ import posixpath
 import re
 import shlex
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -103,15 +103,30 @@ def _plain(topic: str) -> tuple[dict[str, int], str]:
     return {name: int(count)}, alike
 
 
-def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
-    """Return the files of a recording in order, its metadata, and findings; BadBag without files.
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The files of a recording in order, its metadata, and sentences about what is odd with them.
+
+    `missing` are sentences about files that metadata.yaml lists and that are not there. `listed`
+    says whether it names the files that are read.
+    """
+
+    files: list[Path]
+    metadata: Metadata = field(default_factory=Metadata)
+    findings: list[str] = field(default_factory=list)
+    missing: list[str] = field(default_factory=list)
+    listed: bool = False
+
+
+def files_of(path: Path) -> Found:
+    """Return the files of a recording; BadBag without files.
 
     `path` is a file or a rosbag2 folder; a folder with several recordings is refused.
     """
     if not path.exists():
         raise BadBag(f'{path}: no such file or folder')
     if path.is_file():
-        return [path], Metadata(), []
+        return Found([path])
     present = sorted(p for p in path.iterdir() if p.is_file() and p.name.lower().endswith(SUFFIXES))
     findings: list[str] = []
     metadata = Metadata()
@@ -122,7 +137,7 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
             findings.append(f'{error}: not used')
     else:
         findings.append(f'{path.name}: no {NAME}')
-    listed, told = _listed(path, metadata.files, present)
+    listed, told, missing = _listed(path, metadata.files, present)
     findings += told
     files = listed or present
     several = not listed and len(numbered([p.name for p in files])) > 1
@@ -135,7 +150,7 @@ def files_of(path: Path) -> tuple[list[Path], Metadata, list[str]]:
     if not files:
         wanted = ', '.join(SUFFIXES)
         raise BadBag(f'{path}: expected a rosbag2 folder, found no {wanted} file in it')
-    return files, metadata, findings
+    return Found(files, metadata, findings, missing, bool(listed))
 
 
 def part_of(name: str) -> tuple[str, int] | None:
@@ -191,8 +206,11 @@ def _refuse_several(folder: Path) -> None:
 
 def _listed(
     folder: Path, names: Sequence[str], present: Sequence[Path]
-) -> tuple[list[Path], list[str]]:
-    """Return the files that metadata.yaml lists, and findings; no files means: use `present`."""
+) -> tuple[list[Path], list[str], list[str]]:
+    """Return the files that metadata.yaml lists, findings, and what is missing, in sentences.
+
+    No files means: use `present`.
+    """
     files, findings, missing = [], [], []
     listed = {Path(name).name for name in names}
     for name in names:
@@ -210,8 +228,7 @@ def _listed(
     unlisted = ', '.join(p.name for p in present if p not in files)
     if missing and not files and unlisted:
         gone = ', '.join(map(repr, missing))
-        return [], [f'{NAME} lists {gone}, which does not exist; {unlisted} was read instead']
-    findings += [f'{NAME}: file {name!r} is missing' for name in missing]
+        return [], [f'{NAME} lists {gone}, which does not exist; {unlisted} was read instead'], []
     if names and unlisted:
         findings.append(f'{NAME} does not list {unlisted}: it was not read')
-    return files, findings
+    return files, findings, [f'{NAME}: file {name!r} is missing' for name in missing]

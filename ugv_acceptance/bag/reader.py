@@ -5,6 +5,7 @@
 
 import filecmp
 import hashlib
+import json
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -20,7 +21,9 @@ from ugv_acceptance.bag.chunks import MAX_CHUNK_BYTES
 from ugv_acceptance.bag.foreign import ForeignIndex, open_ros1, open_sqlite
 from ugv_acceptance.bag.mcap_index import SIMULATED, Channel, McapIndex
 from ugv_acceptance.bag.mcap_source import open_mcap
-from ugv_acceptance.bag.metadata import Metadata, files_of
+from ugv_acceptance.bag.metadata import NAME as METADATA
+from ugv_acceptance.bag.metadata import Found, Metadata, files_of
+from ugv_acceptance.bag.missing_parts import missing_parts
 from ugv_acceptance.bag.reading import Member, Reading, normal_type, wire_of
 
 _BLOCK = 1 << 20
@@ -60,8 +63,9 @@ class Bag:
     """A recording: one or several files of one storage format, as found when it was opened.
 
     `start_ns` and `end_ns` are the first and last log time. `protected` says whether all, part or
-    none of its chunks have a checksum; `salvaged` is a sentence if a file breaks off, else None;
-    `findings` are sentences about what is odd. What only reading can find is in `Reading.facts`.
+    none of its chunks have a checksum; `salvaged` is a sentence if the recording is not whole (a
+    file breaks off, a part of it is missing), else None; `findings` are sentences about what is
+    odd. What only reading can find is in `Reading.facts`.
     `promised` is the number of messages by topic according to metadata.yaml. Of a `beginning`,
     `until_ns` is the last log time that is read.
     """
@@ -100,6 +104,19 @@ class Bag:
             self._hash.append(one.hex())
         return self._hash[0]
 
+    def identity(self) -> str:
+        """Return 64 hexadecimal digits that differ where what is read, or is missing, differs.
+
+        The SHA-256 of a whole recording. Where metadata.yaml counts messages that are not there, or
+        a part is known to be missing, another number: so much may change while the files do not.
+        """
+        held = {name: topic.count for name, topic in self.topics.items()}
+        short = sorted((k, n) for k, n in self.promised.items() if n > held.get(k, 0))
+        if self.salvaged is None and not short:
+            return self.sha256()
+        text = json.dumps([self.sha256(), self.salvaged is not None, short])
+        return hashlib.sha256(text.encode()).hexdigest()
+
     def beginning(self, until_ns: int) -> 'Bag':
         """Return the recording as if it ended at a log time (ns); nothing after it is read.
 
@@ -135,25 +152,28 @@ def open_bag(
     members: list[Member] = []
     findings: list[str] = []
     promised: Counter[str] = Counter()
+    missing: list[str] = []
+    single: list[Path] = []
     for path in given:
         try:
-            files, metadata, found = files_of(Path(path))
-            part = [_member(file, max_chunk_bytes) for file in files]
+            found = files_of(Path(path))
+            part = [_member(file, max_chunk_bytes) for file in found.files]
+            single += [file for file in found.files if file == Path(path)]
         except OSError as error:
             raise BadBag(f'{path}: cannot be read ({error})') from error
         topics, odd = _topics(part)
-        findings += found + _compared(metadata, topics)
-        promised.update(metadata.counts or {})
+        gone = _not_there(Path(path), found, topics)
+        missing += gone
+        findings += _told(found, topics, gone)
+        promised.update(found.metadata.counts or {})
         members += part
-    _refuse_twice(members)
-    kinds = sorted({member.storage for member in members})
-    if len(kinds) > 1:
-        raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
+    _refuse_unfit(members)
+    missing += missing_parts(single)
     if len(given) > 1:
         topics, odd = _topics(members)
     ranges = [span for member in members if (span := member.span())]
     findings += [f'{m.name}: {text}' for m in members for text in m.findings()] + odd
-    salvaged = [f'{m.name}: {text}' for m in members if (text := m.index.salvaged)]
+    salvaged = [f'{m.name}: {text}' for m in members if (text := m.index.salvaged)] + missing
     return Bag(
         tuple(member.path for member in members),
         min((first for first, _ in ranges), default=0),
@@ -167,8 +187,32 @@ def open_bag(
     )
 
 
-def _refuse_twice(members: Sequence[Member]) -> None:
-    """Raise BadBag if two files hold the same: each of their messages would be taken as two."""
+def _told(found: Found, held: dict[str, Topic], gone: Sequence[str]) -> list[str]:
+    """Return the findings about a part's files, but for what is `gone`."""
+    rest = [text for text in found.missing if text not in gone]
+    return [*found.findings, *_compared(found.metadata, held), *rest]
+
+
+def _not_there(path: Path, found: Found, held: dict[str, Topic]) -> list[str]:
+    """Return sentences about parts of the recording at `path` that are not there.
+
+    A file that metadata.yaml lists may be, where every message that it counts is in the others.
+    """
+    if not found.listed:
+        return list(missing_parts(found.files, path)) if path.is_dir() else []
+    counts, total = found.metadata.counts, found.metadata.message_count or 0
+    here = sum(topic.count for topic in held.values())
+    if not counts and total > here:
+        return [*found.missing, f'{METADATA} says {total} messages, found {here}']
+    short = any(n > (held[name].count if name in held else 0) for name, n in (counts or {}).items())
+    return found.missing if short or not counts else []
+
+
+def _refuse_unfit(members: Sequence[Member]) -> None:
+    """Raise BadBag if files have other formats, or two hold the same: it would count twice."""
+    kinds = sorted({member.storage for member in members})
+    if len(kinds) > 1:
+        raise BadBag(f'expected files of one format, got {" and ".join(kinds)}')
     known: dict[int, list[Member]] = {}
     for member in filter(Member.span, members):  # those with messages
         alike = known.setdefault(member.content.stat().st_size, [])

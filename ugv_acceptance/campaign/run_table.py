@@ -81,11 +81,14 @@ def unjudged_row(name: str, why: str) -> Row:
 
 
 def in_order(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows by start time, each recording once; those without a result last, by name."""
+    """Return the rows by start time, each recording once; those without a result last, by name.
+
+    Two are copies if they have one result: of equal files one may lack what another one has.
+    """
     first: dict[str, Row] = {}
     copies: dict[str, list[str]] = {}
     for row in sorted(rows, key=lambda r: r.name):
-        key = row.sha256 or f'unread {row.name}'
+        key = row.result or f'unread {row.name}'
         copies.setdefault(key, []).append(row.name)
         first.setdefault(key, row)
     single = [_with_copies(row, copies[key][1:]) for key, row in first.items()]

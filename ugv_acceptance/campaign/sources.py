@@ -8,7 +8,7 @@ import os
 import posixpath
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any
 from ugv_acceptance import AcceptanceError, BadBag, pip_install
 from ugv_acceptance.bag.foreign import LEFT_BESIDE
 from ugv_acceptance.bag.metadata import NAME as METADATA
-from ugv_acceptance.bag.metadata import SUFFIXES, numbered
+from ugv_acceptance.bag.metadata import SUFFIXES, numbered, part_of
 from ugv_acceptance.campaign.marks import listed_mark, local_mark
 from ugv_acceptance.campaign.not_judged import words
 
@@ -27,7 +27,8 @@ class Source:
     """One recording: its name (path or URL as found), its files, and whether fsspec fetches them.
 
     The files of a rosbag2 folder include metadata.yaml. `marks` tell, for each file, whether it
-    changes (`marks.py`), '' where nothing tells that; () if nobody looked.
+    changes (`marks.py`) or what a killed recorder left beside it, '' where nothing tells that; ()
+    if nobody looked.
     """
 
     name: str
@@ -57,7 +58,10 @@ def find_sources(places: Iterable[str]) -> list[Source]:
         if is_url(place):
             marks = _remote_files(place, now_ns)
             sources = sorted_out(list(marks), remote=True)
-            marked = [replace(s, marks=tuple(marks[file] for file in s.files)) for s in sources]
+            marked = [
+                replace(s, marks=tuple(_listed_with_beside(marks, file) for file in s.files))
+                for s in sources
+            ]
         else:
             marked = [
                 replace(source, marks=_local_marks(source, now_ns))
@@ -88,13 +92,43 @@ def is_unchanged(source: Source) -> bool:
 
 
 def _local_marks(source: Source, now_ns: int) -> tuple[str, ...]:
-    return tuple(local_mark(file, now_ns) for file in source.files)
+    return tuple(
+        _joined(
+            local_mark(file, now_ns),
+            {
+                end: local_mark(file + end, now_ns)
+                for end in _beside(file)
+                if os.path.lexists(file + end)
+            },
+        )
+        for file in source.files
+    )
 
 
 def _looked_up(url: str, now_ns: int) -> str:
     system, path = _opened(url)
     system.invalidate_cache(path)
-    return listed_mark(system.info(path), now_ns)
+    ends = [end for end in _beside(url) if system.exists(path + end)]
+    left = {end: listed_mark(system.info(path + end), now_ns) for end in ends}
+    return _joined(listed_mark(system.info(path), now_ns), left)
+
+
+def _listed_with_beside(marks: Mapping[str, str], url: str) -> str:
+    """Return the mark of a listed file, with those of what a killed recorder left beside it."""
+    left = {end: marks[url + end] for end in _beside(url) if url + end in marks}
+    return _joined(marks[url], left)
+
+
+def _joined(mark: str, left: Mapping[str, str]) -> str:
+    """Return a file's mark with those of what is `left` beside it, by the ends of their names."""
+    if not all((mark, *left.values())):
+        return ''
+    return ' '.join([mark, *(f'{end} {other}' for end, other in left.items())])
+
+
+def _beside(file: str) -> Iterable[str]:
+    """Return by the ends of their names what a killed recorder may leave beside a file."""
+    return LEFT_BESIDE if file.lower().endswith('.db3') else ()
 
 
 def sorted_out(files: Sequence[str], *, remote: bool = False) -> list[Source]:
@@ -129,9 +163,12 @@ def _remote_files(url: str, now_ns: int) -> dict[str, str]:
     system, path = _opened(url)
     try:
         system.invalidate_cache()  # what this process listed before may have changed
-        listed = (
-            {path: system.info(path)} if system.isfile(path) else system.find(path, detail=True)
-        )
+        if system.isfile(path):
+            beside = (path + end for end in _beside(path))
+            files = [path, *(file for file in beside if system.exists(file))]
+            listed = {file: system.info(file) for file in files}
+        else:
+            listed = system.find(path, detail=True)
     except Exception as error:  # noqa: BLE001 - every protocol has its own errors
         raise AcceptanceError(f'{url}: cannot be listed ({words(error)})') from None
     return {
@@ -170,7 +207,8 @@ def local_paths(source: Source) -> Iterator[Path | list[Path]]:
 
 
 def _copied(source: Source, folder: Path) -> list[Path]:
-    run = folder / posixpath.basename(source.name)
+    # Named as where the files are: the name of a folder tells whether one file is a part.
+    run = folder / (posixpath.basename(posixpath.dirname(source.files[0])) or 'run')
     run.mkdir()
     copies = []
     for url in source.files:
@@ -178,8 +216,9 @@ def _copied(source: Source, folder: Path) -> list[Path]:
         copy = run / posixpath.basename(url)
         try:
             system.get_file(path, str(copy))
-            if url.lower().endswith('.db3'):
-                _copy_beside(system, path, copy)
+            for end in _beside(url):  # a part of the recording is in that
+                if system.exists(path + end):
+                    system.get_file(path + end, f'{copy}{end}')
         except FileNotFoundError as error:
             if run.is_dir():
                 raise BadBag(f'{url}: cannot be read ({words(error)})') from None
@@ -190,12 +229,15 @@ def _copied(source: Source, folder: Path) -> list[Path]:
     return copies
 
 
-def _copy_beside(system: Any, path: str, copy: Path) -> None:  # noqa: ANN401 - of fsspec
-    """Fetch what a killed recorder left beside an SQLite file, as its end is in that."""
-    for end in LEFT_BESIDE:
-        if system.exists(path + end):
-            system.get_file(path + end, f'{copy}{end}')
-
-
 def _openable(source: Source, files: list[Path]) -> Path | list[Path]:
-    return files[0].parent if source.files[-1].endswith(f'/{METADATA}') else files
+    folder = files[0].parent
+    whole = source.files[-1].endswith(f'/{METADATA}')
+    return folder if whole or _is_left_over(files) else files
+
+
+def _is_left_over(files: Sequence[Path]) -> bool:
+    """Return whether a file may be the only part of a recording that is left in its folder."""
+    part, folder = part_of(files[0].name), files[0].parent
+    if len(files) > 1 or part is None or part[0] != folder.name:
+        return False
+    return sum(path.name.lower().endswith(SUFFIXES) for path in folder.iterdir()) == 1

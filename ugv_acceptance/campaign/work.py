@@ -37,7 +37,8 @@ class Done:
     `row` and `text` are a new result's line and JSON, `key` alone says that it is known, `error`
     that it is unreadable (`missing`: a file of it is not there), `lost` that it was not judged for
     a reason that is not its own. `cpu` is the CPU time (s) of its process that it took. `sha256` is
-    the hash of its recording, '' where its files may have changed since they were listed.
+    the identity of its recording (`Bag.identity`), '' where its files may have changed since they
+    were listed.
     """
 
     source: Source
@@ -54,7 +55,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A result, its key, hash and size (bytes) of its recording; None: the result is known."""
+    """A result, its key, identity and size (bytes) of its recording; None: the result is known."""
 
     key: str
     sha256: str
@@ -62,10 +63,10 @@ class _Found:
     result: Json | None
 
 
-def key_of(bag_sha256: str, brief: Brief) -> str:
+def key_of(identity: str, brief: Brief) -> str:
     """Return the key of a result: a hash of recording, configuration, criteria and software."""
     criteria = brief.criteria.sha256 if brief.criteria else 'limits'
-    parts = (bag_sha256, brief.config.sha256, criteria, __version__, str(RESULT_VERSION))
+    parts = (identity, brief.config.sha256, criteria, __version__, str(RESULT_VERSION))
     return hashlib.sha256('\n'.join(parts).encode()).hexdigest()
 
 
@@ -117,7 +118,7 @@ def _failed(source: Source, paths: Path | list[Path], error: Exception) -> Done:
 
 def _judged(bag: Bag, brief: Brief) -> _Found:
     config, criteria = brief.config, brief.criteria
-    sha256 = bag.sha256()
+    sha256 = bag.identity()
     key = key_of(sha256, brief)
     size = sum(path.stat().st_size for path in bag.paths)
     if key in brief.known:

@@ -57,7 +57,7 @@ def _parts(bag: Path) -> Iterator[Path]:
 
     yield bag
     try:
-        files = files_of(bag)[0]
+        files = files_of(bag).files
     except (AcceptanceError, OSError):  # reported when it is read
         return
     for file in files:

@@ -1,12 +1,18 @@
-"""Which joints report rates that contradict their positions: an examination without objection."""
+"""Which joints report rates that contradict their positions.
+
+Rates that are wrong are not used. Where rates that were right tell of a motion of which the
+positions know nothing, the positions are wrong.
+"""
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ugv_acceptance.evaluation.criteria.statement import NotChecked, Statement
-from ugv_acceptance.evaluation.inputs.joint_rates import CELL, JointRate
+from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
+from ugv_acceptance.evaluation.criteria.statement import NotChecked, Objection, Statement
+from ugv_acceptance.evaluation.inputs.joint_rates import CELL, STUCK, JointRate
 from ugv_acceptance.evaluation.margin_table import MarginRows
+from ugv_acceptance.model.robot import Robot
 
 # Seconds of contradiction that are told.
 LEAST = 1.0
@@ -14,9 +20,9 @@ LEAST = 1.0
 
 @dataclass(slots=True)
 class ReportedRates:
-    """Tells at the end whose reported rates were not used; `rates` returns those of `names` (j)."""
+    """Tells at the end whose reported rates were not used; `rates` returns those of the joints."""
 
-    names: Sequence[str]
+    robot: Robot
     rates: Callable[[], Sequence[JointRate]]
 
     def add(self, rows: MarginRows) -> None:
@@ -24,17 +30,32 @@ class ReportedRates:
 
     def statement(self, start: int, end: int) -> Statement:
         """Return which reported rates contradicted the positions, and by how much."""
-        del start, end
+        del end
+        every = list(zip(self.robot.joint_names, self.rates(), strict=True))
         told = [
             (name, rate.doubted * CELL / 1e9, rate.factor)
-            for name, rate in zip(self.names, self.rates(), strict=True)
+            for name, rate in every
             if rate.doubted * CELL / 1e9 >= LEAST
         ]
         return Statement(
+            objections=tuple(
+                Objection('joint_positions', INCONCLUSIVE, self._stuck(name, rate, start))
+                for name, rate in every
+                if rate.stuck >= STUCK
+            ),
             not_checked=tuple(
                 NotChecked(f'reported velocity of {name}', _why(factor), seconds)
                 for name, seconds, factor in told
-            )
+            ),
+        )
+
+    def _stuck(self, name: str, rate: JointRate, start: int) -> str:
+        slides = self.robot.joint(name).slides
+        by = f'{rate.stuck:.2f} m' if slides else f'{math.degrees(rate.stuck):.0f} deg'
+        return (
+            f'the position of {name} stands still to the last digit until '
+            f'{(rate.stuck_at - start) / 1e9:.2f} s, while its velocity, which agreed with it '
+            f'before, shows a motion of {by}'
         )
 
 

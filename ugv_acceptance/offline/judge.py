@@ -6,7 +6,7 @@ from typing import Any
 
 from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts
-from ugv_acceptance.bag.recording import Recording
+from ugv_acceptance.bag.recording import NAMES, Names, Recording
 from ugv_acceptance.evaluation.advice.recorded import AlertAdvice
 from ugv_acceptance.evaluation.alerts.state_machine import Alert
 from ugv_acceptance.evaluation.carrying import CarryingJoints, name_measured
@@ -41,6 +41,7 @@ from ugv_acceptance.offline.evaluation import Judgement
 from ugv_acceptance.offline.recorded_transforms import with_transforms
 from ugv_acceptance.offline.stretches import stretches
 from ugv_acceptance.offline.training import TrainingRecord
+from ugv_acceptance.offline.unread_load import unread_load
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
@@ -103,11 +104,13 @@ def judge(
     _explain_silence(log, topics, batches.facts)
     data = {
         **result_of(reading.summary, log, bag.start_ns, length, reading.told.sentences()),
-        'bag': _bag_result(bag, topics, batches.facts),
+        'bag': _bag_result(recording, topics, batches.facts),
         'inputs': _inputs_result(evaluator, topics, batches.facts, bag.start_ns),
     }
     statements = [*statements, *(e.statement(*span) for e in reading.examinations)]
     statements.append(absent_imu(settings, topics.imu))
+    configured = recording.names or NAMES
+    statements.append(unread_load(bag, topics, configured[-1], batches.facts))
     statements.append(untold_joints(settings, evaluator.joints.never_told))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:
@@ -140,7 +143,7 @@ def _examinations(
         InputTimes(),
         CarryingJoints(settings, limits.payloads.at, lambda: evaluator.carrying),
         TouchExamination(),
-        ReportedRates(settings.robot.joint_names, lambda: evaluator.rates),
+        ReportedRates(settings.robot, lambda: evaluator.rates),
         GroundExamination(settings, criteria, evaluator.watch.trend, evaluator.watch.log),
     )
 
@@ -231,7 +234,8 @@ def _explain_silence(log: Sequence[Alert], topics: Topics, facts: Facts) -> None
                 alert.detail = f'{count} of {total} are malformed; the first: {reason}'
 
 
-def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
+def _bag_result(recording: Recording, topics: Topics, facts: Facts) -> dict[str, Any]:
+    bag, names = recording.bag, recording.names or NAMES
     return {
         'path': [str(path) for path in bag.paths],
         'sha256': bag.sha256(),
@@ -239,22 +243,26 @@ def _bag_result(bag: Bag, topics: Topics, facts: Facts) -> dict[str, Any]:
         'messages': {name: topic.count for name, topic in bag.topics.items()},
         'protected': bag.protected,
         'salvaged': bag.salvaged,
-        'lost_messages': _lost(bag, topics, facts),
+        'lost_messages': _lost(bag, topics, names, facts),
         'findings': [*bag.findings, *facts.findings],
     }
 
 
-def _lost(bag: Bag, topics: Topics, facts: Facts) -> int:
+def _lost(bag: Bag, topics: Topics, configured: Names, facts: Facts) -> int:
     """Return how many messages metadata.yaml or the index of the file counts that were not read.
 
-    Only of the topics read here: losing a camera's messages does not affect the verdict. Where only
-    the beginning was asked for, those that metadata.yaml counts and the index does not.
+    Only of the topics read here: losing a camera's messages does not affect the verdict. Of those
+    that are not in the files at all, by the `configured` names. Where only the beginning was asked
+    for, those that metadata.yaml counts and the index does not.
     """
+    meant = {name.lstrip('/') for name in configured if name is not None}
+    absent = {name: count for name, count in bag.promised.items() if name not in bag.topics}
+    gone = sum(count for name, count in absent.items() if name.lstrip('/') in meant)
     names = (topics.joint_states, topics.imu, topics.payload)
     held = {name: bag.topics[name].count for name in names if name in bag.topics}
     counted = {name: max(bag.promised.get(name, 0), count) for name, count in held.items()}
     read = facts.counts if bag.until_ns is None else held
-    return sum(max(0, count - read.get(name, 0)) for name, count in counted.items())
+    return gone + sum(max(0, count - read.get(name, 0)) for name, count in counted.items())
 
 
 def _inputs_result(

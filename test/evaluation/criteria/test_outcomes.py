@@ -24,6 +24,7 @@ S = 1_000_000_000
 QUIET = made(seconds(0, 1), until=seconds(1, 10))
 BELOW = Value('torque', 'lift', below=True, limit=25.0)
 COVERED = {
+    'bag': {'salvaged': None, 'lost_messages': 0},
     'coverage': {'fraction': 0.987, 'duration_s': 10.0, 'unseen_s': [], 'unseen_stretches': 0},
     'stability': {'min_angle_deg': 20.0},
     'torque': {},

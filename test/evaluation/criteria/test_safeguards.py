@@ -33,6 +33,7 @@ QUIET = made(seconds(0, 1), until=seconds(1, 10))
 # Demands nothing.
 NOTHING = DataDemand('duration', least=0.0)
 GOOD: dict[str, Any] = {
+    'bag': {'salvaged': None, 'lost_messages': 0},
     'coverage': {
         'fraction': 0.99, 'duration_s': 10.0, 'unseen_s': [], 'unseen_stretches': 0,
         'longest_unseen_s': 0.2,
@@ -51,6 +52,9 @@ BLIND = {
         'longest_unseen_s': 1.4,
     },
 }
+CUT = {**GOOD, 'bag': {**GOOD['bag'], 'salvaged': 'run_0 is missing'}}
+LOSSY = {**GOOD, 'bag': {**GOOD['bag'], 'lost_messages': 7}}
+SHORT = {**GOOD, 'coverage': {**GOOD['coverage'], 'duration_s': 0.4}}
 
 
 def judged(data: Any, demand: Demand = NOTHING, **options: Any) -> Any:
@@ -69,6 +73,8 @@ def judged(data: Any, demand: Demand = NOTHING, **options: Any) -> Any:
         (TIPPED, 'FAIL', '2.5 deg past tipping: LEFT at 3.00 s'),
         (OVER, 'FAIL', 'lift 100 % of its limit at 4.00 s: it needs 45.0 of 45.0 N m'),
         (BLIND, 'INCONCLUSIVE', 'no margins from 1.00 to 2.40 s (1.40 s)'),
+        (CUT, 'INCONCLUSIVE', 'the recording is not whole: run_0 is missing'),
+        (LOSSY, 'INCONCLUSIVE', '7 messages are missing'),
     ],
 )
 def test_what_criteria_do_not_ask_for_counts(data: Any, verdict: str, reason: str) -> None:
@@ -80,7 +86,13 @@ def test_what_criteria_do_not_ask_for_counts(data: Any, verdict: str, reason: st
 
 @pytest.mark.parametrize(
     ('data', 'name'),
-    [(TIPPED, 'tipping'), (OVER, 'torque_limit'), (BLIND, 'unseen_stretches')],
+    [
+        (TIPPED, 'tipping'),
+        (OVER, 'torque_limit'),
+        (BLIND, 'unseen_stretches'),
+        (CUT, 'recording'),
+        (LOSSY, 'recording'),
+    ],
 )
 def test_a_waiver_stands_in_the_first_line(data: Any, name: str) -> None:
     """With its reason; what it waives stays on record with the verdict it had."""
@@ -105,6 +117,17 @@ def test_criteria_may_say_how_long_a_stretch_without_margins_may_be() -> None:
     assert judged(BLIND, DataDemand('longest_unseen', most=1.3))['verdict'] == 'INCONCLUSIVE'
 
 
+def test_criteria_may_say_how_much_of_a_recording_may_be_missing() -> None:
+    """Their own demand replaces the safeguard's, each for its own quantity."""
+    assert judged(LOSSY, DataDemand('lost_messages', most=9.0))['verdict'] == 'PASS'
+    assert judged(LOSSY, DataDemand('lost_messages', most=6.0))['verdict'] == 'INCONCLUSIVE'
+    assert judged(LOSSY, DataDemand('salvaged', most=1.0))['verdict'] == 'INCONCLUSIVE'
+    assert judged(CUT, DataDemand('salvaged', most=1.0))['verdict'] == 'PASS'
+    assert judged(SHORT, DataDemand('duration', least=0.3))['verdict'] == 'PASS'
+    of = judged(SHORT, DataDemand('salvaged', most=0.0))
+    assert (of['verdict'], of['reasons'][0]) == ('INCONCLUSIVE', 'the recording lasts 0.4 s')
+
+
 def test_a_failed_criterion_is_not_said_twice() -> None:
     """The reasons name the tilt once where a criterion failed on it as well."""
     rows = made(seconds(0, 1), until=seconds(1, 10), angle=[(1.0, -0.04, 1.0, 1.0)] * 2)
@@ -121,6 +144,21 @@ def test_an_alert_that_is_an_objection_is_one() -> None:
     found = judged(GOOD, alerts=stuck)
     assert found['verdict'] == 'INCONCLUSIVE'
     assert [r for r in found['reasons'] if 'lift' in r] == found['reasons'][:1]
+
+
+@pytest.mark.parametrize(
+    ('code', 'subject', 'words'),
+    [('TIP_AHEAD', 'left', 'it tips within'), ('TORQUE_AHEAD', 'lift', 'lift')],
+)
+def test_a_recording_does_not_end_on_the_way_to_a_limit(
+    code: str, subject: str, words: str
+) -> None:
+    """A limit is passed within a second of the last message, or not: nobody saw which."""
+    assert judged(GOOD, alerts=[alert(code, subject, 8.0, 9.0)])['verdict'] == 'PASS'
+    found = judged(GOOD, alerts=[alert(code, subject, 9.8, None)])
+    assert found['verdict'] == 'INCONCLUSIVE'
+    assert found['reasons'][0].startswith('the recording ends too early: ')
+    assert words in found['reasons'][0]
 
 
 def test_what_an_examination_states_counts() -> None:

@@ -179,6 +179,31 @@ def test_a_foreign_frame_takes_gravity_away_at_once(frame: str, found: set[str])
     assert not unusable
 
 
+@pytest.mark.parametrize(
+    ('frames', 'foreign'),
+    [
+        (('r1/imu_link', 'r2/imu_link'), [50, 51]),
+        (('/r1/imu_link', 'r1/imu_link'), []),
+        (('imu_link', 'r1/imu_link'), []),
+        (('', 'r1/imu_link'), []),
+        (('fleet/r1/imu_link', 'r1/imu_link'), [50, 51]),
+    ],
+)
+def test_the_frame_of_another_robot_is_foreign(frames: tuple[str, str], foreign: list[int]) -> None:
+    """The expected frame with another prefix than at first: gravity is gone, live and recorded."""
+    told = settings(ImuInput(frame='imu_link'))
+    message = Imu(T0, LEAN, STILL, upright(LEAN))
+    run = [replace(message, time=T0 + 10 * k * MS, frame=frames[k >= 50]) for k in range(52)]
+    one, many = (ImuTracker(told, RuleSet(told).attitude) for _ in range(2))
+    steps = [
+        one.step(m.time, m.time, m.orientation, 0.0, m.omega, m.acceleration, m.frame)[0]
+        for m in run
+    ]
+    rows = many.columns([imu_columns(run[50:]), imu_columns(run[:50])])
+    assert [k for k, g in enumerate(steps) if not math.isfinite(g[0])] == foreign
+    assert np.flatnonzero(np.isnan(rows.gravity[:, 0])).tolist() == foreign
+
+
 def test_gravity_is_gone_from_the_alert_on_until_the_alert_ends() -> None:
     """Half a second after it began to disagree; a second after it agreed again, to the message."""
     told = settings(ImuInput(agreement_delay=0.5))

@@ -3,11 +3,18 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from evaluation.streams import MS, T0, Imu, Joints, Message, S, live, recorded, settings, split
 
+import ugv_acceptance as ugv
+from ugv_acceptance.bag.cdr import JOINT_STATE, Decoder
+from ugv_acceptance.bag.encode import joint_state_cdr
+from ugv_acceptance.bag.raw import messages
+from ugv_acceptance.bag.reader import open_bag
+from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.evaluation.inputs.joint_rates import JointRate
 from ugv_acceptance.type_aliases import Floats
 
@@ -96,3 +103,66 @@ def test_a_fast_joint_is_found_without_its_velocity(velocity: tuple[float, ...])
         assert found.rule.subject == 'lift'
         assert found.peak == pytest.approx(1.0)
         assert 2.2 <= (found.start - T0) / S <= 2.6
+
+
+STUCK_AT = 4.0
+
+
+def stuck(t: float) -> float:
+    """Turn by 0.3 rad/s; from then on the encoder repeats one number."""
+    return 0.3 * min(t, STUCK_AT)
+
+
+@pytest.mark.parametrize(
+    ('position', 'reported', 'told'),
+    [
+        (stuck, lambda _: 0.3, 0.3 * (10.0 - STUCK_AT)),
+        (stuck, lambda t: 0.3 if t < STUCK_AT + 3.0 else 0.0, 0.9),
+        (stuck, lambda t: 0.3 if t < STUCK_AT + 0.5 else 0.0, 0.0),
+        (stuck, lambda t: 0.3 if t < STUCK_AT else 0.02, 0.0),
+        (stuck, lambda t: 0.3 if t < STUCK_AT else 0.1 * math.sin(40.0 * t), 0.0),
+        (lambda _: 1.0, lambda _: 0.3, 0.0),
+        (lambda t: 0.3 * t, lambda _: 0.3, 0.0),
+        (lambda t: 0.3 * t, lambda _: 17.2, 0.0),
+    ],
+)
+def test_a_motion_that_only_a_proven_rate_tells(
+    position: Callable[[float], float], reported: Callable[[float], float], told: float
+) -> None:
+    """Summed up while the position stands still to the last bit; not noise, nor a rate unproven."""
+    seconds = np.arange(500) / 50
+    time = T0 + (seconds * 1e9).astype(np.int64)
+    q = np.array([position(t) for t in seconds])
+    qd = np.array([reported(t) for t in seconds])
+    found = []
+    for parts in ([slice(None)], [slice(k, k + 37) for k in range(0, 500, 37)]):
+        rate = JointRate(0.0)
+        for part in parts:
+            rate.columns(time[part], time[part], q[part], qd[part])
+        found.append(rate.stuck)
+    assert found[0] == pytest.approx(found[1])
+    assert found[0] == pytest.approx(told, abs=0.07)
+
+
+def test_an_encoder_that_stands_still_while_its_joint_turns_is_no_pass(
+    repository: Path, tmp_path: Path
+) -> None:
+    """Without any effort: the positions of a recorded run freeze, its velocities go on."""
+    bag = open_bag(repository / 'bags' / 'packbot_pass')
+    frozen: tuple[float, ...] = ()
+    with BagWriter(tmp_path / 'run') as writer:
+        for name, topic in bag.topics.items():
+            writer.add_topic(name, topic.type)
+        decoder = Decoder(JOINT_STATE)
+        for message in messages(bag, bag.topics):
+            data = message.data
+            if message.topic == '/joint_states':
+                told = decoder.one(data)
+                if message.log_time >= bag.start_ns + 10 * S:
+                    frozen = frozen or told.position
+                now = frozen or told.position
+                data = joint_state_cdr(told.stamp, '', told.names, now, told.velocity, [])
+            writer.write(message.topic, message.log_time, data)
+    found = ugv.evaluate(tmp_path / 'run')
+    assert found.verdict == 'INCONCLUSIVE'
+    assert 'stands still to the last digit until' in found.reasons[0]

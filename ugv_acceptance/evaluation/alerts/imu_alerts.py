@@ -5,7 +5,8 @@ from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 
 IMU_ALERTS = {
     'IMU_FRAME': AlertText(
-        'the frame_id of {subject} is not the one in the configuration',
+        'the frame_id of {subject} is not the one in the configuration, or has another prefix '
+        'than before',
         'check that this is the IMU whose mounting is configured; if so, set topics.imu.frame_id',
         FailureSource.DESIGN,
         'The data are not from the IMU that was configured: tilt cannot be trusted.',

@@ -85,7 +85,8 @@ def _gaps(tracker: ImuTracker, tally: Tally, rate: float) -> Iterator[NotChecked
         yield NotChecked(
             'tilt errors',
             'an orientation wrong by less than about 9 degrees (5 at rest), for less '
-            'than 2 s, or by an IMU mounted up to 45 degrees wrong is not found'
+            'than 2 s, or by an IMU mounted up to 45 degrees wrong (turned about its upright '
+            'axis: by any angle) is not found'
             if given else 'no window held the orientation against the acceleration',
         )  # fmt: skip
     yield from _rate_gaps(tracker, tally, rate)

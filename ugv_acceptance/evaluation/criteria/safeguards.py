@@ -16,6 +16,7 @@ from ugv_acceptance.evaluation.criteria.criteria import (
     CAUTIOUS,
     FAIL,
     INCONCLUSIVE,
+    LEAST_DURATION,
     LONGEST_UNSEEN,
     PASS,
     TREND,
@@ -33,6 +34,7 @@ SAFEGUARDS = {
     'ground': 'on uneven ground and stairs tip-over is judged by a rule that the criteria accept',
     'torque_limit': 'no joint needs more torque than its limit',
     'unseen_stretches': f'no stretch of over {LONGEST_UNSEEN:g} s is without margins',
+    'recording': 'the recording is whole, lasts a second, and does not end on the way to a limit',
     'chassis_acceleration': 'no acceleration of the chassis tips the robot or lifts its tracks',
     'static_model': 'joints move slowly enough for margins that assume they rest',
     'measured_effort': 'no measured effort reaches the limit of its joint',
@@ -49,6 +51,9 @@ ALERT_OBJECTIONS: dict[str, tuple[str, str]] = {
     'INPUT_SLOW': ('unseen_stretches', INCONCLUSIVE),
     'ARM_ON_GROUND': ('ground_contact', INCONCLUSIVE),
 }
+# A limit will be passed within a second: nobody saw whether it was, where these alerts are
+# active at the end.
+_AHEAD = ('TIP_AHEAD', 'TORQUE_AHEAD')
 # What a criterion on values is about, and the safeguard that would say the same again.
 _SAID_BY = {
     'tip_angle': 'tipping',
@@ -85,6 +90,7 @@ def safeguarded(
     found = [
         *_from_margins(data),
         *_unseen(criteria, data),
+        *_not_whole(criteria, data),
         *_from_alerts(alerts, settings, {key for x in statements for key in x.unfounded}, start),
         *(objection for statement in statements for objection in statement.objections),
     ]
@@ -131,11 +137,42 @@ def _unseen(criteria: CriteriaSet, data: Json) -> Iterator[Objection]:
     yield Objection('unseen_stretches', INCONCLUSIVE, f'no margins from {named}{more}')
 
 
+def _not_whole(criteria: CriteriaSet, data: Json) -> Iterator[Objection]:
+    """Object to a recording of which something is missing, unless a criterion says how much may.
+
+    In the words of the criteria that hold without a file, which then say the same.
+    """
+    demanded = {c.demand.quantity for c in criteria.criteria if isinstance(c.demand, DataDemand)}
+    bag, seconds = data['bag'], data['coverage']['duration_s']
+    words = {
+        'salvaged': bag['salvaged'] and salvaged_words(data),
+        'lost_messages': bag['lost_messages'] and lost_words(data),
+        'duration': seconds < LEAST_DURATION and f'the recording lasts {seconds:.3g} s',
+    }
+    for quantity, reason in words.items():
+        if reason and quantity not in demanded:
+            yield Objection('recording', INCONCLUSIVE, reason)
+
+
+def salvaged_words(data: Json) -> str:
+    """Return in words why a recording is not whole."""
+    return f'the recording is not whole: {data["bag"]["salvaged"]}'
+
+
+def lost_words(data: Json) -> str:
+    """Return in words how many messages are missing."""
+    lost = data['bag']['lost_messages']
+    return f'{lost} messages are missing that metadata.yaml or the index of the file counts'
+
+
 def _from_alerts(
     alerts: Sequence[Alert], settings: Settings, unfounded: set[tuple[str, str]], start: int
 ) -> Iterator[Objection]:
     seen = set(unfounded)
     for alert in alerts:
+        if alert.rule.code in _AHEAD and alert.end is None:
+            words = describe(alert, settings, start)
+            yield Objection('recording', INCONCLUSIVE, f'the recording ends too early: {words}')
         told = ALERT_OBJECTIONS.get(alert.rule.code)
         if told is None or (alert.rule.code, alert.rule.subject) in seen:
             continue

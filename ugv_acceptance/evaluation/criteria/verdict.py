@@ -45,9 +45,11 @@ from ugv_acceptance.evaluation.criteria.not_judged import kept_words
 from ugv_acceptance.evaluation.criteria.quantities import OF_TIPPING, measured_of, shown, unit_of
 from ugv_acceptance.evaluation.criteria.safeguards import (
     Safeguarded,
+    lost_words,
     reasons_of,
     safeguarded,
     safeguards_result,
+    salvaged_words,
     waived_words,
 )
 from ugv_acceptance.evaluation.criteria.statement import NotChecked
@@ -364,10 +366,9 @@ def _unmet_words(
             f'evaluated ({percent_words(demand.least)} needed)'
         )
     if demand.quantity == 'salvaged':
-        return f'the recording is truncated: {data["bag"]["salvaged"]}'
+        return salvaged_words(data)
     if demand.quantity == 'lost_messages':
-        lost = data['bag']['lost_messages']
-        return f'{lost} messages are missing that metadata.yaml or the index of the file counts'
+        return lost_words(data)
     unit = unit_of(demand.quantity)
     texts = {k: 'unknown' if x is None else f'{x:.4g} {unit}'.strip() for k, x in unmet.items()}
     numbers = ', '.join(f'{k} {text}'.removeprefix('run ') for k, text in texts.items())

@@ -4,9 +4,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ugv_acceptance.model.expressions import Mat, add, matmul, rotate, subtract, transpose
 from ugv_acceptance.model.robot import IDENTITY, ZERO, Matrix, Robot, Vector
 from ugv_acceptance.model.tree import plain, tree_of
+from ugv_acceptance.type_aliases import Floats
 
 # A transform as /tf_static tells it: parent, child, origin (m) and axes of the child in the parent.
 Transform: TypeAlias = tuple[str, str, Vector, Matrix]
@@ -19,6 +23,36 @@ def same_frame(named: str, expected: str) -> bool:
     """
     bare = named.lstrip('/')
     return bare == expected or bare.endswith(f'/{expected}')
+
+
+@dataclass(slots=True)
+class FrameCheck:
+    """Whether messages name the frame expected; `prefix` is that with which they first did.
+
+    Two prefixes are two robots. A message without a frame or prefix contradicts nothing.
+    """
+
+    prefix: str = ''
+
+    def foreign(self, named: str, expected: str) -> float:
+        """Return 1 if a message names another frame, or the one of another robot; else 0."""
+        bare = named.lstrip('/')
+        if not expected or not bare:
+            return 0.0
+        if not same_frame(bare, expected):
+            return 1.0
+        prefix = bare.removesuffix(expected)
+        self.prefix = self.prefix or prefix
+        return float(prefix not in {'', self.prefix})
+
+    def rows(self, named: NDArray[np.str_], expected: str) -> Floats:
+        """Return `foreign` of many messages (n,), in order of receipt."""
+        names, first, of = np.unique(named, return_index=True, return_inverse=True)
+        found = np.zeros(len(names))
+        for k in np.argsort(first).tolist():
+            found[k] = self.foreign(str(names[k]), expected)
+        rows: Floats = found[of]
+        return rows
 
 
 def without_prefix(frame: str, prefix: str) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ugv_acceptance.evaluation.alerts.state_machine import WARN, Alert, Signal, feed
-from ugv_acceptance.evaluation.inputs.frames import same_frame
+from ugv_acceptance.evaluation.inputs.frames import FrameCheck
 from ugv_acceptance.evaluation.inputs.imu_cell import A, Q, W
 from ugv_acceptance.evaluation.inputs.imu_grid import samples
 from ugv_acceptance.evaluation.inputs.imu_motion import MotionChecks, MotionSignals
@@ -100,6 +100,7 @@ class ImuTracker:
     _up: UpKernels = field(init=False)
     _frame: str | None = None
     _foreign: float = 0.0
+    _expected: FrameCheck = field(default_factory=FrameCheck)
     _busy: bool = False
 
     def __post_init__(self) -> None:
@@ -186,7 +187,8 @@ class ImuTracker:
     def _take_frame(self, now: int, frame: str) -> None:
         if self._frame is not None:
             self.motion.frame(now)
-        self._frame, self._foreign = frame, _foreign(frame, self.settings.imu.frame)
+        self._frame = frame
+        self._foreign = self._expected.foreign(frame, self.settings.imu.frame)
 
     def _judge(self, now: int, empty: float, strange: float, apart: float) -> bool:
         """Feed the fault signals with a message; return whether a fault makes gravity unknown."""
@@ -218,12 +220,13 @@ class ImuTracker:
         acceleration = _lines([s.linear_acceleration for s in columns])[:, order]
         frame = self.settings.imu.frame
         if len({s.frame_id for s in columns}) == 1:
-            foreign = np.full(len(time), _foreign(columns[0].frame_id, frame))
-            self._take_frames(time, np.array([columns[0].frame_id]))
+            names = np.array([columns[0].frame_id])
+            foreign = np.full(len(time), self._expected.rows(names, frame))
         else:
             lengths = [len(s.log_time) for s in columns]
-            foreign = np.repeat([_foreign(s.frame_id, frame) for s in columns], lengths)[order]
-            self._take_frames(time, np.repeat([s.frame_id for s in columns], lengths)[order])
+            names = np.repeat([s.frame_id for s in columns], lengths)[order]
+            foreign = self._expected.rows(names, frame)
+        self._take_frames(time, names)
         self.seen.take(columns, omega)
         with np.errstate(all='ignore'):
             smooth = self.low_pass.columns(stamp, acceleration)
@@ -344,12 +347,6 @@ def spans(signal: Signal, before: Alert | None, seen: int) -> Iterator[tuple[flo
             continue
         if (alert.rule.code, alert.rule.subject) == (rule.code, rule.subject):
             yield alert.start, math.inf if alert.end is None else alert.end
-
-
-def _foreign(frame: str, expected: str) -> float:
-    """Return 1 if a message names another frame than `expected` (a namespace may precede)."""
-    told = expected and frame.lstrip('/')
-    return 1.0 if told and not same_frame(frame, expected) else 0.0
 
 
 def _is_rotation(x: Values, y: Values, z: Values, w: Values) -> Values:

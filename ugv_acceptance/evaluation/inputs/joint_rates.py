@@ -7,7 +7,7 @@ the slope takes its place.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,14 @@ TOGETHER = 250_000_000
 # Two rates contradict each other if they differ by more than SHARE of the larger one and FLOOR
 # (rad/s, m/s). Below twice the FLOOR nothing is proven.
 SHARE, FLOOR = 0.5, 0.1
+# A position that stands still to the last bit for so many cells, while a rate that was proven keeps
+# telling of a motion (rad/s, m/s), by so much in all (rad, m), is not that of the joint.
+STILL, SLOWEST, STUCK = 5, 0.05, 0.2
 NEVER = -1
 DOUBTED, UNPROVEN, PROVEN = -1, 0, 1
+
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(slots=True)
@@ -32,7 +38,8 @@ class JointRate:
 
     `turn` is the angle (rad) after which positions may be wrapped, 0: they are not. `doubted` is
     the number of cells in which the reported rate contradicted the positions, `factor` by how much
-    it last was larger (NaN: not known).
+    it last was larger (NaN: not known). Of columns, `stuck` is the largest motion (rad, m) that a
+    rate told, once proven, while the position stood still, and `stuck_at` the end of it (ns).
     """
 
     turn: float
@@ -41,6 +48,10 @@ class JointRate:
     trust: int = UNPROVEN
     doubted: int = 0
     factor: float = math.nan
+    stuck: float = 0.0
+    stuck_at: int = NEVER
+    _proven: bool = False
+    _still: dict[int, tuple[float, int]] = field(default_factory=dict)
     _time: int = NEVER
     _stamp: int = 0
     _q: float = math.nan
@@ -146,8 +157,33 @@ class JointRate:
             last = int(np.flatnonzero(wrong)[-1])
             self.doubted += int(wrong.sum())
             self.factor = float(mean[last] / slope[last]) if slope[last] else math.nan
+        if len(q) > 1:
+            gone = np.where(fresh, np.inf, np.where(judged, way, np.nan))
+            self._stand(times[1:], gone, mean, seconds, right)
         says = np.where(wrong, DOUBTED, np.where(right, PROVEN, UNPROVEN))
         return np.where(fresh, np.nan, slope), says, ~fresh & ~judged
+
+    def _stand(self, time: Times, way: Floats, rate: Floats, seconds: Floats, right: Mask) -> None:
+        """Take cells (n,): way (rad, m) in so many seconds, the mean `rate` told, if it is `right`.
+
+        Cells that tell nothing (way NaN) neither end a standstill nor count.
+        """
+        proven = np.logical_or.accumulate(right) | self._proven
+        self._proven = bool(proven[-1])
+        stands = (way == 0.0) & proven
+        for sign in (1, -1):
+            still = stands & (sign * rate >= SLOWEST)
+            ends = ~np.isnan(way) & ~still
+            sums, cells = np.cumsum(np.where(still, sign * rate * seconds, 0.0)), np.cumsum(still)
+            last = np.maximum.accumulate(np.where(ends, np.arange(len(ends)), NEVER))
+            before, number = self._still.get(sign, (0.0, 0))
+            sums -= np.where(last == NEVER, -before, sums[last])
+            cells -= np.where(last == NEVER, -number, cells[last])
+            self._still[sign] = float(sums[-1]), int(cells[-1])
+            most = np.where(cells >= STILL, sums, 0.0)
+            at = int(most.argmax())
+            if most[at] > self.stuck:
+                self.stuck, self.stuck_at = float(most[at]), int(time[at])
 
 
 def _agree(a: float, b: float) -> bool:
