@@ -68,8 +68,14 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
         return f'{where}: expected this key, got none'
     if 'error' in context:
         return f'{where}: {context["error"]}'
+    if error['type'] in ('dict_type', 'model_type'):
+        return f'{where}: expected keys with values, got {_given(error["input"])}'
     text = error['msg'].replace('Input should be', 'expected', 1)
     return f'{where}: {text}, got {shown(error["input"])}'
+
+
+def _given(value: object) -> str:
+    return 'nothing' if value is None else shown(value)
 
 
 def settings_from(build: Build) -> Settings:
