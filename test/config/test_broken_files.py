@@ -72,3 +72,27 @@ def test_a_record_of_a_drill_that_is_no_json(tmp_path: Path, content: str, got: 
     path.write_text(content, 'utf-8')
     with pytest.raises(AcceptanceError, match=rf'from drill --out\), got {got}'):
         read_record(path)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'words'),
+    [
+        ('{name: two}', '{name: 5}', 'robot.name: expected a text, got 5'),
+        ('{name: two}', "{name: ''}", 'robot.name: expected a text that is not empty, got ""'),
+        (
+            '{name: two}',
+            '{name: two}\ntopics: {imu: {name: imu 1}}',
+            'expected a topic such as /arm/',
+        ),
+    ],
+)
+def test_a_value_of_another_kind_is_told_without_words_of_a_library(
+    tmp_path: Path, old: str, new: str, words: str
+) -> None:
+    """No pattern, no valid string: what is expected, and what came."""
+    text = write_robot(tmp_path).read_text('utf-8')
+    assert old in text
+    (tmp_path / 'two.yaml').write_text(text.replace(old, new, 1), 'utf-8')
+    with pytest.raises(BadConfig) as caught:
+        load(tmp_path / 'two.yaml')
+    assert words in str(caught.value)

@@ -100,7 +100,7 @@ def init(
     contacts: Annotated[
         str | None,
         typer.Option(
-            help='What touches the ground: yes (as found), no, LINK,LINK.',
+            help='What touches the ground: yes (as found), no, none, LINK,LINK.',
             autocompletion=words_like('yes', 'no'),
         ),
     ] = None,
