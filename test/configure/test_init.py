@@ -398,3 +398,16 @@ def swivelling() -> str:
     caster = wheel('caster', '-0.03 0 -0.05', tyre(0.05, 0.02), parent='fork')
     imu = link('imu_link') + joint('imu_link', '0 0 0.1', 'fixed')
     return small_rover(shape(box(0.5, 0.3, 0.1), '0 0 0.15'), pair, fork + caster + imu)
+
+
+def test_what_is_open_is_named_with_what_it_costs(tmp_path: Path) -> None:
+    """Of the mass alone the URDF's stands in; what else is open is not checked."""
+    mass = init(tmp_path, rover())
+    assert mass.returncode == 3
+    assert mass.stdout.startswith("NOT done, open: mass; the URDF's is taken\n")
+    arm = init(tmp_path, arm_alone(), '--mass', 'urdf', '--overwrite')
+    assert arm.returncode == 3
+    first = arm.stdout.splitlines()[0]
+    assert first.startswith('NOT done, open: ')
+    assert 'contacts' in first
+    assert 'mass' not in first
