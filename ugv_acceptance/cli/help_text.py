@@ -57,7 +57,7 @@ def _plain(error: Any) -> str:  # noqa: ANN401 - see usage_text
     if wrong is None:
         return message
     what = wrong['what'].replace('a valid integer', 'a whole number').replace('a valid', 'a')
-    told = getattr(error.__cause__ or error.__context__, 'errors', list)()
+    told: list[Any] = getattr(error.__cause__ or error.__context__, 'errors', list)()
     got = f', got {told[0]["input"]}' if told else ''
     return f'{wrong["option"]}: expected {what}{got}'
 
