@@ -174,6 +174,19 @@ def test_no_file_names_a_machine_or_a_registry(repository: Path) -> None:
     assert not found
 
 
+def test_files_that_pages_name_are_there(repository: Path) -> None:
+    """Tests and modules in backticks, and the targets of links, on every page."""
+    tracked = [f'/{path.relative_to(repository).as_posix()}' for path in tracked_files(repository)]
+    missing = []
+    for page in [repository / 'README.md', *repository.glob('docs/**/*.md')]:
+        text = page.read_text('utf-8')
+        named = re.findall(r'`((?:[a-z_]+/)*\w+\.py)`', text)
+        missing += [n for n in named if not any(path.endswith(f'/{n}') for path in tracked)]
+        targets = re.findall(r'\]\((?!http)([^)#:]+)[^)]*\)', text)
+        missing += [f'{page.name}: {at}' for at in targets if not (page.parent / at).exists()]
+    assert not missing
+
+
 def test_the_benches_start_as_it_is_written(repository: Path) -> None:
     """Each command that names one finds it, from the root of the checkout, with what it imports."""
     pages = [*repository.glob('docs/**/*.md'), *repository.glob('bench/**/*.py')]

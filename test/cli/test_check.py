@@ -51,6 +51,18 @@ def test_a_motion_is_permitted_with_its_margins(reach: Path) -> None:
     assert found['conditions']['payload_kg'] == 0.0
 
 
+def test_the_answer_on_the_page_is_that_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The motion on docs/check.md is the file, and what it prints is what the page shows."""
+    monkeypatch.chdir(Path(__file__).resolve().parents[2])
+    page, example = Path('docs/check.md').read_text('utf-8'), 'docs/examples/reach.yaml'
+    _, _, motion = Path(example).read_text('utf-8').partition('\n')
+    assert f'```yaml\n{motion}```' in page
+    shown = page.partition(f'$ ugv-acceptance check {example} {" ".join(FOLDED)}\n')[2]
+    done = ugv('check', example, *FOLDED)
+    assert done.returncode == 1
+    assert done.stdout.startswith(shown.partition('```')[0])
+
+
 def test_a_load_that_is_too_heavy_is_refused(reach: Path) -> None:
     """Exit code 1; the first line names the file, a sentence the joint and its torque."""
     done = ugv('check', reach, *FOLDED, '--payload', '15kg')

@@ -4,11 +4,13 @@ import inspect
 import re
 import shlex
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
 import typer
 from cli.here import ugv
+from cli.options_page import page
 
 from ugv_acceptance.cli import VERBS
 
@@ -54,3 +56,9 @@ def test_a_sentence_is_wrapped_for_the_page(monkeypatch: pytest.MonkeyPatch) -> 
     lines = [line.strip() for line in text.partition('Examples')[0].splitlines()]
     start = next(k for k, line in enumerate(lines) if line.startswith('The exit code is'))
     assert lines[start + 1].startswith('of several bags the worst counts')
+
+
+def test_the_page_of_options_is_what_the_program_says() -> None:
+    """docs/options.md has every option of every verb, with its meaning."""
+    docs = Path(__file__).resolve().parents[2] / 'docs' / 'options.md'
+    assert docs.read_text('utf-8') == page()

@@ -334,6 +334,49 @@ def test_legs_in_a_guessed_posture_are_asked_about(tmp_path: Path) -> None:
     assert len(links) == 4
 
 
+def kneeling(shank: str = '-0.1') -> str:
+    """Return a dog whose knees are never straight: amid their range it is on them."""
+    text = dog().replace('0 0 -0.1"/><geometry><box size="0.03 0.03 0.16"',
+                         f'0 0 {shank}"/><geometry><box size="0.03 0.03 0.16"')  # fmt: skip
+    return re.sub(
+        r'(<joint name="\w+_knee".*?)lower="-2" upper="2"', r'\1lower="-3" upper="-2.8"', text
+    )
+
+
+def test_knees_are_no_feet(tmp_path: Path) -> None:
+    """Where the middle of its ranges has a robot on its knees, no yes makes feet of them."""
+    text = kneeling()
+    asked = init(tmp_path, text, '--mass', 'urdf', '--limit', '*=urdf')
+    assert asked.returncode == 3
+    assert 'Do these touch the ground: none?' in ' '.join(asked.stdout.split())
+    feet = 'front_left_foot,front_right_foot,rear_left_foot,rear_right_foot'
+    assert f'--contacts {feet}' in ' '.join(asked.stdout.split())
+    yes = init(tmp_path, text, '--mass', 'urdf', '--contacts', 'yes', '--overwrite')
+    assert yes.returncode == 2
+    named = ('--contacts', feet, '--mass', 'urdf', '--limit', '*=urdf', '--overwrite')
+    done = init(tmp_path, text, *named)
+    assert done.returncode == 0, done.stdout
+    assert 'not seen' in next(x for x in done.stdout.splitlines() if 'how it stands' in x)
+    assert not [w for w in load(tmp_path / 'robot.yaml').warnings if 'kneel' in w]
+
+
+def test_contacts_at_knees_are_warned_of(tmp_path: Path) -> None:
+    """A configuration that stands on knees says so when it is loaded, and is not done."""
+    feet = 'front_left_foot,front_right_foot,rear_left_foot,rear_right_foot'
+    options = ('--contacts', feet, '--mass', 'urdf', '--limit', '*=urdf')
+    assert init(tmp_path, dog(), *options).returncode == 0
+    path = tmp_path / 'robot.yaml'
+    assert not [w for w in load(path).warnings if 'kneel' in w]
+    text = path.read_text('utf-8')
+    knees = re.sub(
+        r'link: (\w+)_foot, position_m: \[.*?\]', r'link: \1_thigh, position_m: [0, 0, -0.2]', text
+    )
+    path.write_text(knees, 'utf-8')
+    warned = [w for w in load(path).warnings if 'does the robot kneel?' in w]
+    assert len(warned) == 4
+    assert ugv('init', '--check', path).returncode == 3
+
+
 @pytest.mark.parametrize(('told', 'far'), [((), 0.06), (('fork_joint',), 0.005)])
 def test_a_caster_that_nobody_tells_makes_its_points_uncertain(
     tmp_path: Path, told: tuple[str, ...], far: float
@@ -355,3 +398,16 @@ def swivelling() -> str:
     caster = wheel('caster', '-0.03 0 -0.05', tyre(0.05, 0.02), parent='fork')
     imu = link('imu_link') + joint('imu_link', '0 0 0.1', 'fixed')
     return small_rover(shape(box(0.5, 0.3, 0.1), '0 0 0.15'), pair, fork + caster + imu)
+
+
+def test_what_is_open_is_named_with_what_it_costs(tmp_path: Path) -> None:
+    """Of the mass alone the URDF's stands in; what else is open is not checked."""
+    mass = init(tmp_path, rover())
+    assert mass.returncode == 3
+    assert mass.stdout.startswith("NOT done, open: mass; the URDF's is taken\n")
+    arm = init(tmp_path, arm_alone(), '--mass', 'urdf', '--overwrite')
+    assert arm.returncode == 3
+    first = arm.stdout.splitlines()[0]
+    assert first.startswith('NOT done, open: ')
+    assert 'contacts' in first
+    assert 'mass' not in first

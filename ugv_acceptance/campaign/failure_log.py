@@ -7,12 +7,14 @@ chargeable; all but run may be left out.
 import csv
 import io
 import math
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.files import text as text_of
 from ugv_acceptance.evaluation.alerts.failure_source import FailureSource
 
 UNKNOWN = 'unknown'
@@ -82,12 +84,11 @@ def read_log(path: Path) -> list[Entry]:
     try:
         if path.stat().st_size > LARGEST:
             raise BadConfig(f'{path}: expected a failure log below 20 MB, got a larger file')
-        text = path.read_text('utf-8-sig')
+        content = path.read_bytes().removeprefix(BOM_UTF8)
     except OSError as error:
         raise BadConfig(f'{path}: expected a failure log, got: {error.strerror}') from None
-    except UnicodeDecodeError:
-        raise BadConfig(f'{path}: expected UTF-8 text, got other bytes') from None
-    rows = _csv_rows(text, path) if path.suffix.lower() == '.csv' else _yaml_rows(text, path)
+    told = text_of(content, path)
+    rows = _csv_rows(told, path) if path.suffix.lower() == '.csv' else _yaml_rows(told, path)
     return [_entry(where, row) for where, row in rows]
 
 

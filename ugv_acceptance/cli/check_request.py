@@ -36,14 +36,18 @@ def trajectory_of(source: Path, topic: str, when: str) -> 'Trajectory':
 
 
 def _text_of(source: Path) -> str:
+    from ugv_acceptance.config.files import text as text_of
+
     try:
         if source == Path('-'):
             return sys.stdin.read(LARGEST)
-        with source.open(encoding='utf-8') as file:
-            return file.read(LARGEST)
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else 'it is not UTF-8'
-        raise BadConfig(f'{source}: expected a trajectory in YAML, got: {why}') from None
+        with source.open('rb') as file:
+            content = file.read(LARGEST)
+    except UnicodeDecodeError:
+        raise BadConfig('standard input: expected UTF-8 text, got another encoding') from None
+    except OSError as error:
+        raise BadConfig(f'{source}: expected a trajectory in YAML, got: {error.strerror}') from None
+    return text_of(content, source)
 
 
 def _recorded(source: Path, topic: str, when: str) -> 'Trajectory':

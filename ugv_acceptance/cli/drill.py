@@ -36,7 +36,7 @@ def drill(
         ),
     ] = None,
     seed: Annotated[
-        int, typer.Option(min=0, help='Of sides, angles, loads, sensors: the same seed, the same.')
+        int, typer.Option(min=0, help='Seed of all that is drawn: the same seed, the same drill.')
     ] = 1,
     operator: Annotated[str, typer.Option(help='Whose drill it is, for the record.')] = 'unknown',
     out: Annotated[

@@ -5,6 +5,7 @@ Sentences are wrapped for the page they are shown on, not as the docstring is; l
 """
 
 import inspect
+import re
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -40,7 +41,25 @@ def usage_text(error: Any) -> str:  # noqa: ANN401 - typer's own class has no pu
         return str(error.format_message())
     verb = context.command_path.partition(' ')[2]
     about, path = (f'{verb}: ' if verb else ''), context.command_path
-    return f'{about}{error.format_message().rstrip(".")}; `{path} --help` says more'
+    return f'{about}{_plain(error).rstrip(".")}; `{path} --help` says more'
+
+
+# A value of the wrong kind, as the library that checks it says so.
+_WRONG = re.compile(
+    r"Invalid value for '?(?P<option>--?[\w-]+)[^:]*: Input should be (?P<what>[^,]*)"
+)
+
+
+def _plain(error: Any) -> str:  # noqa: ANN401 - see usage_text
+    """Return what is wrong as option, what was expected, and what came where that is known."""
+    message: str = error.format_message()
+    wrong = _WRONG.match(message)
+    if wrong is None:
+        return message
+    what = wrong['what'].replace('a valid integer', 'a whole number').replace('a valid', 'a')
+    told: list[Any] = getattr(error.__cause__ or error.__context__, 'errors', list)()
+    got = f', got {told[0]["input"]}' if told else ''
+    return f'{wrong["option"]}: expected {what}{got}'
 
 
 def _fit_page() -> None:

@@ -45,7 +45,7 @@ def print_found(found: 'Found') -> int:
     words = {
         DONE: f'[bold green]done:[/] {escape(found.done)}',
         FAILS: f'[bold red]NOT done, a check fails:[/] {escape(", ".join(failed))}',
-        OPEN: '[bold yellow]NOT done:[/] something is open, and what hangs on it is not checked',
+        OPEN: f'[bold yellow]NOT done, open:[/] {escape(_open(found))}',
     }
     say(console, words[code])
     for note in found.notes:
@@ -60,6 +60,14 @@ def print_found(found: 'Found') -> int:
     say(console, words[code])
     wrote(*found.written)
     return code
+
+
+def _open(found: 'Found') -> str:
+    """Return what is open, and what that costs: of the mass alone that the URDF's is taken."""
+    names = list(dict.fromkeys(check.what for check in found.checks if check.state == 'open'))
+    alone = names == ['mass']
+    cost = "the URDF's is taken" if alone else 'what hangs on it is not checked'
+    return f'{", ".join(names)}; {cost}'
 
 
 def init(
@@ -100,7 +108,7 @@ def init(
     contacts: Annotated[
         str | None,
         typer.Option(
-            help='What touches the ground: yes (as found), no, LINK,LINK.',
+            help='What touches the ground: yes (as found), no, none, LINK,LINK.',
             autocompletion=words_like('yes', 'no'),
         ),
     ] = None,
@@ -134,7 +142,8 @@ def init(
 
     Every line of the YAML says how sure it is. What no file tells is asked on a terminal, at most
     five things; in a script the options answer. Without an answer it is written as unknown: what
-    hangs on it is not checked, and nothing passes. A xacro is a program: give only one you trust.
+    hangs on it is not checked, and nothing passes. For the mass alone the URDF's stands in, and
+    every verdict says that it is assumed. A xacro is a program: give only one you trust.
 
     The exit code is 0 when done, 1 if a check fails, 2 for bad input, 3 if something is open.
 

@@ -71,7 +71,9 @@ def map(  # noqa: A001 - the verb's name; one parameter an option
     caution: Annotated[
         str, typer.Option(help='Caution from here on: 80 (% of torque), 10deg, 4 (kg), 50 (N).')
     ] = '',
-    failure: Annotated[str, typer.Option(help='Failure from here on: 100, 0deg, 2, 25.')] = '',
+    failure: Annotated[
+        str, typer.Option(help='Failure from here on, as --caution: 100, 0deg, 2, 25.')
+    ] = '',
     friction: Annotated[
         float, typer.Option(help='Friction coefficient of the tracks on the ground, for drag.')
     ] = 0.7,

@@ -68,7 +68,7 @@ def record(
     ] = '',
     duration: Annotated[str, typer.Option(help='End after so long: 90s, 10min, 2h.')] = '',
     leave: Annotated[
-        str, typer.Option(help='What stays free on the disk: recording ends before.')
+        str, typer.Option(help='End when less than this is free on the disk.')
     ] = '500MB',
     every: Annotated[
         float, typer.Option(min=0.1, help='Seconds between lines where there is no terminal.')

@@ -162,6 +162,8 @@ def tilt_from(text: str) -> tuple[float, float]:
         if name not in tilt:
             raise BadConfig(f'--tilt: expected roll or pitch, got {name}')
         tilt[name] = quantity(value, 'angle', f'--tilt {name}={value}')
+        if abs(tilt[name]) > math.pi:
+            raise BadConfig(f'--tilt {name}={value}: expected at most 180 deg to either side')
     return tilt['roll'], tilt['pitch']
 
 
@@ -170,6 +172,10 @@ def _pairs(text: str, option: str) -> list[tuple[str, str]]:
     for name, equals, _ in pairs:
         if not equals:
             raise BadConfig(f'{option}: expected name=value,name=value, got {name}')
+    names = [name.strip() for name, _, _ in pairs]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise BadConfig(f'{option}: expected each name once, got {twice} twice')
     return [(name.strip(), value) for name, _, value in pairs]
 
 

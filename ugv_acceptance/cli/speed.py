@@ -30,7 +30,8 @@ def speed(
         float, typer.Option(help="The static model's own error, N m (rms): 1.0 as in the paper.")
     ] = 1.0,
     critical: Annotated[
-        float, typer.Option(help='Critical value of F; 0: computed for 5 % and the samples.')
+        float,
+        typer.Option(help='F above which the static model is rejected; 0: at 5 %, by --samples.'),
     ] = 0.0,
     samples: Annotated[int, typer.Option(min=3, help='Postures; the paper takes 201.')] = 201,
     as_json: Annotated[bool, typer.Option('--json', help='Print JSON, not a table.')] = False,

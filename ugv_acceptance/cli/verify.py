@@ -83,8 +83,10 @@ def read_result(path: Path) -> 'Json':
         told = json.loads(path.read_text('utf-8'))
     except OSError as error:
         raise AcceptanceError(f'{path}: expected a result, got: {error.strerror}') from None
-    except (ValueError, RecursionError) as error:
-        raise AcceptanceError(f'{path}: expected JSON, got: {str(error)[:100]}') from None
+    except (ValueError, RecursionError):
+        raise AcceptanceError(
+            f'{path}: expected a result (JSON, from evaluate --json), got no JSON'
+        ) from None
     if not isinstance(told, dict):
         raise AcceptanceError(f'{path}: expected the result of one recording, got a list or less')
     if told.get('version') != RESULT_VERSION:

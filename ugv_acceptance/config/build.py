@@ -44,6 +44,13 @@ _LAW_KINDS = {
 }
 
 
+# What is expected where the library's own words are no sentence for people.
+_WORDS = {
+    'string_too_short': 'expected a text that is not empty',
+    'string_type': 'expected a text',
+}
+
+
 def checked(document: Document, model: type[M]) -> M:
     """Return the validated file; BadConfig with file, line and field of its first error."""
     try:
@@ -68,8 +75,19 @@ def _sentence(document: Document, error: dict[str, Any]) -> str:
         return f'{where}: expected this key, got none'
     if 'error' in context:
         return f'{where}: {context["error"]}'
-    text = error['msg'].replace('Input should be', 'expected', 1)
+    if error['type'] in ('dict_type', 'model_type'):
+        return f'{where}: expected keys with values, got {_given(error["input"])}'
+    if error['type'] == 'string_pattern_mismatch':
+        topic = '/' in context['pattern']
+        kind = 'a topic such as /arm/joint_states: letters, digits, _ and /, no digit first'
+        text = f'expected {kind if topic else "letters, digits, _ and - alone"}'
+        return f'{where}: {text}, got {shown(error["input"])}'
+    text = _WORDS.get(error['type']) or error['msg'].replace('Input should be', 'expected', 1)
     return f'{where}: {text}, got {shown(error["input"])}'
+
+
+def _given(value: object) -> str:
+    return 'nothing' if value is None else shown(value)
 
 
 def settings_from(build: Build) -> Settings:

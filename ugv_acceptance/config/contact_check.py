@@ -29,6 +29,9 @@ from ugv_acceptance.type_aliases import Floats
 SLACK = 0.05
 # How far (m) a mesh reaches from its link's origin at most, in diagonals of all other geometry.
 AS_LARGE = 0.75
+# A point of a leg this near its joint, as a share of how far its geometry reaches, is of the knee;
+# geometry that reaches less than so much (m) further tells nothing.
+KNEE, FURTHER = 0.5, 0.05
 # Unevenness (m) of the tracks from which it is told.
 FLAT = 1e-4
 # Lowest and highest corner (3,) of an extent along the axes, m.
@@ -53,6 +56,53 @@ class Uneven:
     names: tuple[str, ...]
     off: float
     rocking: float
+
+
+@dataclass(frozen=True, slots=True)
+class Kneeling:
+    """A contact `near` (m) the joint that moves it; `end` is the link that reaches furthest."""
+
+    contact: Contact
+    near: float
+    end: str
+    reach: float
+
+
+def kneeling(robot: Robot, shapes: Sequence[Shape]) -> tuple[Kneeling, ...]:
+    """Return the contacts at the knees of legs: what moves with them, or on them, reaches further.
+
+    Whoever stands on them lies or kneels in the posture from which they were taken. Geometry counts
+    by its middle, meshes do not; nor does what joints turn without end, as wheels on a leg do.
+    """
+    tree = tree_of(robot)
+    own, ends = _reaches(tree, shapes), _reaches(tree, shapes)
+    endless = {joint.name for joint in robot.joints if joint.kind == 'continuous'}
+    for k in range(len(tree.bodies) - 1, 0, -1):
+        body = tree.bodies[k]
+        if body.joint not in endless and k in ends and body.parent:
+            far, end = ends[k]
+            more = float(np.linalg.norm(np.array(body.offset))) + far
+            ends[body.parent] = max(ends.get(body.parent, (0.0, '')), (more, end))
+    found = []
+    for contact in robot.contacts:
+        body_of, point = in_body(tree, contact.link, contact.position)
+        near = float(np.linalg.norm(np.array(point, dtype=np.float64)))
+        reach, end = ends.get(body_of, (0.0, ''))
+        goes_on = (reach, end) != own.get(body_of, (0.0, ''))
+        if body_of and near + FURTHER < reach and (goes_on or near < KNEE * reach):
+            found.append(Kneeling(contact, near, end, reach))
+    return tuple(found)
+
+
+def _reaches(tree: Tree, shapes: Sequence[Shape]) -> dict[int, tuple[float, str]]:
+    """Return how far (m) from its joint the geometry of each body reaches, and on which link."""
+    found: dict[int, tuple[float, str]] = {}
+    for shape in shapes:
+        body, middle = in_body(tree, shape.link, shape.xyz)
+        if shape.size is not None:
+            far = float(np.linalg.norm(np.array(middle, dtype=np.float64)))
+            found[body] = max(found.get(body, (0.0, '')), (far, shape.link))
+    return found
 
 
 def uneven_tracks(robot: Robot) -> Uneven | None:

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import Document, read_document
+from ugv_acceptance.config.files import text as text_of
 from ugv_acceptance.config.schema import Name, NotNegative, Positive, Reason, Section
 from ugv_acceptance.config.units import EXAMPLES, Given, Measure, parse, shown
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
@@ -178,12 +179,9 @@ def load_criteria(path: Path, settings: Settings) -> CriteriaSet:
     """
     try:
         content = path.read_bytes()
-        text = content.decode('utf-8')
-    except UnicodeDecodeError:
-        raise BadConfig(f'{path}: expected UTF-8 text, got other bytes') from None
     except OSError as error:
         raise BadConfig(f'{path}: expected a file of criteria, got: {error.strerror}') from None
-    document = read_document(text, str(path))
+    document = read_document(text_of(content, path), str(path))
     file = checked(document, CriteriaFile)
     if not file.criteria:
         raise BadConfig(f'{document.where(("criteria",))}: expected at least one criterion')

@@ -100,6 +100,21 @@ def _place(error: Exception) -> str:
     return '' if mark is None else f':{mark.line + 1}'
 
 
+# What PyYAML says of the mistakes that people make, in words that tell what to do.
+_WORDS = (
+    ("character '\\t'", 'a tab: indent with spaces'),
+    ('expected <block end>', 'a line that is indented neither as those beside it nor below them'),
+    ('unacceptable character', 'a control character, or another encoding than UTF-8'),
+    ('mapping values are not allowed here', 'a second ":" in one line, or a line indented too far'),
+    ("could not find expected ':'", 'a line without ":" where a key is expected'),
+    ("expected ',' or", 'a bracket that is not closed, or a comma that is missing'),
+    ('unexpected end of stream', 'a quote or bracket that is not closed'),
+    ('found unexpected end', 'a quote or bracket that is not closed'),
+)
+
+
 def _problem(error: Exception) -> str:
-    text = getattr(error, 'problem', None) or str(error) or type(error).__name__
-    return ' '.join(str(text).split())
+    """Return why a text is no YAML, in plain words where it is a usual mistake."""
+    text = str(getattr(error, 'problem', None) or str(error) or type(error).__name__)
+    known = next((words for part, words in _WORDS if part in text), None)
+    return known or ' '.join(text.split())

@@ -19,7 +19,8 @@ def find(path: Path) -> Path:
     found = next((place for place in places if place.is_file()), None)
     if found is None:
         known = ', '.join(shipped()) or 'none found'
-        raise BadConfig(f'{path}: expected a file, or one that ships ({known})')
+        got = f'a link to {path.readlink()}, which is not there' if path.is_symlink() else 'none'
+        raise BadConfig(f'{path}: expected a file, or one that ships ({known}), got {got}')
     return found
 
 
@@ -75,9 +76,10 @@ def read(path: Path, what: str) -> bytes:
         raise BadConfig(f'{path}: expected a {what}, got: {reason}') from None
 
 
-def text(content: bytes, path: Path) -> str:
+def text(content: bytes, path: Path | str) -> str:
     """Return the bytes of a file as text; BadConfig if they are not UTF-8."""
     try:
         return content.decode('utf-8')
     except UnicodeDecodeError as error:
-        raise BadConfig(f'{path}: expected UTF-8 text, got byte {error.start} of another') from None
+        line = content.count(b'\n', 0, error.start) + 1
+        raise BadConfig(f'{path}:{line}: expected UTF-8 text, got another encoding') from None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.files import text as text_of
 from ugv_acceptance.config.units import shown
 
 # Entries that a report shows; one that nobody entered is marked as missing.
@@ -58,14 +59,12 @@ def file_of(text: str | None) -> Path | None:
 
 def _file(path: Path) -> dict[object, object]:
     try:
-        text = path.read_text('utf-8')
-    except UnicodeDecodeError:
-        raise BadConfig(f'{path}: expected UTF-8 text, got other bytes') from None
+        content = path.read_bytes()
     except OSError as error:
         raise BadConfig(
             f'{path}: expected KEY=VALUE,... or a YAML file of an identity, got: {error.strerror}'
         ) from None
-    data = read_document(text, str(path)).data
+    data = read_document(text_of(content, path), str(path)).data
     if not isinstance(data, dict):
         raise BadConfig(f'{path}: expected keys with values, got {shown(data)}')
     return data

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ugv_acceptance.config.contact_check import kneeling
 from ugv_acceptance.config.wheels import askew
 from ugv_acceptance.model.hull import hull, pairs
 from ugv_acceptance.model.resting import Face, lowest_of, resting_face
@@ -74,6 +75,7 @@ def setup_doubts(
     pose = pose_of(tree, body_positions(drives_of(robot, tree), q))
     points = [plain(point_of(tree, pose, c.link, c.position)[1]) for c in robot.contacts]
     found += _under_wheels(robot, tree, pose, shapes, points)
+    found += _at_knees(robot, shapes)
     moves = [k for k, c in enumerate(robot.contacts) if tree.frames[c.link][0]]
     polygon = hull(tuple(points), tuple(range(len(points))))
     if not polygon:
@@ -106,6 +108,20 @@ def _on_wheels(robot: Robot, given: Sequence[Contact]) -> list[SetupDoubt]:
             DOUBT,
         )
         for contact, off in askew(replace(robot, contacts=tuple(given)))
+    ]
+
+
+def _at_knees(robot: Robot, shapes: Sequence[Shape]) -> list[SetupDoubt]:
+    """Return the contact points that are at the knees of legs, not at their ends."""
+    return [
+        SetupDoubt(
+            ('contacts', one.contact.name, 'position'),
+            f'expected the end of a leg, got a point {1e3 * one.near:.0f} mm from the joint that '
+            f'moves {one.contact.link}: {one.end}, further out, reaches {1e3 * one.reach:.0f} mm; '
+            'does the robot kneel?',
+            DOUBT,
+        )
+        for one in kneeling(robot, shapes)
     ]
 
 

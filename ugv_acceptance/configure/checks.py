@@ -102,7 +102,12 @@ def _stands(
     for doubt in doubts:
         yield Check('.'.join(doubt.field), _state(doubt, evidence), doubt.words)
     if not doubts:
-        yield Check(STANDS, OK, _balance(settings.robot, posture))
+        words = _balance(settings.robot, posture)
+        if evidence is None and roles_of(settings.robot).legs:
+            how = 'no recording tells how its legs stand; with joints at 0, or mid of their range'
+            yield Check(STANDS, UNSEEN, f'{how}: {words}')
+        else:
+            yield Check(STANDS, OK, words)
 
 
 def _on_robot(

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ugv_acceptance.config.contact_check import Kneeling, kneeling
 from ugv_acceptance.config.urdf import Urdf, read_urdf
 from ugv_acceptance.configure.contact_points import derive_contacts
 from ugv_acceptance.configure.draft import (
@@ -77,9 +78,25 @@ def contacts_of(given: Given, draft: Draft, links: Sequence[str]) -> Contacts:
 
 def _asked_of_legs(robot: Robot, contacts: Contacts, evidence: Evidence | None) -> Contacts:
     """Return contact points with the question of the posture, where legs stand in a guessed one."""
+    knees = kneeling(robot, robot.shapes)
+    if knees:
+        return _no_knees(contacts, knees, guessed=evidence is None)
     if evidence is not None or contacts.question or not roles_of(robot).legs:
         return contacts
     return replace(contacts, question=_LEGS)
+
+
+def _no_knees(contacts: Contacts, knees: Sequence[Kneeling], *, guessed: bool) -> Contacts:
+    """Return contact points without any, where the posture has the robot on its knees."""
+    ends = list(dict.fromkeys(one.end for one in knees))
+    seen = 'with every joint at 0, or mid of its range,' if guessed else 'as recorded'
+    question = (
+        f'Its legs {seen} kneel: {knees[0].contact.link} would touch {1e3 * knees[0].near:.0f} mm '
+        f'from its joint, {ends[0]} is further out. Name the ends of its legs '
+        f'(--contacts {",".join(ends)}), or give a recording of it standing.'
+    )
+    ground: Derived[float] = Derived(None, ASK, 'no contact point is known')
+    return replace(contacts, points=(), ground=ground, tilt=0.0, question=question)
 
 
 def robot_of(urdf: Urdf, joints: Joints, contacts: Contacts) -> Robot:

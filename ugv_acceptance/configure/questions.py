@@ -238,10 +238,10 @@ def _check_links(draft: Draft, links: Sequence[str], option: str) -> None:
 def _with_tilt(draft: Draft, answers: Answers, _: Anew) -> Draft:
     contacts = draft.contacts
     asked = _tilt(draft) is not None or 'this tilt real' in contacts.question
+    if answers.tilt not in {None, REAL, NOT_REAL}:
+        raise BadConfig(f'--tilt: expected {REAL} or {NOT_REAL}, got {cut(str(answers.tilt))}')
     if answers.tilt is None or not asked:
         return draft
-    if answers.tilt not in {REAL, NOT_REAL}:
-        raise BadConfig(f'--tilt: expected {REAL} or {NOT_REAL}, got {cut(answers.tilt)}')
     if answers.tilt == NOT_REAL:
         # The points are wrong then, and nobody knows which: what hangs on them is not checked.
         words = 'You said that the tilt of their plane is not real: which of them is wrong?'

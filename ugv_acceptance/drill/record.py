@@ -126,9 +126,10 @@ def _content(path: Path) -> bytes:
 def _read(path: Path, content: bytes) -> Json:
     try:
         record = json.loads(content)
-    except (ValueError, RecursionError) as error:
+    except (ValueError, RecursionError):
+        got = 'an empty file' if not content.strip() else 'no JSON'
         raise AcceptanceError(
-            f'{path}: expected the record of a drill, JSON, got: {str(error)[:SHOWN]}'
+            f'{path}: expected the record of a drill (JSON, from drill --out), got {got}'
         ) from None
     if not isinstance(record, dict) or record.get('kind') != KIND:
         raise AcceptanceError(f"{path}: kind: expected '{KIND}', got {_kind_of(record)}")

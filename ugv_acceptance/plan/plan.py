@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from ugv_acceptance import BadConfig
 from ugv_acceptance.config.build import checked
 from ugv_acceptance.config.document import read_document
+from ugv_acceptance.config.files import text as text_of
 from ugv_acceptance.config.poses import pose_named
 from ugv_acceptance.config.seal import sealed
 from ugv_acceptance.evaluation.alerts.messages import RECORDED
@@ -187,11 +188,10 @@ def read_plan(path: Path, robot: Robot | None = None) -> Plan:
     pose, whose angles the steps that name it then have.
     """
     try:
-        text = path.read_text('utf-8')
-    except (OSError, UnicodeDecodeError) as error:
-        got = error.strerror if isinstance(error, OSError) else error
-        raise BadConfig(f'{path}: expected a plan, got: {got}') from None
-    document = read_document(text, str(path))
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadConfig(f'{path}: expected a plan, got: {error.strerror}') from None
+    document = read_document(text_of(content, path), str(path))
     plan = checked(document, Plan)
     if robot is None:
         return plan
