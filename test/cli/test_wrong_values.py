@@ -25,6 +25,14 @@ def test_a_wrong_value_is_one_line(words: tuple[str, ...], line: str) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.parametrize('words', [('evaluate', ''), ('model', '-c', ''), ('map', 'x', '--out=')])
+def test_an_empty_path_is_not_the_current_folder(words: tuple[str, ...]) -> None:
+    """As an unset variable of a shell leaves it: another recording would be judged than meant."""
+    done = ugv(*words)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert f'{words[0]}: expected a path, got ""' in done.stderr
+
+
 def test_an_answer_that_nobody_asked_for_has_to_be_one(tmp_path: Path) -> None:
     """A misspelt --tilt is refused, also where no tilt is in doubt."""
     (tmp_path / 'my.urdf').write_text(rover(), 'utf-8')

@@ -7,7 +7,8 @@ Sentences are wrapped for the page they are shown on, not as the docstring is; l
 import inspect
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -74,8 +75,24 @@ def _fit_page() -> None:
     rich_utils.COLOR_SYSTEM = system
 
 
+def _folders_here(values: Iterable[object]) -> int:
+    """Return how many paths among a verb's values, alone or in lists, are the current folder."""
+    lists = [value if isinstance(value, list | tuple) else (value,) for value in values]
+    return sum(isinstance(one, Path) and one == Path() for some in lists for one in some)
+
+
 class Verb(TyperCommand):
-    """A verb whose help fits the page it is shown on."""
+    """A verb whose help fits the page it is shown on, and which takes no empty path."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as below
+        """Parse the words; a usage error where a path is empty, as an unset variable leaves it."""
+        words = [word.rpartition('=')[2] if word[:1] == '-' else word for word in args]
+        rest: list[str] = super().parse_args(ctx, args)
+        # Path('') is the current folder.
+        here = [word for word in words if word and Path(word) == Path()]
+        if '' in words and _folders_here(ctx.params.values()) > len(here):
+            ctx.fail('expected a path, got ""')
+        return rest
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - classes of typer's
         """Write the help."""
