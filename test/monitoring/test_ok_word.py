@@ -127,6 +127,17 @@ def test_it_is_false_in_danger_and_until_that_was_reset() -> None:
     assert robot.stand(0.1).why == ''
 
 
+def test_it_is_false_before_the_delay_of_an_alert_is_over() -> None:
+    """A limit of DANGER that is passed now, by a load or a fall, is false from that message on."""
+    assert ready().stand(0.02, roll=FALL).why == 'a limit of DANGER is passed'
+    settings = replace(SETTINGS, robot=replace(SETTINGS.robot, contacts=WIDE))
+    robot = Robot(settings).stand(SETTLED + 0.5)
+    assert robot.why == ''
+    load = inertia_cdr(robot.at, 'gripper_link', 30.0, (0.0, 0.0, 0.0))
+    robot.session.take_payload(load)
+    assert robot.stand(0.02).why == 'a limit of DANGER is passed'
+
+
 def test_an_overload_that_is_over_must_be_acknowledged() -> None:
     """A torque beyond its limit is false until somebody has seen it."""
     settings = replace(SETTINGS, robot=replace(SETTINGS.robot, contacts=WIDE))
