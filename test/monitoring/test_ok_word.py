@@ -10,7 +10,7 @@ from nodes.live_case import FOLDED, NAMES
 from ugv_acceptance.bag.encode import imu_cdr, inertia_cdr, joint_state_cdr
 from ugv_acceptance.config import load
 from ugv_acceptance.evaluation.alerts.messages import ALERTS, LIVE
-from ugv_acceptance.evaluation.alerts.state_machine import OK, WARN
+from ugv_acceptance.evaluation.alerts.state_machine import OK, STALE, WARN
 from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.monitoring.diagnostics import verdict_of
 from ugv_acceptance.monitoring.ok_word import ADVISING, SETTLED, Delay, OkWord
@@ -125,6 +125,17 @@ def test_it_is_false_in_danger_and_until_that_was_reset() -> None:
     assert robot.stand(0.1).why == 'TIP_OVER right: over, latched until reset'
     alarms.reset(robot.at, 'Ada')
     assert robot.stand(0.1).why == ''
+
+
+def test_it_is_false_before_the_delay_of_an_alert_is_over() -> None:
+    """A limit of DANGER that is passed now, by a load or a fall, is false from that message on."""
+    assert ready().stand(0.02, roll=FALL).why == 'a limit of DANGER is passed'
+    settings = replace(SETTINGS, robot=replace(SETTINGS.robot, contacts=WIDE))
+    robot = Robot(settings).stand(SETTLED + 0.5)
+    assert robot.why == ''
+    load = inertia_cdr(robot.at, 'gripper_link', 30.0, (0.0, 0.0, 0.0))
+    robot.session.take_payload(load)
+    assert robot.stand(0.02).why == 'a limit of DANGER is passed'
 
 
 def test_an_overload_that_is_over_must_be_acknowledged() -> None:
@@ -315,6 +326,30 @@ def test_one_of_two_drivers_of_a_topic_that_repeats_itself_is_seen(frozen: int) 
     assert robot.why == ''
     robot.run(2.0, send)
     assert robot.true <= 1002 * S + 100 * MS
+
+
+@pytest.mark.parametrize('speed', [0.0, 0.2, 1.0, 3.0])
+def test_joints_that_are_repeated_in_a_simulation_are_no_data(speed: float) -> None:
+    """At whatever speed /clock runs, and where it stands: an old message is no new one."""
+    robot = Robot(simulated=True)
+    began = robot.at + 1990 * MS  # no whole second: such a stamp may stand still for longer
+    last = 0
+
+    def send(at: int) -> None:
+        nonlocal last
+        lives = at <= began
+        clock = 50 * S + round((at - began) * (1.0 if lives else speed))
+        last = clock if lives else last
+        robot.session.stamps.follow(at, clock)
+        robot.joints(last)
+        robot.session.take_imu(imu(clock))
+
+    robot.run(1.99, send)
+    assert (robot.level, robot.why) == (OK, '')
+    robot.run(1.0, send)
+    assert robot.level == STALE
+    assert {a.rule.code for a in robot.session.active} >= {'JOINTS_REPEATED'}
+    assert robot.true <= began + 100 * MS
 
 
 def test_a_driver_that_names_its_joints_otherwise_from_now_on_is_alive() -> None:

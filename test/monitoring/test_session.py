@@ -198,6 +198,20 @@ def test_simulated_stamps_are_shifted_into_receipt_time(now: int, simulated: int
     assert abs(stamps.stamp(now, simulated) - now) <= RESHIFT
 
 
+@given(st.integers(0, 2**60), st.lists(st.integers(0, 10**10), min_size=1, max_size=50))
+def test_a_simulated_stamp_that_stands_still_does_so_whatever_the_clock_does(
+    first: int, steps: list[int]
+) -> None:
+    """A slow or frozen /clock moves the shift, but not what a stamp was converted to."""
+    stamps, now = StampShift(simulated=True), first
+    stamps.follow(now, first // 2 + 1)
+    still = stamps.stamp(now, first // 2)
+    for step in steps:
+        now += step
+        stamps.follow(now, first // 2 + 1)
+        assert stamps.stamp(now, first // 2) == still
+
+
 def test_real_stamps_are_not_shifted() -> None:
     """Without use_sim_time nothing moves a stamp."""
     stamps = StampShift()

@@ -16,6 +16,9 @@ from hypothesis import strategies as st
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from nodes.live_case import ERROR, FOLDED, OK, STALE, WARN, Live, imu, levels, parameter, session_of
+from rcl_interfaces.msg import Parameter as Msg
+from rcl_interfaces.msg import ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -38,6 +41,32 @@ def change(live: Live, transition: int) -> bool:
 def state(live: Live) -> str:
     """Return the monitor's state as it tells others."""
     return str(live.call(GetState, '/acceptance_monitor/get_state').current_state.label)
+
+
+def test_a_transition_that_its_state_does_not_have_is_refused(live: Live) -> None:
+    """Asked twice to activate, or for a transition that does not exist, the monitor goes on."""
+    monitor, driver = live.running()
+    for transition in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CLEANUP, 200):
+        assert not change(live, transition)
+    assert state(live) == 'active'
+    heard = len(driver.verdicts)
+    live.until(lambda: OK in levels(driver)[heard:], driver.send)
+    assert monitor.session is not None
+
+
+@pytest.mark.parametrize('kind', [0, 3, 77, 255])
+def test_a_parameter_of_no_type_is_refused(live: Live, kind: int) -> None:
+    """A value without a type, of another, or of one that ROS does not have, ends nothing."""
+    live.running()
+    value = ParameterValue(type=kind, integer_value=-1)
+    for service, how in (
+        (SetParameters, 'set_parameters'),
+        (SetParametersAtomically, 'set_parameters_atomically'),
+    ):
+        request = service.Request(parameters=[Msg(name='limits.tip_warn_deg', value=value)])
+        answer = live.call(service, f'/acceptance_monitor/{how}', request)
+        results = answer.results if how == 'set_parameters' else [answer.result]
+        assert not any(result.successful for result in results)
 
 
 def put(monitor: Any, **values: Any) -> Any:

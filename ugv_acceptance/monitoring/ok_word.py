@@ -11,6 +11,7 @@ false wherever the verdict is DANGER or NO DATA, and also
   that is relaxed, a second or foreign publisher, a robot that is not the configured one, another
   payload than declared, a margin smaller than its uncertainty, a wrong clock, a slow input, an IMU
   or a motor that contradicts itself. An alert that is new here is one of these;
+* while a margin is where DANGER begins, before the alert's delay is over too;
 * while a failure of the robot that is over waits to be acknowledged, of tip-over to be reset;
 * until the uncertainty of the margins has been worked out once;
 * while the data are older than the stale limit of their input: by receipt, by a header stamp that
@@ -153,6 +154,8 @@ class OkWord:
             rule = alert.rule
             if rule.level > WARN or rule.code not in ADVISING:
                 yield f'{level_words(rule.level)} {rule.code} {rule.subject}'
+        if _is_passed(session):
+            yield 'a limit of DANGER is passed'
         if session.evaluator.waits_for_trend:
             yield 'whether the robot begins to tip is not known yet'
         if not session.certainty.known:
@@ -176,6 +179,17 @@ def told_anew(joints: JointMerger) -> int:
         if any(joints.seen[j] == layout.last for j, _ in layout.pairs)
     ]
     return min([*newest, *joints.seen])
+
+
+def _is_passed(session: Session) -> bool:
+    """Return whether a margin is now where DANGER begins, though the alert's delay is not over."""
+    margins, limits = session.evaluator.margins, session.settings.limits
+    if margins is None:
+        return True
+    angles: Any = margins.angle
+    pairs = zip(margins.torque, limits.torque, strict=True)
+    over = any(abs(torque) >= limits.torque_error * most for torque, most in pairs)
+    return over or min(angles) <= limits.tip_error
 
 
 def _settled(settings: Settings) -> int:

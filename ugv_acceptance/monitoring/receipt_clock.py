@@ -11,6 +11,8 @@ from typing import Protocol
 
 # Simulated time may drift this far (ns) from real time before the shift is renewed.
 RESHIFT = 250_000_000
+# Newest stamps of which is remembered what they were converted to.
+REMEMBERED = 64
 
 
 def _offset() -> int:
@@ -40,18 +42,26 @@ class StampShift:
     """Converts header stamps to receipt time by `shift` (ns), where they are `simulated`.
 
     The shift follows `/clock`; before its first message, it is such that the first header stamp
-    equals the present.
+    equals the present. A stamp that comes again is converted as before: what stands still does so
+    while `/clock` runs slowly, or not at all.
     """
 
     simulated: bool = False
     shift: int = 0
     shifted: bool = False
+    _converted: dict[int, int] = field(default_factory=dict)
 
     def stamp(self, now: int, stamp: int) -> int:
         """Return a header stamp (ns) converted to the time of this clock."""
-        if self.simulated and not self.shifted:
+        if not self.simulated:
+            return stamp
+        if not self.shifted:
             self.shift, self.shifted = now - stamp, True
-        return stamp + self.shift
+        converted = self._converted
+        found = converted[stamp] = converted.pop(stamp, stamp + self.shift)
+        if len(converted) > REMEMBERED:
+            del converted[next(iter(converted))]
+        return found
 
     def follow(self, now: int, simulated_now: int) -> None:
         """Renew the shift if `/clock` (`simulated_now`, ns; 0: none yet) has drifted from it."""

@@ -1,4 +1,4 @@
-"""Keeps a fault of our own code in a timer from ending the monitor."""
+"""Keeps a fault in a timer or a service from ending the monitor."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -28,3 +28,21 @@ def guarded(watcher: Watcher, work: Callable[[], None]) -> Callable[[], None]:
                 watcher.session.fail(work.__name__, error)
 
     return run
+
+
+def answering(watcher: Watcher, name: str, answer: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap what answers a service, so that an exception is logged and the answer stays as it began.
+
+    That is no success, where an answer says so. rclpy raises where a lifecycle manager asks for a
+    transition that its state does not have, and ends the node.
+    """
+
+    def call(request: Any, response: Any) -> Any:  # noqa: ANN401 - of any service
+        try:
+            return answer(request, response)
+        except Exception as error:  # noqa: BLE001 - no request may end the watch
+            text = f'{name}: refused: {error}'
+            watcher.get_logger().warning(text, throttle_duration_sec=5.0)
+            return type(response)()
+
+    return call

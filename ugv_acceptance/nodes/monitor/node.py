@@ -34,7 +34,7 @@ from ugv_acceptance.monitoring.receipt_clock import StampShift
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.nodes.executor import run
 from ugv_acceptance.nodes.monitor.black_box import BlackBox
-from ugv_acceptance.nodes.monitor.guarded import guarded
+from ugv_acceptance.nodes.monitor.guarded import answering, guarded
 from ugv_acceptance.nodes.monitor.lamps import Lamps
 from ugv_acceptance.nodes.monitor.motion_desk import MotionDesk
 from ugv_acceptance.nodes.monitor.ok_output import OkOutput
@@ -101,6 +101,8 @@ class Monitor(FittingParameters, LifecycleNode):
         self.motions = MotionDesk(
             self, lambda: self.session, lambda: self._inputs, self.output, self.steady
         )
+        for service in self.services:
+            service.callback = answering(self, service.srv_name, service.callback)
         self.say()
 
     def destroy_node(self) -> None:

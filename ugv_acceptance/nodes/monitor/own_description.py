@@ -63,14 +63,22 @@ class OwnDescription:
             self.listen(topic)
         return topic is not None
 
-    def complete(self, path: Path, urdf: Path | None, *, wait: bool) -> Config:
+    def complete(
+        self,
+        path: Path,
+        urdf: Path | None,
+        *,
+        wait: bool,
+        asked: Callable[[], bool] = lambda: False,
+    ) -> Config:
         """Load a robot's files, with the robot's own description where they name no URDF.
 
-        With `wait` it waits for the description. Raises BadConfig where there is none to take.
+        With `wait` it waits for the description, until it is `asked` to end. Raises BadConfig where
+        there is none to take.
         """
         if self.is_needed(path, urdf):
             if wait:
-                self._wait()
+                self._wait(asked)
             return load(path, urdf_text=self._take())
         config = load(path, urdf=urdf)
         self.listen(config.topics.robot_description)
@@ -142,12 +150,15 @@ class OwnDescription:
         self._tried = self._take()
         return True
 
-    def _wait(self) -> None:
-        """Wait until a description can be taken, at most WAIT; blocks the node's executor."""
+    def _wait(self, asked: Callable[[], bool]) -> None:
+        """Wait until a description can be taken or it is `asked` to end, at most WAIT.
+
+        Blocks the node's executor.
+        """
         # Taken by hand, since the executor waits for this function.
         probe = self._node.create_subscription(String, self.topic, _nothing, QOS, raw=True)
         end = time.monotonic() + WAIT
-        while time.monotonic() < end and not (self._settled and not self.obstacle()):
+        while time.monotonic() < end and not (asked() or (self._settled and not self.obstacle())):
             with probe.handle:
                 got = probe.handle.take_message(String, True)
             if got is None:
@@ -191,17 +202,19 @@ class OwnDescription:
 def load_live(config: Path | None, urdf: Path | None, args: list[str]) -> Config:
     """Load a robot's files; where they name no URDF, with the one the robot tells over ROS.
 
-    `args` are ROS arguments. Raises BadConfig where the robot tells none that can be taken.
+    `args` are ROS arguments. Raises BadConfig where the robot tells none that can be taken, and
+    SystemExit where a signal asks the process to end meanwhile.
     """
     if description_topic(config, urdf=urdf) is None:
         return load(config, urdf=urdf)
-    with ros(args):
+    with ros(args) as stop:
         node = Node('robot_description_reader')
         try:
             own = OwnDescription(node, _nothing)
-            return own.complete(config or Path(), urdf, wait=True)
+            return own.complete(config or Path(), urdf, wait=True, asked=lambda: stop.asked)
         finally:
             node.destroy_node()
+            stop.leave()
 
 
 def _told(data: bytes) -> str | BadSample:
