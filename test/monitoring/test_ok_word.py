@@ -136,6 +136,7 @@ def test_it_is_false_before_the_delay_of_an_alert_is_over() -> None:
     load = inertia_cdr(robot.at, 'gripper_link', 30.0, (0.0, 0.0, 0.0))
     robot.session.take_payload(load)
     assert robot.stand(0.02).why == 'a limit of DANGER is passed'
+    assert verdict_of(robot.session).message.startswith('a limit of DANGER is passed: ')
 
 
 def test_an_overload_that_is_over_must_be_acknowledged() -> None:

@@ -23,6 +23,7 @@ from ugv_acceptance.model.stability import NO_CONTACT, SIDES, STATES
 from ugv_acceptance.monitoring.ground_words import ground_values, tilt_words
 from ugv_acceptance.monitoring.input_status import InputSources, input_status
 from ugv_acceptance.monitoring.message_order import in_order
+from ugv_acceptance.monitoring.ok_word import REACHED, danger_is_reached
 from ugv_acceptance.monitoring.session import Session
 from ugv_acceptance.monitoring.status import Status as Status  # noqa: PLC0414 - others take it from here
 
@@ -62,7 +63,8 @@ def verdict_of(session: Session) -> Status:
         text = '; '.join(words for words in (unknown_words(session.settings), left) if words)
         return Status(STALE, '', text, values | known)
     kept = kept_words(session.settings, rough=session.settings.ground.rough)
-    return Status(OK, '', f'{kept}: {left}', values | known)
+    words = REACHED if danger_is_reached(session) else kept
+    return Status(OK, '', f'{words}: {left}', values | known)
 
 
 def _left(margins: Margins, session: Session) -> str:

@@ -58,6 +58,8 @@ ADVISING = frozenset(
 )
 # Half of the time (ns) over which the quickest message of an input is remembered.
 HALF = 30_000_000_000
+# What is so while an alert of DANGER waits for its delay.
+REACHED = 'a limit of DANGER is passed'
 
 
 @dataclass(slots=True)
@@ -154,8 +156,8 @@ class OkWord:
             rule = alert.rule
             if rule.level > WARN or rule.code not in ADVISING:
                 yield f'{level_words(rule.level)} {rule.code} {rule.subject}'
-        if _is_passed(session):
-            yield 'a limit of DANGER is passed'
+        if danger_is_reached(session):
+            yield REACHED
         if session.evaluator.waits_for_trend:
             yield 'whether the robot begins to tip is not known yet'
         if not session.certainty.known:
@@ -181,7 +183,7 @@ def told_anew(joints: JointMerger) -> int:
     return min([*newest, *joints.seen])
 
 
-def _is_passed(session: Session) -> bool:
+def danger_is_reached(session: Session) -> bool:
     """Return whether a margin is now where DANGER begins, though the alert's delay is not over."""
     margins, limits = session.evaluator.margins, session.settings.limits
     if margins is None:
