@@ -1,17 +1,23 @@
-"""A load that is told in messages nobody can read: what is judged is a guess, and no PASS."""
+"""A load that is told in messages nobody can read, or by two in turn: a guess, and no PASS."""
 
 import struct
 from collections.abc import Callable
+from itertools import cycle, islice
 from pathlib import Path
 
 import pytest
 import yaml
+from evaluation.streams import settings
 
 import ugv_acceptance as ugv
+from ugv_acceptance.bag.encode import inertia_cdr
 from ugv_acceptance.bag.metadata import NAME as METADATA
 from ugv_acceptance.bag.raw import messages
 from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.bag.writer import BagWriter
+from ugv_acceptance.evaluation.inputs.payload import PayloadLog
+from ugv_acceptance.model.robot import Payload
+from ugv_acceptance.offline.unread_load import disputed_load
 
 PAYLOAD = 'geometry_msgs/msg/InertiaStamped'
 FLOAT = 'std_msgs/msg/Float64'
@@ -110,3 +116,40 @@ def test_a_load_of_which_metadata_alone_tells_is_lost(repository: Path, tmp_path
     about['topics_with_message_count'].append({'topic_metadata': of, 'message_count': 3})
     (folder / METADATA).write_text(yaml.safe_dump(told))
     assert ugv.evaluate(folder).result['bag']['lost_messages'] == 3
+
+
+@pytest.mark.parametrize(
+    ('every', 'loads', 'kg'),
+    [
+        (1.0, (1.0, 0.2), '0.2 and 1 kg'),
+        (2.0, (1.0, 0.2, 0.5), '0.2 and 0.5 and 1 kg'),
+        (0.01, (0.0, 1.0), '0 and 1 kg'),
+        (6.0, (1.0, 0.2), ''),
+        (1.0, (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7), ''),
+    ],
+)
+def test_a_load_that_two_tell_in_turn_is_disputed(
+    every: float, loads: tuple[float, ...], kg: str
+) -> None:
+    """Quicker than one is set down and another one taken up; a load may be told to change."""
+    told = PayloadLog(settings())
+    told.payloads = [Payload(mass, (0.0, 0.0, 0.0)) for mass in islice(cycle(loads), 8)]
+    told.since = [round(every * 1e9) * k for k in range(8)]
+    said = [objection.reason for objection in disputed_load(told).objections]
+    assert said == ([f'the load is told as {kg} in turn: two tell it'] if kg else [])
+
+
+def test_a_run_whose_load_is_disputed_is_no_pass(repository: Path, tmp_path: Path) -> None:
+    """The good run, told 1 kg and 0.2 kg in turn."""
+    bag = open_bag(repository / 'bags' / 'packbot_pass')
+    with BagWriter(tmp_path / 'run') as writer:
+        for name, topic in bag.topics.items():
+            writer.add_topic(name, topic.type)
+        for k, message in enumerate(messages(bag, list(bag.topics))):
+            writer.write(message.topic, message.log_time, message.data)
+            if k % 200 == 0:
+                light = inertia_cdr(message.log_time, 'gripper_link', 0.2, (0.0, 0.0, 0.0))
+                writer.write('/payload', message.log_time, light)
+    found = ugv.evaluate(tmp_path / 'run')
+    assert found.verdict == 'INCONCLUSIVE'
+    assert 'the load is told as 0.2 and 1 kg in turn: two tell it' in found.reasons

@@ -41,7 +41,7 @@ from ugv_acceptance.offline.evaluation import Judgement
 from ugv_acceptance.offline.recorded_transforms import with_transforms
 from ugv_acceptance.offline.stretches import stretches
 from ugv_acceptance.offline.training import TrainingRecord
-from ugv_acceptance.offline.unread_load import unread_load
+from ugv_acceptance.offline.unread_load import disputed_load, unread_load
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.
@@ -111,6 +111,7 @@ def judge(
     statements.append(absent_imu(settings, topics.imu))
     configured = recording.names or NAMES
     statements.append(unread_load(bag, topics, configured[-1], batches.facts))
+    statements.append(disputed_load(asked.payloads))
     statements.append(untold_joints(settings, evaluator.joints.never_told))
     statements.append(assumptions(settings, sources, asked, evaluator.first_payload))
     for statement in statements:

@@ -1,4 +1,4 @@
-"""Whether a recording tells a load in messages that are not read: what is judged is a guess."""
+"""Whether the load that a recording tells is one to judge by, and all that it tells is read."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -9,6 +9,11 @@ from ugv_acceptance.bag.reader import Bag, Topics
 from ugv_acceptance.bag.reading import Facts, normal_type, wire_of
 from ugv_acceptance.evaluation.criteria.criteria import INCONCLUSIVE
 from ugv_acceptance.evaluation.criteria.statement import Objection, Statement
+from ugv_acceptance.evaluation.inputs.payload import PayloadLog
+
+# As often within this time (ns) is a load told again that another one had replaced, where two tell
+# it in turn: nobody sets a load down and takes it up so fast.
+RETURNS, RETURNED = 3, 10_000_000_000
 
 
 def unread_load(bag: Bag, topics: Topics, configured: str, facts: Facts) -> Statement:
@@ -22,6 +27,20 @@ def unread_load(bag: Bag, topics: Topics, configured: str, facts: Facts) -> Stat
             for why in _unread(bag, topics.payload, configured.lstrip('/'), facts)
         )
     )
+
+
+def disputed_load(told: PayloadLog) -> Statement:
+    """Return the objection to a load that two or more tell differently, in turn; `told` in ns."""
+    loads = told.payloads
+    back = [k for k in range(2, len(loads)) if loads[k] in loads[max(0, k - 4) : k - 1]]
+    for first, last in zip(back, back[RETURNS - 1 :], strict=False):
+        if told.since[last] - told.since[first] <= RETURNED:
+            masses = sorted({load.mass for load in loads[first - 2 : last + 1]})
+            where = '' if len(masses) > 1 else 'at different places, '
+            why = f'{" and ".join(f"{mass:g}" for mass in masses)} kg {where}in turn: two tell it'
+            objection = Objection('payload', INCONCLUSIVE, f'the load is told as {why}')
+            return Statement(objections=(objection,))
+    return Statement()
 
 
 def _unread(bag: Bag, chosen: str | None, configured: str, facts: Facts) -> Iterator[str]:
