@@ -340,7 +340,7 @@ def test_a_result_of_an_older_version_says_where_it_is_told_what_to_do(
 @pytest.mark.parametrize(
     ('text', 'words'),
     [
-        ('{', 'expected JSON'),
+        ('{', 'got no JSON'),
         ('[]', 'expected the result of one recording'),
         ('{"version": 99}', 'expected a result of version 2, got 99'),
         ('{"version": 2}', 'bag: expected a result of evaluate'),

@@ -30,11 +30,11 @@ from ugv_acceptance.evaluation.settings import Settings
 from ugv_acceptance.type_aliases import Json
 
 SAFEGUARDS = {
-    'tipping': 'the robot is never past its tipping point',
+    'tipping': 'the robot is never past its tipping point, nor about to be at the end',
     'ground': 'on uneven ground and stairs tip-over is judged by a rule that the criteria accept',
-    'torque_limit': 'no joint needs more torque than its limit',
+    'torque_limit': 'no joint needs more torque than its limit, nor is about to at the end',
     'unseen_stretches': f'no stretch of over {LONGEST_UNSEEN:g} s is without margins',
-    'recording': 'the recording is whole, lasts a second, and does not end on the way to a limit',
+    'recording': 'the recording is whole, all of its messages are there, and it lasts a second',
     'chassis_acceleration': 'no acceleration of the chassis tips the robot or lifts its tracks',
     'static_model': 'joints move slowly enough for margins that assume they rest',
     'measured_effort': 'no measured effort reaches the limit of its joint',
@@ -52,8 +52,8 @@ ALERT_OBJECTIONS: dict[str, tuple[str, str]] = {
     'ARM_ON_GROUND': ('ground_contact', INCONCLUSIVE),
 }
 # A limit will be passed within a second: nobody saw whether it was, where these alerts are
-# active at the end.
-_AHEAD = ('TIP_AHEAD', 'TORQUE_AHEAD')
+# active at the end. Code -> safeguard.
+_AHEAD = {'TIP_AHEAD': 'tipping', 'TORQUE_AHEAD': 'torque_limit'}
 # What a criterion on values is about, and the safeguard that would say the same again.
 _SAID_BY = {
     'tip_angle': 'tipping',
@@ -171,8 +171,8 @@ def _from_alerts(
     seen = set(unfounded)
     for alert in alerts:
         if alert.rule.code in _AHEAD and alert.end is None:
-            words = describe(alert, settings, start)
-            yield Objection('recording', INCONCLUSIVE, f'the recording ends too early: {words}')
+            words = f'the recording ends too early: {describe(alert, settings, start)}'
+            yield Objection(_AHEAD[alert.rule.code], INCONCLUSIVE, words)
         told = ALERT_OBJECTIONS.get(alert.rule.code)
         if told is None or (alert.rule.code, alert.rule.subject) in seen:
             continue
