@@ -185,13 +185,8 @@ def told_anew(joints: JointMerger) -> int:
 
 def danger_is_reached(session: Session) -> bool:
     """Return whether a margin is now where DANGER begins, though the alert's delay is not over."""
-    margins, limits = session.evaluator.margins, session.settings.limits
-    if margins is None:
-        return True
-    angles: Any = margins.angle
-    pairs = zip(margins.torque, limits.torque, strict=True)
-    over = any(abs(torque) >= limits.torque_error * most for torque, most in pairs)
-    return over or min(angles) <= limits.tip_error
+    watch = session.evaluator.watch
+    return any(error.raw for _, error in (*watch.torque, *watch.tip))
 
 
 def _settled(settings: Settings) -> int:

@@ -40,8 +40,8 @@ from ugv_acceptance.evaluation.summary import Summary, ordered, result_of
 from ugv_acceptance.offline.evaluation import Judgement
 from ugv_acceptance.offline.recorded_transforms import with_transforms
 from ugv_acceptance.offline.stretches import stretches
+from ugv_acceptance.offline.told_load import disputed_load, unread_load
 from ugv_acceptance.offline.training import TrainingRecord
-from ugv_acceptance.offline.unread_load import disputed_load, unread_load
 from ugv_acceptance.type_aliases import Json
 
 # Version of the result's layout; it changes when programs that read results must change.

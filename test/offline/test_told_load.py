@@ -17,7 +17,7 @@ from ugv_acceptance.bag.reader import open_bag
 from ugv_acceptance.bag.writer import BagWriter
 from ugv_acceptance.evaluation.inputs.payload import PayloadLog
 from ugv_acceptance.model.robot import Payload
-from ugv_acceptance.offline.unread_load import disputed_load
+from ugv_acceptance.offline.told_load import disputed_load
 
 PAYLOAD = 'geometry_msgs/msg/InertiaStamped'
 FLOAT = 'std_msgs/msg/Float64'
